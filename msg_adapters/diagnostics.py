@@ -1,0 +1,44 @@
+"""Diagnostics: a level, a sentence and named values -> diagnostic_msgs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from msg_adapters.stamps import ns_to_stamp
+
+
+class Level(Enum):
+    """How a node does."""
+
+    OK = DiagnosticStatus.OK
+    WARN = DiagnosticStatus.WARN
+    ERROR = DiagnosticStatus.ERROR
+    STALE = DiagnosticStatus.STALE
+
+
+def diagnostic_status(
+    name: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str = ""
+) -> DiagnosticStatus:
+    """The status of one component. Floats are written with six digits, lists with commas, None as '-'."""
+    pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
+    return DiagnosticStatus(level=level.value, name=name, message=message, hardware_id=hardware_id, values=pairs)
+
+
+def diagnostic_array(stamp_ns: int, *statuses: DiagnosticStatus) -> DiagnosticArray:
+    """What goes out on /diagnostics; stamp_ns in ns."""
+    array = DiagnosticArray(status=list(statuses))
+    array.header.stamp = ns_to_stamp(stamp_ns)
+    return array
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_text(item) for item in value) or "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

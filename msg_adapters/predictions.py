@@ -1,0 +1,119 @@
+"""PredictPush and PredictPushBatch, both ends: arrays -> request -> arrays -> response -> arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
+
+from msg_adapters import MessageError
+from push_predictor.errors import RequestError
+from push_predictor.models.push_model import Prediction
+from push_predictor.types import Array
+
+Response = TypeVar("Response", PredictPush.Response, PredictPushBatch.Response)
+
+
+@dataclass(frozen=True, eq=False)
+class PushQuery:
+    """n pushes asked of one model: inputs (n, 3: velocity m/s, contact, angle rad), one duration (s) for all,
+    covariates (n,) by name. model: a name, empty for the default one."""
+
+    model: str
+    inputs: Array
+    duration: float
+    covariates: dict[str, Array]
+
+
+def query_to_request(
+    model: str, push: Array, duration: float, covariates: Mapping[str, float] | None = None
+) -> PredictPush.Request:
+    """The request for one push (3,)."""
+    request = PredictPush.Request(model=model, duration=float(duration))
+    request.velocity, request.contact, request.angle = (float(value) for value in push)
+    request.covariate_names = list(covariates or {})
+    request.covariate_values = [float(value) for value in (covariates or {}).values()]
+    return request
+
+
+def query_to_batch_request(query: PushQuery) -> PredictPushBatch.Request:
+    """The request for n pushes."""
+    request = PredictPushBatch.Request(model=query.model, duration=float(query.duration))
+    request.velocity, request.contact, request.angle = (column.tolist() for column in query.inputs.T)
+    request.covariate_names = list(query.covariates)
+    request.covariate_values = _push_by_push(query.covariates).ravel().tolist()
+    return request
+
+
+def query_from_request(request: Any) -> PushQuery:
+    """The query of a PredictPush request, n = 1. Raises RequestError if names and values of covariates do not match."""
+    inputs = np.array([[request.velocity, request.contact, request.angle]])
+    return PushQuery(request.model, inputs, request.duration, _covariates(request, 1))
+
+
+def query_from_batch_request(request: Any) -> PushQuery:
+    """The query of a PredictPushBatch request. Raises RequestError if the arrays differ in length."""
+    count = len(request.velocity)
+    for name in ("contact", "angle"):
+        if (length := len(getattr(request, name))) != count:
+            raise RequestError(f"{name} length", length, f"{count} values, as many as velocity has")
+    inputs = np.array([request.velocity, request.contact, request.angle], dtype=np.float64).T
+    return PushQuery(request.model, inputs, request.duration, _covariates(request, count))
+
+
+def fill_response(response: PredictPush.Response, prediction: Prediction) -> PredictPush.Response:
+    """Write the first of the predictions into a response."""
+    response.mean = prediction.mean[0]
+    response.covariance = prediction.covariance[0].reshape(9)
+    response.process_covariance = prediction.process_covariance[0].reshape(9)
+    response.in_domain = bool(prediction.in_domain[0])
+    response.success = True
+    return response
+
+
+def fill_batch_response(response: PredictPushBatch.Response, prediction: Prediction) -> PredictPushBatch.Response:
+    """Write n predictions into a response, push by push, each matrix row-major."""
+    response.mean.frombytes(prediction.mean.tobytes())
+    response.covariance.frombytes(prediction.covariance.tobytes())
+    response.process_covariance.frombytes(prediction.process_covariance.tobytes())
+    response.in_domain = prediction.in_domain.tolist()
+    response.success = True
+    return response
+
+
+def refuse(response: Response, reason: str) -> Response:
+    """A response without a number: success is false and the message says why."""
+    response.success, response.message = False, reason
+    return response
+
+
+def prediction_from_response(response: Any) -> Prediction:
+    """The predictions of either response; n = 1 for PredictPush. Raises MessageError if it holds a refusal."""
+    if not response.success:
+        raise MessageError("success", False, f"a request that the server accepts; it says: {response.message}")
+    in_domain = response.in_domain
+    return Prediction(
+        np.array(response.mean, dtype=np.float64).reshape(-1, 3),
+        np.array(response.covariance, dtype=np.float64).reshape(-1, 3, 3),
+        np.array(response.process_covariance, dtype=np.float64).reshape(-1, 3, 3),
+        np.array([in_domain] if isinstance(in_domain, bool) else in_domain, dtype=np.bool_),
+    )
+
+
+def _covariates(request: Any, count: int) -> dict[str, Array]:
+    names: Sequence[str] = request.covariate_names
+    if not names and not len(request.covariate_values):
+        return {}
+    if (found := len(request.covariate_values)) != count * len(names):
+        raise RequestError("covariate_values length", found, f"{count * len(names)}, {len(names)} names a push")
+    if repeated := {name for name in names if names.count(name) > 1}:
+        raise RequestError("covariate_names", sorted(repeated), "each name once")
+    values = np.array(request.covariate_values, dtype=np.float64).reshape(count, len(names))
+    return dict(zip(names, values.T, strict=True))
+
+
+def _push_by_push(covariates: Mapping[str, Array]) -> Array:
+    return np.column_stack(list(covariates.values())) if covariates else np.empty((0, 0))

@@ -1,0 +1,72 @@
+"""A validated window <-> push_predictor_interfaces/PushResidual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from push_predictor_interfaces.msg import PushResidual
+
+from msg_adapters import MessageError
+from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ValidatedWindow:
+    """One window, predicted and observed.
+
+    stamp_ns: end of the window, ns. window: number within the push. inputs (3,): velocity m/s, contact, angle rad;
+    duration s. predicted and observed (3,): dx m, dy m, dtheta rad in the push frame; covariance (3, 3) of an
+    observed outcome.
+    """
+
+    stamp_ns: int
+    push_id: str
+    window: int
+    model: str
+    inputs: Array
+    duration: float
+    predicted: Array
+    covariance: Array
+    observed: Array
+
+    @property
+    def standardised(self) -> Array:
+        """L^-1 (observed - predicted) with L L' = covariance, (3,). Raises MessageError for a covariance that is none."""
+        try:
+            factor = np.linalg.cholesky(self.covariance)
+        except np.linalg.LinAlgError:
+            raise MessageError("covariance", self.covariance.tolist(), "a positive definite matrix") from None
+        return np.asarray(np.linalg.solve(factor, self.observed - self.predicted))
+
+
+def residual_to_message(window: ValidatedWindow, frame_id: str = "world") -> PushResidual:
+    """The message of a window. Raises MessageError for a covariance that is not positive definite."""
+    message = PushResidual(push_id=window.push_id, window=int(window.window), model=window.model)
+    message.header.stamp, message.header.frame_id = ns_to_stamp(window.stamp_ns), frame_id
+    message.velocity, message.contact, message.angle = (float(value) for value in window.inputs)
+    message.duration = float(window.duration)
+    message.predicted, message.observed = _flat(window.predicted), _flat(window.observed)
+    message.covariance, message.standardised = _flat(window.covariance), _flat(window.standardised)
+    return message
+
+
+def residual_from_message(message: Any) -> ValidatedWindow:
+    """The window of a message, as a recording of residuals holds it."""
+    return ValidatedWindow(
+        stamp_to_ns(message.header.stamp),
+        message.push_id,
+        int(message.window),
+        message.model,
+        np.array([message.velocity, message.contact, message.angle], dtype=np.float64),
+        float(message.duration),
+        np.array(message.predicted, dtype=np.float64),
+        np.array(message.covariance, dtype=np.float64).reshape(3, 3),
+        np.array(message.observed, dtype=np.float64),
+    )
+
+
+def _flat(values: Array) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)

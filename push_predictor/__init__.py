@@ -1,0 +1,3 @@
+"""Models of planar pushing: learnt from recordings, served over ROS 2, checked against outcomes."""
+
+__version__ = "0.1.0"

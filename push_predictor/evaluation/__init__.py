@@ -1,0 +1,1 @@
+"""How good a model is: metrics, splits, validation against recordings, pictures and reports."""

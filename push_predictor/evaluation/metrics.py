@@ -1,0 +1,44 @@
+"""NMSE, NLPD and coverage, the same offline and online (contract, section 4).
+
+NLPD is the negative log predictive density in SI units (m, m, rad); totals are sums over the three outputs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtri
+
+from push_predictor.types import Array
+
+COVERAGE_LEVELS = (0.5, 0.9, 0.95)
+
+
+def nmse(mean: Array, outcomes: Array, training_mean: Array) -> Array:
+    """Normalised squared error (k,) of predictions (n, k): over the deviation from the training mean (k,)."""
+    error = np.sum((outcomes - mean) ** 2, axis=0)
+    spread = np.sum((outcomes - training_mean) ** 2, axis=0)
+    return np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0)
+
+
+def gaussian_nlpd(mean: Array, variance: Array, outcomes: Array) -> Array:
+    """Negative log density (n, k) of outcomes under independent Gaussians, mean and variance (n, k)."""
+    return np.asarray(0.5 * (np.log(2.0 * np.pi * variance) + (outcomes - mean) ** 2 / variance))
+
+
+def joint_nlpd(mean: Array, covariance: Array, outcomes: Array) -> Array:
+    """Negative log density (n,) of outcomes (n, k) under Gaussians with full covariance (n, k, k)."""
+    z = standardised(mean, covariance, outcomes)
+    log_determinant = np.linalg.slogdet(covariance)[1]
+    return np.asarray(0.5 * (np.sum(z**2, axis=1) + log_determinant + z.shape[1] * np.log(2.0 * np.pi)))
+
+
+def standardised(mean: Array, covariance: Array, outcomes: Array) -> Array:
+    """Residuals (n, k) in units of the prediction: L^-1 (outcome - mean), L L' = covariance (n, k, k)."""
+    lower = np.linalg.cholesky(covariance)
+    return np.asarray(np.linalg.solve(lower, (outcomes - mean)[..., None])[..., 0])
+
+
+def coverage(mean: Array, variance: Array, outcomes: Array, level: float) -> Array:
+    """Share (k,) of outcomes inside the central Gaussian interval that should hold `level` of them."""
+    half = ndtri(0.5 + level / 2.0) * np.sqrt(variance)
+    return np.asarray(np.mean(np.abs(outcomes - mean) <= half, axis=0))

@@ -1,0 +1,118 @@
+"""A model against observed pushes: the numbers that `evaluate`, `validate` and push_validator report alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What was predicted for n windows, beside what was observed.
+
+    mean, observed (n, 3); covariance (n, 3, 3); exact_log_density (n, 3), None where the predictive is Gaussian;
+    push_id (n,); training_mean (3,), the reference of the NMSE.
+    """
+
+    model: str
+    n_train: int
+    push_id: np.ndarray
+    mean: Array
+    covariance: Array
+    observed: Array
+    exact_log_density: Array | None
+    training_mean: Array
+
+    @property
+    def variance(self) -> Array:
+        """The diagonals (n, 3) of the covariances."""
+        return np.asarray(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+
+def compare(model: PushModel, table: PushTable) -> Comparison:
+    """Predict every row of a table."""
+    return comparison_of(model, table, model.predict(table.inputs, table.duration))
+
+
+def comparison_of(model: PushModel, table: PushTable, prediction: Prediction) -> Comparison:
+    """Set predictions that were already made, by a service for instance, beside the outcomes of a table."""
+    return Comparison(
+        model.name,
+        len(model.training),
+        table.push_id,
+        prediction.mean,
+        prediction.covariance,
+        table.outcomes,
+        model.exact_log_density(table),
+        model.training_mean,
+    )
+
+
+def metrics_json(comparison: Comparison) -> dict[str, object]:
+    """The JSON of contract section 4, with 95 % intervals of the totals from resampling whole pushes.
+
+    A number that these windows do not determine (none was seen) is null.
+    """
+    c = comparison
+    count, nothing = len(c.observed), np.full(3, np.nan)
+    nlpd = gaussian_nlpd(c.mean, c.variance, c.observed)
+    exact = None if c.exact_log_density is None else _named(-_mean(c.exact_log_density))
+    return {
+        "model": c.model,
+        "n_train": c.n_train,
+        "n_test": count,
+        "n_pushes": len(set(c.push_id.tolist())),
+        "nmse": _named(nmse(c.mean, c.observed, c.training_mean) if count else nothing),
+        "nlpd": _named(_mean(nlpd)),
+        "exact_nlpd": exact,
+        "joint_nlpd": _number(np.mean(joint_nlpd(c.mean, c.covariance, c.observed))) if count else None,
+        "coverage": {str(level): _coverage(c, level) if count else None for level in COVERAGE_LEVELS},
+        "interval": _intervals(c, nlpd),
+    }
+
+
+def trained_on(model: PushModel, table: PushTable) -> list[str]:
+    """The pushes of a table that the model was trained on: its figures on them are not held out."""
+    return sorted(set(table.pushes) & set(model.training.pushes))
+
+
+def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:
+    if len(set(c.push_id.tolist())) < 2:
+        return {"level": 0.95, "by": "push", "nmse": None, "nlpd": None}
+    weights = push_bootstrap(c.push_id)
+    error, spread = (c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2
+    nmse_draws = np.sum((weights @ error) / (weights @ spread), axis=1)
+    nlpd_draws = (weights @ nlpd.sum(axis=1)) / weights.sum(axis=1)
+    return {"level": 0.95, "by": "push", "nmse": _interval(nmse_draws), "nlpd": _interval(nlpd_draws)}
+
+
+def _interval(draws: Array) -> dict[str, float | None]:
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return {"low": _number(low), "high": _number(high)}
+
+
+def _coverage(c: Comparison, level: float) -> dict[str, float | None]:
+    shares = coverage(c.mean, c.variance, c.observed, level)
+    return {name: _number(share) for name, share in zip(OUTPUTS, shares, strict=True)}
+
+
+def _named(values: Array) -> dict[str, float | None]:
+    return {
+        **{name: _number(value) for name, value in zip(OUTPUTS, values, strict=True)},
+        "total": _number(np.sum(values)),
+    }
+
+
+def _mean(rows: Array) -> Array:
+    return np.mean(rows, axis=0) if len(rows) else np.full(rows.shape[1], np.nan)
+
+
+def _number(value: float | np.floating) -> float | None:
+    return float(value) if np.isfinite(value) else None

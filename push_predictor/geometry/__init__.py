@@ -1,0 +1,1 @@
+"""Planar geometry: angles, rigid motions, outlines of sliders."""

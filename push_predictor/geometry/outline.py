@@ -1,0 +1,216 @@
+"""The outline of a slider: contact fraction <-> point, normals, nearest point.
+
+The body frame has its origin at the outline's area centroid (contract, section 1). A contact is a fraction of the
+perimeter, counter-clockwise from the first vertex. Circles and ellipses are polygons for the record, but their
+points and normals come from the smooth curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.errors import RigError
+from push_predictor.types import Array, BoolArray, IntArray
+
+SMOOTH_TABLE = 8192  # chords that stand for the arc length of an ellipse: relative error 1e-8
+NEWTON_STEPS = 12
+SAME_LENGTH = 1e-6  # m; vertices closer than this to their image are a symmetry
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Nearest boundary points of n query points: contact (n,), point (n, 2), outward normal (n, 2),
+    signed distance (n,) in m (negative inside), at_vertex (n,) where a polygon's corner is nearest."""
+
+    contact: Array
+    point: Array
+    normal: Array
+    distance: Array
+    at_vertex: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A closed outline in the body frame.
+
+    vertices: (V, 2) in m, counter-clockwise. semi_axes: (a, b) in m along body x and y for a circle or an ellipse,
+    else None. Raises RigError if the vertices do not make a counter-clockwise polygon.
+    """
+
+    vertices: Array
+    semi_axes: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        vertices = np.array(self.vertices, dtype=np.float64)
+        if vertices.ndim != 2 or vertices.shape[1:] != (2,) or len(vertices) < 3:
+            raise RigError(f"outline: shape {vertices.shape} is not accepted, give at least three [x, y] in metres")
+        if not np.all(np.isfinite(vertices)):
+            raise RigError("outline: a vertex is not finite, give [x, y] in metres")
+        if _signed_area(vertices) <= 0.0:
+            raise RigError("outline: the vertices run clockwise or enclose nothing, give them counter-clockwise")
+        vertices.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+
+    @cached_property
+    def perimeter(self) -> float:
+        """Length of the boundary, m."""
+        return float(self._arc[-1])
+
+    @cached_property
+    def area(self) -> float:
+        """Enclosed area, m^2."""
+        if self.semi_axes is not None:
+            return float(np.pi * self.semi_axes[0] * self.semi_axes[1])
+        return float(_signed_area(self.vertices))
+
+    @cached_property
+    def centroid(self) -> Array:
+        """Area centroid (2,), m: zero where the body frame is as the contract says."""
+        x, y = self.vertices.T
+        xn, yn = np.roll(x, -1), np.roll(y, -1)
+        cross = x * yn - xn * y
+        return np.array([np.sum((x + xn) * cross), np.sum((y + yn) * cross)]) / (3.0 * np.sum(cross))
+
+    @cached_property
+    def rotational_symmetry(self) -> int:
+        """Order of the rotational symmetry about the origin: square 4, ellipse 2, 1 for none, 0 for a circle."""
+        if self.semi_axes is not None:
+            return 0 if np.isclose(*self.semi_axes, rtol=0.0, atol=SAME_LENGTH) else 2
+        count = len(self.vertices)
+        orders = (k for k in range(count, 1, -1) if count % k == 0 and self._unchanged_by_turn(k))
+        return next(orders, 1)
+
+    @cached_property
+    def edge_starts(self) -> Array:
+        """Contact fractions (E + 1,) at which the edges begin, the last entry 1; a smooth outline is one edge."""
+        if self.semi_axes is not None:
+            return np.array([0.0, 1.0])
+        return np.asarray(self._arc / self._arc[-1])
+
+    def edge(self, contact: Array) -> tuple[IntArray, Array]:
+        """Edge index (n,) and fraction along that edge (n,) of contacts (n,) in [0, 1)."""
+        starts = self.edge_starts
+        index = np.clip(np.searchsorted(starts, contact, side="right") - 1, 0, len(starts) - 2)
+        fraction = (contact - starts[index]) / (starts[index + 1] - starts[index])
+        return index.astype(np.int64), np.clip(fraction, 0.0, 1.0)
+
+    def contact_on_edge(self, edge: int, fraction: float) -> float:
+        """The contact at `fraction` of an edge. An edge's end keeps to that edge, not to the next one's start."""
+        starts = self.edge_starts
+        value = starts[edge] + fraction * (starts[edge + 1] - starts[edge])
+        return float(np.clip(value, starts[edge], np.nextafter(starts[edge + 1], 0.0)))
+
+    def point(self, contact: Array) -> Array:
+        """Boundary points (n, 2) in m at contacts (n,)."""
+        if self.semi_axes is not None:
+            return self._curve(self._curve_parameter(contact))
+        edge, fraction = self.edge(contact)
+        start = self.vertices[edge]
+        return start + fraction[:, None] * (self._ends[edge] - start)
+
+    def inward_normal(self, contact: Array) -> Array:
+        """Unit normals (n, 2) into the slider at contacts (n,)."""
+        if self.semi_axes is not None:
+            return -self._curve_normal(self._curve_parameter(contact))
+        return -self._edge_normals[self.edge(contact)[0]]
+
+    def project(self, points: Array) -> Projection:
+        """Nearest boundary points of points (n, 2) in the body frame."""
+        points = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        return self._project_smooth(points) if self.semi_axes is not None else self._project_polygon(points)
+
+    # --- polygons -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _ends(self) -> Array:
+        return np.roll(self.vertices, -1, axis=0)
+
+    @cached_property
+    def _edge_normals(self) -> Array:
+        along = self._ends - self.vertices
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        return np.stack([along[:, 1], -along[:, 0]], axis=1)
+
+    @cached_property
+    def _arc(self) -> Array:
+        points = self._curve(self._table) if self.semi_axes is not None else np.vstack([self.vertices, self.vertices[:1]])
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+    def _unchanged_by_turn(self, order: int) -> bool:
+        angle = 2.0 * np.pi / order
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        image = self.vertices @ turn.T
+        return bool(np.allclose(image, np.roll(self.vertices, -(len(image) // order), axis=0), atol=SAME_LENGTH))
+
+    def _project_polygon(self, points: Array) -> Projection:
+        along = self._ends - self.vertices
+        squared = np.sum(along**2, axis=1)
+        offset = points[:, None, :] - self.vertices[None]
+        fraction = np.clip(np.einsum("nej,ej->ne", offset, along) / squared, 0.0, 1.0)
+        away = offset - fraction[..., None] * along
+        distance = np.einsum("nej,nej->ne", away, away)
+        rows = np.arange(len(points))
+        edge = np.argmin(distance, axis=1)
+        share, away = fraction[rows, edge], away[rows, edge]
+        length = np.sqrt(distance[rows, edge])
+        inside = self._contains(points)
+        at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
+        radial = away / np.maximum(length, 1e-300)[:, None]
+        normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
+        contact = [self.contact_on_edge(int(e), float(f)) for e, f in zip(edge, share, strict=True)]
+        return Projection(np.array(contact), points - away, normal, np.where(inside, -length, length), at_vertex)
+
+    def _contains(self, points: Array) -> BoolArray:
+        x, y = points[:, :1], points[:, 1:]
+        (x0, y0), (x1, y1) = self.vertices.T, self._ends.T
+        crosses = (y0 > y) != (y1 > y)
+        rise = np.where(y1 == y0, 1.0, y1 - y0)
+        return np.asarray(np.sum(crosses & (x < x0 + (y - y0) * (x1 - x0) / rise), axis=1) % 2 == 1)
+
+    # --- circles and ellipses -----------------------------------------------------------------------------------
+
+    @cached_property
+    def _table(self) -> Array:
+        a, b = self.semi_axes or (1.0, 1.0)
+        first = np.arctan2(self.vertices[0, 1] / b, self.vertices[0, 0] / a)
+        return first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1)
+
+    def _curve(self, parameter: Array) -> Array:
+        a, b = self.semi_axes or (1.0, 1.0)
+        return np.stack([a * np.cos(parameter), b * np.sin(parameter)], axis=-1)
+
+    def _curve_normal(self, parameter: Array) -> Array:
+        a, b = self.semi_axes or (1.0, 1.0)
+        normal = np.stack([b * np.cos(parameter), a * np.sin(parameter)], axis=-1)
+        return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+    def _curve_parameter(self, contact: Array) -> Array:
+        return np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table)
+
+    def _project_smooth(self, points: Array) -> Projection:
+        parameter = self._nearest_parameter(points)
+        nearest, normal = self._curve(parameter), self._curve_normal(parameter)
+        distance = np.einsum("nj,nj->n", points - nearest, normal)
+        turned = self._table[0] + (parameter - self._table[0]) % (2.0 * np.pi)
+        contact = np.interp(turned, self._table, self._arc) / self.perimeter
+        contact = np.clip(contact, 0.0, np.nextafter(1.0, 0.0))
+        return Projection(contact, nearest, normal, distance, np.zeros(len(points), dtype=np.bool_))
+
+    def _nearest_parameter(self, points: Array) -> Array:
+        a, b = self.semi_axes or (1.0, 1.0)
+        x, y = points.T
+        t = np.arctan2(a * y, b * x)
+        for _ in range(NEWTON_STEPS):  # stationarity of |curve(t) - point|^2
+            cos, sin = np.cos(t), np.sin(t)
+            slope = (b * b - a * a) * cos * sin + x * a * sin - y * b * cos
+            bend = (b * b - a * a) * (cos * cos - sin * sin) + x * a * cos + y * b * sin
+            t = t - np.clip(slope / np.where(np.abs(bend) < 1e-12, 1e-12, np.abs(bend)), -0.3, 0.3)
+        return t
+
+
+def _signed_area(vertices: Array) -> float:
+    x, y = vertices.T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

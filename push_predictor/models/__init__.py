@@ -1,0 +1,1 @@
+"""Models of one push: Gaussian process, variational heteroscedastic GP, analytical."""

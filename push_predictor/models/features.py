@@ -1,0 +1,31 @@
+"""From (velocity, contact, angle) to what a kernel can compare.
+
+The outline's rotational symmetry is folded (contract, section 1): a square's four sides are one. Mirror symmetry is not
+assumed. On a smooth outline the contact is a point on a closed curve, so it enters by its cosine and sine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.types import Array
+
+EDGE_SPACING = 3.0  # edges that no symmetry maps onto each other lie this many edge lengths apart
+
+
+def push_features(outline: Outline, inputs: Array) -> Array:
+    """Features (n, D) of inputs (n, 3: velocity m/s, contact, angle rad); the velocity comes first, the angle last."""
+    velocity, contact, angle = inputs.T
+    return np.column_stack([velocity, _contact_features(outline, contact), angle])
+
+
+def _contact_features(outline: Outline, contact: Array) -> Array:
+    order = outline.rotational_symmetry
+    if order == 0:
+        return np.empty((len(contact), 0))
+    if outline.semi_axes is not None:
+        phase = 2.0 * np.pi * order * contact
+        return np.column_stack([np.cos(phase), np.sin(phase)])
+    edge, fraction = outline.edge(contact)
+    return (EDGE_SPACING * (edge % (len(outline.vertices) // order)) + fraction)[:, None]

@@ -1,0 +1,129 @@
+"""Standard Gaussian process regression with one noise level (Rasmussen and Williams 2006, algorithm 2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError
+from scipy.optimize import minimize
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.kernels import SquaredExponential
+from push_predictor.models.posterior import KernelPosterior
+from push_predictor.models.prediction import LatentPrediction
+from push_predictor.models.ridge import factorise
+from push_predictor.types import Array
+
+# Logarithms, for inputs and outputs of unit spread.
+_LENGTHSCALE_BOUNDS = (np.log(1e-2), np.log(1e3))
+_SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
+_NOISE_BOUNDS = (np.log(1e-3), np.log(1e1))
+_REFUSED = 1e10
+
+
+@dataclass(frozen=True)
+class GpParameters:
+    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation."""
+
+    log_lengthscales: Array
+    log_signal_sd: float
+    log_noise_sd: float
+
+    @property
+    def kernel(self) -> SquaredExponential:
+        """Kernel of f."""
+        return SquaredExponential(self.log_lengthscales, self.log_signal_sd)
+
+    @property
+    def noise_variance(self) -> float:
+        """Variance of the noise."""
+        return float(np.exp(2.0 * self.log_noise_sd))
+
+
+class GaussianProcess:
+    """A Gaussian process conditioned on inputs (n, D) and outputs (n,), both standardised by the caller."""
+
+    def __init__(self, inputs: Array, outputs: Array, parameters: GpParameters) -> None:
+        self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
+        noise = np.full(len(outputs), parameters.noise_variance)
+        self._posterior = KernelPosterior(parameters.kernel.matrix(inputs), noise)
+        self._weights = self._posterior.weights(outputs)
+
+    @property
+    def log_marginal_likelihood(self) -> float:
+        """log p(outputs | inputs), nats."""
+        constant = len(self.outputs) * np.log(2.0 * np.pi)
+        return -0.5 * float(self.outputs @ self._weights + self._posterior.log_determinant + constant)
+
+    def predict(self, inputs: Array) -> LatentPrediction:
+        """The function and the noise at inputs (m, D)."""
+        kernel = self.parameters.kernel
+        cross = kernel.cross(inputs, self.inputs)
+        # The noise bounds the posterior variance from below by about noise / n; rounding may not.
+        smallest = np.finfo(float).eps * kernel.variance
+        variance = np.maximum(kernel.variance - self._posterior.explained_variance(cross), smallest)
+        log_noise = np.full(len(cross), 2.0 * self.parameters.log_noise_sd)
+        return LatentPrediction(cross @ self._weights, variance, log_noise, np.zeros(len(cross)))
+
+
+def fit_gp(
+    inputs: Array, outputs: Array, start: GpParameters | None = None, *, most_iterations: int = 100
+) -> GaussianProcess:
+    """Maximise the marginal likelihood over the hyperparameters by L-BFGS from `start`.
+
+    inputs (n, D) and outputs (n,) standardised. Raises TrainingError when the rows do not match or are not
+    finite.
+    """
+    check_rows(inputs, outputs)
+    dimensions = inputs.shape[1]
+    start = start or GpParameters(np.zeros(dimensions), 0.0, np.log(0.3))
+    bounds = [_LENGTHSCALE_BOUNDS] * dimensions + [_SIGNAL_BOUNDS, _NOISE_BOUNDS]
+    first = np.append(start.log_lengthscales, [start.log_signal_sd, start.log_noise_sd])
+    found = minimize(
+        _negative_log_likelihood, np.clip(first, *np.transpose(bounds)), (inputs, outputs), jac=True,
+        method="L-BFGS-B", bounds=bounds, options={"maxiter": most_iterations, "ftol": 1e-9},
+    )  # fmt: skip
+    return GaussianProcess(inputs, outputs, _parameters(found.x))
+
+
+def log_likelihood_and_gradient(
+    inputs: Array, outputs: Array, parameters: GpParameters
+) -> tuple[float, Array]:
+    """log p(outputs | inputs) and its derivative wrt (log lengthscales, log signal sd, log noise sd), (D + 2,).
+
+    Raises LinAlgError where the kernel matrix plus noise is not positive definite.
+    """
+    kernel, noise = parameters.kernel, parameters.noise_variance
+    factorised = factorise(kernel.matrix(inputs))
+    ridge = factorised.regularise(np.full(len(outputs), 1.0 / noise))
+    alpha = ridge.residual(outputs / noise)
+    constant = len(outputs) * np.log(2.0 * np.pi * noise)
+    value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
+    weights = -ridge.precision()
+    weights += np.outer(alpha, alpha)
+    of_noise = noise * np.trace(weights)
+    return value, np.append(0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
+
+
+def check_rows(inputs: Array, outputs: Array) -> Array:
+    """The inputs, when they are (n, D) finite numbers that match outputs (n,); else raises TrainingError."""
+    if inputs.ndim != 2 or outputs.shape != inputs.shape[:1] or len(outputs) < 2:
+        raise TrainingError(
+            f"inputs have shape {inputs.shape} and outputs {outputs.shape}, give (n, D) and (n,) with n >= 2"
+        )
+    if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
+        raise TrainingError("inputs or outputs hold NaN or infinity, give finite numbers")
+    return inputs
+
+
+def _parameters(vector: Array) -> GpParameters:
+    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]))
+
+
+def _negative_log_likelihood(vector: Array, inputs: Array, outputs: Array) -> tuple[float, Array]:
+    try:
+        value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector))
+    except LinAlgError:
+        return _REFUSED, np.zeros_like(vector)
+    return -value, -gradient

@@ -1,0 +1,49 @@
+"""Is this a push that a model may answer for? One place, for the services, the command line and the library."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from push_predictor.errors import RequestError
+from push_predictor.models.push_model import PushModel
+from push_predictor.types import Array, BoolArray
+
+
+def check_request(
+    model: PushModel, velocity: float, contact: float, angle: float, duration: float, covariates: Mapping[str, float]
+) -> None:
+    """Raise RequestError naming field, value and what is accepted, unless the model can answer this push."""
+    _check(model, np.array([[velocity, contact, angle]]), duration, {k: np.array([v]) for k, v in covariates.items()})
+
+
+def check_requests(model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array]) -> None:
+    """The same for n pushes (n, 3) of one duration; the field in the error carries the index of the first bad push."""
+    _check(model, inputs, duration, covariates, indexed=True)
+
+
+def _check(
+    model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array], indexed: bool = False
+) -> None:
+    velocity, contact, angle = inputs.T
+    rules: list[tuple[str, Array, BoolArray, str]] = [
+        ("velocity", velocity, velocity > 0.0, "a finite number above 0, in m/s"),
+        ("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)"),
+        ("angle", angle, np.abs(angle) < np.pi / 2.0, "an angle in (-pi/2, pi/2), in rad"),
+        *((f"covariate {name}", column, np.isfinite(column), "a finite number") for name, column in covariates.items()),
+    ]
+    for field, column, accepted, meaning in rules:
+        bad = np.flatnonzero(~(accepted & np.isfinite(column)))
+        if bad.size:
+            place = f"{field}[{bad[0]}]" if indexed else field
+            raise RequestError(place, float(column[bad[0]]), meaning)
+    _check_duration(model, duration)
+
+
+def _check_duration(model: PushModel, duration: float) -> None:
+    low, high = model.duration_range
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise RequestError("duration", duration, "a finite number above 0, in s")
+    if not low <= duration <= high:
+        raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, near what {model.name} was trained on")
