@@ -9,12 +9,15 @@ from typing import Any, TypeVar
 import numpy as np
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
-from msg_adapters import MessageError
-from push_predictor.errors import RequestError
+from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import Prediction
 from push_predictor.types import Array
 
-Response = TypeVar("Response", PredictPush.Response, PredictPushBatch.Response)
+Response = TypeVar("Response")
+
+
+class Refused(PushPredictorError):
+    """The server answered success=false; the text is its message."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,36 +67,32 @@ def query_from_batch_request(request: Any) -> PushQuery:
     return PushQuery(request.model, inputs, request.duration, _covariates(request, count))
 
 
-def fill_response(response: PredictPush.Response, prediction: Prediction) -> PredictPush.Response:
+def fill_response(response: PredictPush.Response, prediction: Prediction) -> None:
     """Write the first of the predictions into a response."""
     response.mean = prediction.mean[0]
     response.covariance = prediction.covariance[0].reshape(9)
     response.process_covariance = prediction.process_covariance[0].reshape(9)
     response.in_domain = bool(prediction.in_domain[0])
     response.success = True
-    return response
 
 
-def fill_batch_response(response: PredictPushBatch.Response, prediction: Prediction) -> PredictPushBatch.Response:
-    """Write n predictions into a response, push by push, each matrix row-major."""
+def extend_batch_response(response: PredictPushBatch.Response, prediction: Prediction) -> None:
+    """Append n predictions to a response, push by push, each matrix row-major; `success` is left to the caller."""
     response.mean.frombytes(prediction.mean.tobytes())
     response.covariance.frombytes(prediction.covariance.tobytes())
     response.process_covariance.frombytes(prediction.process_covariance.tobytes())
-    response.in_domain = prediction.in_domain.tolist()
-    response.success = True
-    return response
+    response.in_domain.extend(prediction.in_domain.tolist())
 
 
 def refuse(response: Response, reason: str) -> Response:
-    """A response without a number: success is false and the message says why."""
-    response.success, response.message = False, reason
-    return response
+    """A fresh response of the same kind: no number in it, success false, and the reason."""
+    return type(response)(success=False, message=reason)
 
 
 def prediction_from_response(response: Any) -> Prediction:
-    """The predictions of either response; n = 1 for PredictPush. Raises MessageError if it holds a refusal."""
+    """The predictions of either response; n = 1 for PredictPush. Raises Refused with the server's reason."""
     if not response.success:
-        raise MessageError("success", False, f"a request that the server accepts; it says: {response.message}")
+        raise Refused(response.message)
     in_domain = response.in_domain
     return Prediction(
         np.array(response.mean, dtype=np.float64).reshape(-1, 3),

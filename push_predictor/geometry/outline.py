@@ -97,11 +97,10 @@ class Outline:
         fraction = (contact - starts[index]) / (starts[index + 1] - starts[index])
         return index.astype(np.int64), np.clip(fraction, 0.0, 1.0)
 
-    def contact_on_edge(self, edge: int, fraction: float) -> float:
-        """The contact at `fraction` of an edge. An edge's end keeps to that edge, not to the next one's start."""
-        starts = self.edge_starts
-        value = starts[edge] + fraction * (starts[edge + 1] - starts[edge])
-        return float(np.clip(value, starts[edge], np.nextafter(starts[edge + 1], 0.0)))
+    def contact_on_edge(self, edge: IntArray | int, fraction: Array | float) -> Array:
+        """The contacts at fractions of edges. An edge's end keeps to that edge, not to the next one's start."""
+        start, end = self.edge_starts[edge], self.edge_starts[np.asarray(edge) + 1]
+        return np.asarray(np.clip(start + fraction * (end - start), start, np.nextafter(end, 0.0)))
 
     def point(self, contact: Array) -> Array:
         """Boundary points (n, 2) in m at contacts (n,)."""
@@ -160,8 +159,8 @@ class Outline:
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
         normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
-        contact = [self.contact_on_edge(int(e), float(f)) for e, f in zip(edge, share, strict=True)]
-        return Projection(np.array(contact), points - away, normal, np.where(inside, -length, length), at_vertex)
+        contact = self.contact_on_edge(edge, share)
+        return Projection(contact, points - away, normal, np.where(inside, -length, length), at_vertex)
 
     def _contains(self, points: Array) -> BoolArray:
         x, y = points[:, :1], points[:, 1:]

@@ -8,6 +8,7 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
 
@@ -47,3 +48,9 @@ def _check_duration(model: PushModel, duration: float) -> None:
         raise RequestError("duration", duration, "a finite number above 0, in s")
     if not low <= duration <= high:
         raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, near what {model.name} was trained on")
+
+
+def check_table(model: PushModel, table: PushTable) -> None:
+    """The same for the rows of a table, each with its own duration. Raises RequestError."""
+    for duration in np.unique(table.duration):
+        check_requests(model, table.inputs[table.duration == duration], float(duration), {})

@@ -27,9 +27,9 @@ class VHGP:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
         problem = VhgpProblem.of(inputs, outputs, parameters)
-        bound = Bound.at(problem, site_precisions - 0.5, site_precisions)
+        bound = Bound.tied(problem, site_precisions)
         self.bound = bound.value
-        self._signal = KernelPosterior(problem.signal_kernel.matrix, bound.signal_noise + parameters.jitter)
+        self._signal = KernelPosterior(problem.signal_kernel.matrix, bound.noise_level + parameters.jitter)
         self._noise = KernelPosterior(problem.noise_kernel.matrix, 1.0 / site_precisions)
         self._signal_weights = self._signal.weights(outputs)
         self._noise_weights = bound.mean_weights
@@ -52,21 +52,13 @@ class VHGP:
 def fit_vhgp(
     inputs: Array, outputs: Array, start: GaussianProcess | None = None, *, most_iterations: int = 40
 ) -> VHGP:
-    """Maximise the variational bound over the hyperparameters and the site precisions.
+    """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
 
     inputs (n, D) and outputs (n,) standardised. start: a homoscedastic process of the same rows, else one is
     fitted first. Raises TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     gp = start or fit_gp(inputs, outputs)
-    bound = maximise_bound(inputs, outputs, _near(gp), most_iterations)
+    bound = maximise_bound(inputs, outputs, gp.parameters, most_iterations)
     return VHGP(inputs, outputs, bound.problem.parameters, bound.site_precisions)
 
-
-def _near(gp: GaussianProcess) -> VhgpParameters:
-    """Hyperparameters at which a VHGP is close to a homoscedastic process, with room to depart from it."""
-    signal = gp.parameters
-    noise_mean = 2.0 * signal.log_noise_sd - 0.5
-    return VhgpParameters(
-        signal.log_lengthscales, signal.log_signal_sd, signal.log_lengthscales, 0.0, noise_mean
-    )

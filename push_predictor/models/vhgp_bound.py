@@ -78,28 +78,35 @@ class VhgpProblem:
 
 @dataclass(frozen=True)
 class Bound:
-    """F at one (mean_weights, site_precisions), with what the derivatives share."""
+    """F at one q(g), with what the derivatives share.
+
+    q(g) is the prior times Gaussian sites of given precisions (Lambda) and potentials (precision times mean).
+    The sites stay meaningful when the hyperparameters change, which the moments of q(g) do not.
+    """
 
     problem: VhgpProblem
-    mean_weights: Array
     site_precisions: Array
-    noise_deviation: Array  # m - mu0 = K_g b
-    noise_ridge: Ridge
+    site_potentials: Array
+    mean_weights: Array  # b
+    noise_mean: Array  # m
     noise_variances: Array  # diagonal of S
-    signal_noise: Array  # R
+    noise_ridge: Ridge
+    noise_level: Array  # R
     signal_ridge: Ridge
-    alpha: Array  # (K_f + R + jitter)^-1 y
+    alpha: Array  # (K_f + R)^-1 y
     value: float
 
     @classmethod
-    def at(cls, problem: VhgpProblem, mean_weights: Array, site_precisions: Array) -> Bound:
+    def at(cls, problem: VhgpProblem, site_precisions: Array, site_potentials: Array) -> Bound:
         """Evaluate F. Raises LinAlgError or FloatingPointError where it is not a finite number."""
+        parameters = problem.parameters
         noise_ridge = problem.noise_kernel.regularise(site_precisions)
         variances = noise_ridge.posterior_diagonal
+        mean_weights = noise_ridge.residual(site_potentials - site_precisions * parameters.noise_mean)
         deviation = problem.noise_kernel.matrix @ mean_weights
         with np.errstate(over="raise", invalid="raise"):
-            noise = np.exp(problem.parameters.noise_mean + deviation - 0.5 * variances)
-            weights = 1.0 / (noise + problem.parameters.jitter)
+            level = np.exp(parameters.noise_mean + deviation - 0.5 * variances)
+        weights = 1.0 / (level + parameters.jitter)
         signal_ridge = problem.signal_kernel.regularise(weights)
         alpha = signal_ridge.residual(weights * problem.outputs)
         fit = problem.outputs @ alpha + signal_ridge.log_determinant + np.log(2.0 * np.pi / weights).sum()
@@ -107,15 +114,22 @@ class Bound:
         value = -0.5 * float(fit + 0.5 * variances.sum() + divergence)
         if not np.isfinite(value):
             raise FloatingPointError("the variational bound is not finite")
-        return cls(problem, mean_weights, site_precisions, deviation, noise_ridge, variances, noise,
-                   signal_ridge, alpha, value)  # fmt: skip
+        return cls(problem, site_precisions, site_potentials, mean_weights, parameters.noise_mean + deviation,
+                   variances, noise_ridge, level, signal_ridge, alpha, value)  # fmt: skip
+
+    @classmethod
+    def tied(cls, problem: VhgpProblem, site_precisions: Array) -> Bound:
+        """F as a function of the site precisions alone, b = Lambda - 1/2."""
+        mean_weights = site_precisions - 0.5
+        mean = problem.parameters.noise_mean + problem.noise_kernel.matrix @ mean_weights
+        return cls.at(problem, site_precisions, site_precisions * mean + mean_weights)
 
     @cached_property
     def optimal_precisions(self) -> Array:
         """The site precisions that a fixed point reproduces, 1/2 + dF/dm >= 0, shape (n,)."""
-        jittered = self.signal_noise + self.problem.parameters.jitter
+        jittered = self.noise_level + self.problem.parameters.jitter
         precision_diagonal = (1.0 - self.signal_ridge.posterior_diagonal / jittered) / jittered
-        return 0.5 * (self.signal_noise * (self.alpha**2 - precision_diagonal) + 1.0)
+        return 0.5 * (self.noise_level * (self.alpha**2 - precision_diagonal) + 1.0)
 
     @property
     def optimal_weights(self) -> Array:
@@ -165,5 +179,5 @@ def bound_and_gradient(
 ) -> tuple[float, Array, Array]:
     """F with b = Lambda - 1/2, dF/d(site_precisions) (n,) and dF/d(parameters.to_vector()) (2 D + 3,)."""
     problem = VhgpProblem.of(inputs, outputs, parameters)
-    bound = Bound.at(problem, site_precisions - 0.5, site_precisions)
+    bound = Bound.tied(problem, site_precisions)
     return bound.value, bound.site_gradient(), bound.hyperparameter_gradient(tied=True)

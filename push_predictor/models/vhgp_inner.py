@@ -11,7 +11,6 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from push_predictor.models.vhgp_bound import Bound, VhgpProblem
-from push_predictor.types import Array
 
 _SMALLEST_PRECISION = 1e-7  # below it S loses its digits
 _SHORTEST_STEP = 1.0 / 64.0
@@ -37,37 +36,34 @@ def maximise_over_noise(
 
 
 def _first(problem: VhgpProblem, start: Bound | None) -> Bound:
-    n = len(problem.outputs)
-    fresh = np.zeros(n), np.full(n, 0.5)
-    if start is None:
-        return Bound.at(problem, *fresh)
-    try:
-        return Bound.at(problem, start.mean_weights, start.site_precisions)
-    except (LinAlgError, FloatingPointError):
-        return Bound.at(problem, *fresh)
+    if start is not None:
+        try:
+            return Bound.at(problem, start.site_precisions, start.site_potentials)
+        except (LinAlgError, FloatingPointError):
+            pass  # a wild line search: the old sites do not suit the new hyperparameters
+    return Bound.tied(problem, np.full(len(problem.outputs), 0.5))
 
 
 def _improve(bound: Bound, tolerance: float) -> Bound | None:
     """The bound after one step, the longest of 1, 1/2, 1/4 ... that does not lose; None when none is found."""
     step = 1.0
     while step >= _SHORTEST_STEP:
-        try:
-            candidate = Bound.at(bound.problem, *_step(bound, step))
-        except (LinAlgError, FloatingPointError):
-            candidate = None
+        candidate = _after(bound, step)
         if candidate is not None and candidate.value >= bound.value - 1e-3 * tolerance:
             return candidate
         step *= 0.5
     return None
 
 
-def _step(bound: Bound, step: float) -> tuple[Array, Array]:
-    """(mean weights, site precisions) after a move by `step` in the natural parameters of q(g)."""
-    deviation = bound.noise_deviation
-    target = bound.optimal_precisions * deviation + bound.optimal_weights
-    present = bound.site_precisions * deviation + bound.mean_weights
-    precisions = bound.site_precisions + step * (bound.optimal_precisions - bound.site_precisions)
-    precisions = np.maximum(precisions, _SMALLEST_PRECISION)
-    potential = present + step * (target - present)
-    ridge = bound.problem.noise_kernel.regularise(precisions)
-    return ridge.residual(potential), precisions
+def _after(bound: Bound, step: float) -> Bound | None:
+    precisions, potentials = bound.site_precisions, bound.site_potentials
+    target_precisions = np.maximum(bound.optimal_precisions, _SMALLEST_PRECISION)
+    target_potentials = bound.optimal_precisions * bound.noise_mean + bound.optimal_weights
+    try:
+        return Bound.at(
+            bound.problem,
+            precisions + step * (target_precisions - precisions),
+            potentials + step * (target_potentials - potentials),
+        )
+    except (LinAlgError, FloatingPointError):
+        return None

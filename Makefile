@@ -1,0 +1,46 @@
+# make demo   learn, serve, replay, validate, report: the main job, end to end
+# make test   lint, types, tests
+# Both build .venv themselves and write into ignored folders only.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find push_predictor msg_adapters launch config scripts -type f -not -name '*.pyc') setup.py setup.cfg package.xml
+INTERFACES := $(shell find push_predictor_interfaces -type f -not -path '*/build/*')
+# One process or robot must not hear another's demo or tests (ROS_DOMAIN_ID is theirs to choose).
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: demo test lint bags clean
+
+demo: $(VENV)/.installed
+	$(BIN)/python -m examples.demo
+
+test: $(VENV)/.installed lint
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bags: $(VENV)/.installed
+	scripts/make_bags.sh
+
+clean:
+	rm -rf $(VENV) build out install log *.egg-info
+
+$(VENV)/.python:
+	$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13) and "Python 3.10 to 3.13 is needed, this is " + sys.version)'
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+# Building the message package takes most of the time: only when it changes.
+$(VENV)/.interfaces: $(VENV)/.python $(INTERFACES)
+	$(BIN)/pip install -q 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces
+	touch $@
+
+$(VENV)/.installed: $(VENV)/.interfaces $(SOURCES)
+	$(BIN)/pip install -q '.[report,live,import,test]'
+	touch $@

@@ -1,0 +1,46 @@
+"""push_predictor evaluate: a model against data that the caller held out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from push_predictor.commands.metrics_text import print_metrics
+from push_predictor.commands.output import add_command, add_rig, progress, write_json
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """The sub-command `evaluate`."""
+    parser = add_command(
+        commands,
+        "evaluate",
+        "NMSE, NLPD and coverage of a model on recordings or tables held out by the caller.",
+        "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    add_rig(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Evaluate and print; warn where a push was trained on."""
+    from push_predictor.evaluation.validation import compare, metrics_json, trained_on
+    from push_predictor.models.model_file import load_model
+    from push_predictor.models.request import check_table
+    from push_predictor.recordings.load import load_data
+    from push_predictor.recordings.rig import load_rig
+
+    model = load_model(options.model)
+    with progress("evaluate"):
+        table = load_data(options.data, load_rig(options.rig) if options.rig else None)
+        check_table(model, table)
+        metrics = metrics_json(compare(model, table))
+    if seen := trained_on(model, table):
+        print(
+            f"warning: {len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out",
+            file=sys.stderr,
+        )
+    if not write_json(options, metrics):
+        print_metrics(metrics)

@@ -1,0 +1,69 @@
+"""push_predictor info: what a file holds, and what is damaged."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+from push_predictor.commands.output import add_command, write_json
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """The sub-command `info`."""
+    parser = add_command(
+        commands,
+        "info",
+        "What a recording, push table or model holds, and what is damaged in it.",
+        "push_predictor info bags/square_abs_test",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, a push table or a model")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Describe and print."""
+    from push_predictor.recordings.describe import describe_recording, describe_table
+    from push_predictor.recordings.table_file import is_recording
+
+    path: Path = options.file
+    if not path.exists():
+        raise FileNotFoundError(2, "no such file or folder", str(path))
+    if is_recording(path):
+        found = describe_recording(path)
+    elif path.name.endswith((".csv", ".csv.gz")):
+        found = describe_table(path)
+    else:
+        found = _describe_model(path)
+    if not write_json(options, found):
+        _print(found)
+
+
+def _describe_model(path: Path) -> dict[str, object]:
+    from push_predictor.models.model_file import load_model
+
+    model = load_model(path)
+    low, high = model.training.inputs.min(axis=0), model.training.inputs.max(axis=0)
+    return {
+        "model": model.name,
+        "kind": model.kind,
+        "shape": model.rig.shape,
+        "surface": model.rig.surface,
+        "windows": len(model.training),
+        "pushes": model.provenance.pushes,
+        "sources": list(model.provenance.sources),
+        "written_by": model.provenance.version,
+        "velocity_range": [float(low[0]), float(high[0])],
+        "angle_range": [float(low[2]), float(high[2])],
+        "covariates": list(model.training.covariates),
+    }
+
+
+def _print(found: Mapping[str, object]) -> None:
+    width = max(map(len, found))
+    for key, value in found.items():
+        if isinstance(value, (list, tuple)):
+            value = ", ".join(map(str, value)) or "none"
+        if isinstance(value, dict):
+            value = "".join(f"\n  {name}: {entry}" for name, entry in value.items()) or "none"
+        print(f"{key:{width}s}  {value}")

@@ -1,0 +1,62 @@
+"""push_predictor predict: the outcome of one push."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from push_predictor.commands.output import add_command, write_json
+from push_predictor.errors import RequestError
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """The sub-command `predict`."""
+    parser = add_command(
+        commands,
+        "predict",
+        "Predict the outcome of one push: mean and covariance of dx, dy (m) and dtheta (rad).",
+        "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    parser.add_argument("--velocity", required=True, type=float, metavar="V", help="m/s")
+    parser.add_argument("--contact", required=True, type=float, metavar="C", help="fraction of the perimeter")
+    parser.add_argument("--angle", required=True, type=float, metavar="A", help="rad from the inward normal")
+    parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="s (default %(default)s)")
+    parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help="may be repeated")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Check, predict, print."""
+    import numpy as np
+
+    from push_predictor.models.model_file import load_model
+    from push_predictor.models.request import check_request
+
+    model = load_model(options.model)
+    covariates = dict(_covariate(text) for text in options.covariate)
+    check_request(model, options.velocity, options.contact, options.angle, options.duration, covariates)
+    inputs = np.array([[options.velocity, options.contact, options.angle]])
+    prediction = model.predict(inputs, np.array([options.duration]))
+    mean, covariance = prediction.mean[0], prediction.covariance[0]
+    result = {
+        "model": model.name,
+        "mean": mean.tolist(),
+        "covariance": covariance.ravel().tolist(),
+        "process_covariance": prediction.process_covariance[0].ravel().tolist(),
+        "in_domain": bool(prediction.in_domain[0]),
+    }
+    if write_json(options, result):
+        return
+    sd, noise = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(prediction.process_covariance[0]))
+    for k, (name, unit, scale) in enumerate((("dx", "mm", 1e3), ("dy", "mm", 1e3), ("dtheta", "deg", np.degrees(1.0)))):
+        print(f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (noise alone {noise[k] * scale:.3f})")
+    print("inside the training data" if result["in_domain"] else "outside the training data: take with care")
+
+
+def _covariate(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise RequestError("--covariate", text, "NAME=VALUE with a number") from None

@@ -1,0 +1,62 @@
+"""push_predictor train: a model from recordings or tables."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from push_predictor.commands.output import add_command, add_rig, progress, write_json
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """The sub-command `train`."""
+    parser = add_command(
+        commands,
+        "train",
+        "Train a model and save it.",
+        "push_predictor train bags/square_abs_train --model vhgp --out square_abs.pushmodel",
+    )
+    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    parser.add_argument("--model", required=True, choices=("vhgp", "gp", "analytical"), help="which kind")
+    parser.add_argument("--n-train", type=int, metavar="N", help="rows, at random; default: all up to 1000, evenly")
+    parser.add_argument("--seed", type=int, default=0, metavar="K", help="of the choice of rows")
+    parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure")
+    parser.add_argument("--stride", type=float, metavar="S", help="s between window starts; default: end to end")
+    parser.add_argument("--name", help="name in the services; default: the file's stem")
+    parser.add_argument("--out", required=True, type=Path, metavar="MODEL", help="the model file")
+    add_rig(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Load, train, save."""
+    from push_predictor.models.model_file import save_model
+    from push_predictor.models.train import train_model
+    from push_predictor.recordings.load import load_data, load_rig_for
+    from push_predictor.recordings.windows import WindowOptions
+
+    rig = load_rig_for(options.data, options.rig)
+    with progress("read"):
+        table = load_data(options.data, rig, WindowOptions(stride=options.stride))
+    with progress(f"train {options.model}"):
+        model = train_model(
+            table,
+            rig,
+            options.model,
+            name=options.name or options.out.stem,
+            sources=[path.name for path in options.data],
+            n_train=options.n_train,
+            seed=options.seed,
+            fit=options.fit,
+        )
+    save_model(model, options.out)
+    result = {
+        "model": str(options.out),
+        "name": model.name,
+        "kind": model.kind,
+        "n_train": len(model.training),
+        "n_pushes": model.provenance.pushes,
+        "n_rows": len(table),
+    }
+    if not write_json(options, result):
+        print(f"{options.out}: {model.kind}, {len(model.training)} of {len(table)} windows, {result['n_pushes']} pushes")

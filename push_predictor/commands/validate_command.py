@@ -1,0 +1,44 @@
+"""push_predictor validate: the offline counterpart of push_validator."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from push_predictor.commands.metrics_text import print_metrics
+from push_predictor.commands.output import add_command, add_rig, progress, write_json
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """The sub-command `validate`."""
+    parser = add_command(
+        commands,
+        "validate",
+        "Compare a model's predictions with what a recording shows, window by window.",
+        "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a rosbag2 folder or an .mcap file")
+    parser.add_argument("--windows", type=Path, metavar="FILE.json", help="every window: predicted and observed")
+    add_rig(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Validate and print."""
+    from push_predictor.evaluation.offline import validate_recording
+    from push_predictor.evaluation.validation import metrics_json
+    from push_predictor.evaluation.window_log import write_window_log
+    from push_predictor.models.model_file import load_model
+    from push_predictor.recordings.rig import load_rig
+
+    model = load_model(options.model)
+    with progress("validate"):
+        windows, comparison = validate_recording(
+            model, options.recording, load_rig(options.rig) if options.rig else None
+        )
+        metrics = metrics_json(comparison)
+    if options.windows:
+        write_window_log(options.windows, windows, comparison)
+    if not write_json(options, metrics):
+        print_metrics(metrics)

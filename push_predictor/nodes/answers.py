@@ -1,0 +1,58 @@
+"""From a shelf of models and a request to a response: what the services of predict_server do, without a graph.
+
+Each function fills the response or raises a PushPredictorError that says what is wrong with the request.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msg_adapters.predictions import (
+    extend_batch_response,
+    fill_response,
+    query_from_batch_request,
+    query_from_request,
+)
+from push_predictor.errors import RequestError
+from push_predictor.models.request import check_request, check_requests
+from push_predictor.nodes.model_shelf import ModelShelf
+
+ROWS_AT_ONCE = 4096  # of a batch, so that its length does not decide how much memory a prediction takes
+
+
+def answer_push(shelf: ModelShelf, request: Any, response: Any) -> None:
+    """Answer PredictPush. Raises RequestError."""
+    query = query_from_request(request)
+    model = shelf.get(query.model)
+    covariates = {name: float(column[0]) for name, column in query.covariates.items()}
+    check_request(model, request.velocity, request.contact, request.angle, query.duration, covariates)
+    fill_response(response, model.predict(query.inputs, np.array([query.duration])))
+
+
+def answer_batch(shelf: ModelShelf, request: Any, response: Any) -> None:
+    """Answer PredictPushBatch; one bad push refuses all. Raises RequestError."""
+    query = query_from_batch_request(request)
+    model = shelf.get(query.model)
+    check_requests(model, query.inputs, query.duration, query.covariates)
+    for start in range(0, len(query.inputs), ROWS_AT_ONCE):
+        inputs = query.inputs[start : start + ROWS_AT_ONCE]
+        extend_batch_response(response, model.predict(inputs, np.full(len(inputs), query.duration)))
+    response.success = True
+
+
+def answer_list(shelf: ModelShelf, response: Any) -> None:
+    """Answer ListModels."""
+    response.names = shelf.names
+    response.descriptions = [shelf.describe(name) for name in response.names]
+    response.default_model = shelf.default
+
+
+def answer_load(shelf: ModelShelf, request: Any, response: Any) -> None:
+    """Answer LoadModel; the shelf changes only if the file is good. Raises ModelFileError or RequestError."""
+    if not request.path:
+        raise RequestError("path", request.path, "the path of a model file on the server's machine")
+    response.name = shelf.load(Path(request.path), request.name)
+    response.success, response.message = True, f"{request.path} is loaded as {response.name!r}"

@@ -1,0 +1,107 @@
+"""The models a server holds: by name, one of them the default. No ROS here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
+from push_predictor.models.model_file import is_model_file, load_model
+from push_predictor.models.push_model import PushModel
+
+
+class ModelShelf:
+    """Loaded models in the order of their arrival. A model is taken up only when its file has been read whole."""
+
+    def __init__(self) -> None:
+        self._models: dict[str, PushModel] = {}
+        self._files: dict[str, Path] = {}
+        self._chosen = ""
+
+    def __len__(self) -> int:
+        return len(self._models)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the loaded models."""
+        return list(self._models)
+
+    @property
+    def default(self) -> str:
+        """What an empty name stands for: the model chosen, else the first; empty where there is none."""
+        return self._chosen or next(iter(self._models), "")
+
+    @property
+    def accepted(self) -> str:
+        """In words, which names a request may give."""
+        return f"one of {', '.join(self._models)}" if self._models else "a model; none is loaded"
+
+    def choose_default(self, name: str) -> None:
+        """Let an empty name stand for this model, loaded by now or not; empty goes back to the first."""
+        self._chosen = name
+
+    def get(self, name: str) -> PushModel:
+        """A model by name, the default one for an empty name. Raises RequestError if it is not loaded."""
+        model = self._models.get(name or self.default)
+        if model is None:
+            field, value = ("model", name) if name or not self._chosen else ("default_model", self._chosen)
+            raise RequestError(field, value, self.accepted)
+        return model
+
+    def load(self, path: Path, name: str = "", *, replace: bool = True) -> str:
+        """Load a model file under a name (empty: the one in the file); a model of that name gives way to it.
+
+        Answers the name. Raises ModelFileError, after which the shelf is as it was; also for a name that is taken
+        if `replace` is false.
+        """
+        path = path.expanduser().resolve()
+        model = load_model(path)
+        name = name or model.name
+        if not replace and name in self._models:
+            raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
+        self._models[name], self._files[name] = model, path
+        return name
+
+    def load_all(self, places: Iterable[str]) -> list[str]:
+        """Load files and folders of files. Answers what went wrong, a line each; the other models are loaded."""
+        problems = []
+        for index, place in enumerate(places):
+            try:
+                for path in model_files(Path(place).expanduser()):
+                    problems += self._problem(path)
+            except ModelFileError as error:
+                problems.append(f"models[{index}]: {error}")
+        return problems
+
+    def describe(self, name: str) -> str:
+        """One line of `key=value; ...` about a loaded model: kind, outline, surface, training, covariates, file."""
+        model = self._models[name]
+        low, high = float(model.training.duration.min()), float(model.training.duration.max())
+        values = {
+            "kind": model.kind,
+            "outline": model.rig.shape,
+            "surface": model.rig.surface,
+            "pushes": len(model.training.pushes),
+            "windows": len(model.training),
+            "covariates": "-",  # what a request must bring besides; none of the kinds that exist asks for any
+            "duration": f"{low:g}" if high - low < 1e-6 else f"{low:g}..{high:g}",
+            "file": self._files[name],
+        }
+        return "; ".join(f"{key}={value}" for key, value in values.items())
+
+    def _problem(self, path: Path) -> list[str]:
+        try:
+            self.load(path, replace=False)
+        except PushPredictorError as error:
+            return [str(error)]
+        return []
+
+
+def model_files(place: Path) -> list[Path]:
+    """The file itself, or the model files in a folder, by name. Raises ModelFileError if there is none."""
+    if not place.is_dir():
+        return [place]
+    files = sorted(path for path in place.iterdir() if path.is_file() and is_model_file(path))
+    if not files:
+        raise ModelFileError(f"{place}: the folder holds no model file, give one that train wrote")
+    return files

@@ -1,0 +1,127 @@
+"""Node parameters as one table of rows: declared, described, bounded and checked alike in every node."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from push_predictor.errors import RequestError
+
+Value: TypeAlias = "bool | int | float | str | list[str]"
+
+
+@dataclass(frozen=True)
+class Param:
+    """One parameter. low and high bound a number (inclusive); choices bound a text. An empty list is [""]."""
+
+    name: str
+    default: Value
+    description: str
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+    read_only: bool = True
+
+    @property
+    def accepted(self) -> str:
+        """In words, what may be given."""
+        if self.choices:
+            return " or ".join(repr(choice) for choice in self.choices)
+        kind = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}.get(
+            type(self.default), "a list of texts"
+        )
+        bounds = [f"from {self.low:g}"] if self.low is not None else []
+        bounds += [f"up to {self.high:g}"] if self.high is not None else []
+        return " ".join([kind, *bounds])
+
+    def allows(self, value: Any) -> bool:
+        """Has it the type of the default (an integer will do for a number) and is it within bounds?"""
+        if isinstance(self.default, list):
+            return _is_texts(value)
+        if isinstance(self.default, float):
+            return _is_number(value) and math.isfinite(value) and self._within(value)
+        if type(value) is not type(self.default):
+            return False
+        if isinstance(self.default, str):
+            return not self.choices or value in self.choices
+        return isinstance(self.default, bool) or self._within(value)
+
+    def _within(self, value: float) -> bool:
+        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+
+def declare(node: Node, params: Sequence[Param]) -> None:
+    """Declare every row; a value given from outside is checked now, later changes when they come.
+
+    Raises RequestError that names the parameter, its value and what is accepted.
+    """
+    table = {param.name: param for param in params}
+    node.add_on_set_parameters_callback(lambda changed: _verdict(table, changed))
+    for param in params:
+        given = given_value(node, param.name)
+        if given is not None and not param.allows(given):
+            raise RequestError(param.name, given, param.accepted)
+        value = param.default if given is None else _native(param, given)
+        node.declare_parameter(param.name, value, _descriptor(param), ignore_override=True)
+
+
+def given_value(node: Node, name: str) -> Any:
+    """What the command line or a file gives for a parameter that is not declared yet; None for nothing."""
+    value = node.declare_parameter(name, None, ParameterDescriptor(dynamic_typing=True)).value
+    node.undeclare_parameter(name)
+    return value
+
+
+def values_of(node: Node, params: Iterable[Param]) -> dict[str, Any]:
+    """A snapshot {name: value}; lists come without empty texts."""
+    values = {param.name: node.get_parameter(param.name).value for param in params}
+    return {name: [text for text in v if text] if isinstance(v, list) else v for name, v in values.items()}
+
+
+def _native(param: Param, value: Any) -> Any:
+    """`rate:=10` is as good as `rate:=10.0`."""
+    if isinstance(param.default, list):
+        return list(value)
+    return float(value) if isinstance(param.default, float) else value
+
+
+def _descriptor(param: Param) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        description=param.description,
+        read_only=param.read_only,
+        additional_constraints=param.accepted,
+    )
+    if isinstance(param.default, float) and (param.low, param.high) != (None, None):
+        descriptor.floating_point_range = [FloatingPointRange(**_bounds(param, float, math.inf))]
+    elif type(param.default) is int and (param.low, param.high) != (None, None):
+        descriptor.integer_range = [IntegerRange(**_bounds(param, int, 2**63 - 1), step=1)]
+    return descriptor
+
+
+def _bounds(param: Param, kind: Any, limit: Any) -> Mapping[str, Any]:
+    low = -limit if param.low is None else kind(param.low)
+    return {"from_value": low, "to_value": limit if param.high is None else kind(param.high)}
+
+
+def _verdict(table: Mapping[str, Param], changed: Sequence[Parameter]) -> SetParametersResult:
+    for parameter in changed:
+        row = table.get(parameter.name)
+        if row is not None and not row.allows(parameter.value):
+            reason = f"{parameter.name}: {parameter.value!r} is not accepted, give {row.accepted}"
+            return SetParametersResult(successful=False, reason=reason)
+    return SetParametersResult(successful=True)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(isinstance(text, str) for text in value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+

@@ -1,0 +1,251 @@
+"""The node that serves push models: predict_push, predict_push_batch, list_models, load_model (docs/services.md)."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any, TypeVar
+
+from diagnostic_msgs.msg import DiagnosticArray
+from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, qos_profile_system_default
+from rclpy.service import Service
+from rclpy.service_introspection import ServiceIntrospectionState
+
+from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.predictions import refuse
+from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
+from push_predictor.nodes.model_shelf import ModelShelf
+from push_predictor.nodes.parameters import Param, declare, values_of
+from push_predictor.nodes.request_log import RequestLog
+from push_predictor.nodes.runtime import Stop, run
+
+SERVICE_QOS = QoSProfile(depth=100)  # ten, the default, loses requests of a client with more in flight
+INTROSPECTION = {
+    "disabled": ServiceIntrospectionState.OFF,
+    "metadata": ServiceIntrospectionState.METADATA,
+    "contents": ServiceIntrospectionState.CONTENTS,
+}
+PARAMETERS = (
+    Param("models", [""], "Model files, and folders of them, loaded when the node is configured."),
+    Param(
+        "default_model",
+        "",
+        "Name of the model that a request without a name gets; empty: the first loaded.",
+        read_only=False,
+    ),
+    Param("autostart", True, "Configure and activate without a lifecycle manager."),
+    Param(
+        "introspection",
+        "disabled",
+        "Service events on NAME/_service_event: none, metadata, or requests and responses too.",
+        choices=tuple(INTROSPECTION),
+        read_only=False,
+    ),
+    Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
+)
+NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
+Response = TypeVar("Response")
+
+
+class InactiveError(PushPredictorError):
+    """A prediction was asked of a node that is not active."""
+
+
+class PredictServer(LifecycleNode):
+    """Serves the models of the parameter `models`, and those that load_model brings, while it is active."""
+
+    def __init__(self) -> None:
+        super().__init__("push_predictor")
+        declare(self, PARAMETERS)
+        self._shelf, self._log = ModelShelf(), RequestLog()
+        self._problems: list[str] = []
+        self._offered: list[Service] = []
+        self._state = "unconfigured"
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
+        self.create_timer(self.value("diagnostics_period"), self._publish_diagnostics, clock=steady)
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+
+    def start(self) -> None:
+        """Configure and activate, as a lifecycle manager would; without a model the node stays inactive."""
+        if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
+            self.trigger_activate()
+
+    def close(self) -> None:
+        """Publish the last counts."""
+        self._publish_diagnostics()
+
+    # --- transitions ----------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the models and offer the services. A bad model file is reported, the others are loaded."""
+        self._problems = self._shelf.load_all(self.value("models"))
+        for problem in self._problems:
+            self.get_logger().error(problem)
+        self._shelf.choose_default(self.value("default_model"))
+        self._offered = [
+            self.create_service(PredictPush, "predict_push", self._on_push, qos_profile=SERVICE_QOS),
+            self.create_service(PredictPushBatch, "predict_push_batch", self._on_batch, qos_profile=SERVICE_QOS),
+            self.create_service(ListModels, "list_models", self._on_list, qos_profile=SERVICE_QOS),
+            self.create_service(LoadModel, "load_model", self._on_load, qos_profile=SERVICE_QOS),
+        ]
+        self._introspect(self.value("introspection"))
+        self._state = "inactive"
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer predictions from now on. Fails while no model is loaded: the node stays inactive."""
+        if not self._shelf.names:
+            self.get_logger().error(f"{NO_MODEL}; the node stays inactive")
+            return TransitionCallbackReturn.FAILURE
+        self._state = "active"
+        self.get_logger().info(f"serving {', '.join(self._shelf.names)}; default {self._shelf.default!r}")
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Refuse predictions from now on."""
+        self._state = "inactive"
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give up models and services."""
+        self._give_up("unconfigured")
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give up models and services for good."""
+        self._give_up("finalized")
+        return super().on_shutdown(state)
+
+    def _give_up(self, state: str) -> None:
+        while self._offered:
+            self.destroy_service(self._offered.pop())
+        self._shelf, self._problems, self._state = ModelShelf(), [], state
+
+    # --- services -------------------------------------------------------------------------------------------
+
+    def _on_push(self, request: PredictPush.Request, response: PredictPush.Response) -> PredictPush.Response:
+        return self._prediction(answer_push, request, response)
+
+    def _on_batch(
+        self, request: PredictPushBatch.Request, response: PredictPushBatch.Response
+    ) -> PredictPushBatch.Response:
+        return self._prediction(answer_batch, request, response)
+
+    def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
+        answer_list(self._shelf, response)
+        return response
+
+    def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
+        awaited = self._state == "inactive" and not self._shelf.names
+        response = self._guarded(answer_load, request, response)
+        if not response.success:
+            return response
+        self.get_logger().info(response.message)
+        if request.make_default:
+            self.set_parameters([Parameter("default_model", value=response.name)])
+        if awaited and self.value("autostart"):
+            self.trigger_activate()
+        return response
+
+    def _prediction(
+        self, answer: Callable[[ModelShelf, Any, Response], None], request: Any, response: Response
+    ) -> Response:
+        start = perf_counter()
+        response = self._guarded(answer if self._state == "active" else self._inactive, request, response)
+        self._log.add(perf_counter() - start, None if response.success else response.message)
+        return response
+
+    def _inactive(self, shelf: ModelShelf, request: Any, response: Any) -> None:
+        raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")
+
+    def _guarded(
+        self, answer: Callable[[ModelShelf, Any, Response], None], request: Any, response: Response
+    ) -> Response:
+        """A callback that raises would end the node, so every failure becomes an answer."""
+        try:
+            answer(self._shelf, request, response)
+            return response
+        except PushPredictorError as error:
+            reason = str(error)
+            self.get_logger().warning(f"refused: {reason}", throttle_duration_sec=1.0)
+        except Exception as error:
+            reason = f"internal error, see the log of the node: {error!r}"
+            self.get_logger().error(traceback.format_exc())
+        return refuse(response, reason)
+
+    # --- parameters and diagnostics -------------------------------------------------------------------------
+
+    def value(self, name: str) -> Any:
+        """The present value of a parameter."""
+        return values_of(self, PARAMETERS)[name]
+
+    def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
+        for parameter in changed:
+            if parameter.name == "default_model" and parameter.value not in ("", *self._shelf.names):
+                error = RequestError(parameter.name, parameter.value, self._shelf.accepted)
+                return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply_parameters(self, changed: list[Parameter]) -> None:
+        for parameter in changed:
+            if parameter.name == "default_model":
+                self._shelf.choose_default(parameter.value)
+            elif parameter.name == "introspection":
+                self._introspect(parameter.value)
+
+    def _introspect(self, mode: str) -> None:
+        for service in self._offered:
+            service.configure_introspection(
+                self.get_clock(), qos_profile_system_default, INTROSPECTION[mode]
+            )
+
+    def _publish_diagnostics(self) -> None:
+        level, message = self._health()
+        values = {
+            "state": self._state,
+            "models": self._shelf.names,
+            "default_model": self._shelf.default,
+            "problems": "; ".join(self._problems) or None,
+            **self._log.values(),
+        }
+        name = f"{self.get_fully_qualified_name()}: predictions"
+        stamp = self.get_clock().now().nanoseconds
+        self._diagnostics.publish(diagnostic_array(stamp, diagnostic_status(name, level, message, values)))
+
+    def _health(self) -> tuple[Level, str]:
+        if not self._shelf.names:
+            return Level.ERROR, NO_MODEL
+        if self._state != "active":
+            return Level.WARN, f"the node is {self._state}"
+        if self._shelf.default not in self._shelf.names:
+            return Level.WARN, f"default_model {self._shelf.default!r} is not loaded"
+        if self._problems:
+            return Level.WARN, f"{len(self._problems)} of the models could not be loaded"
+        return Level.OK, f"serving {len(self._shelf.names)} models"
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; answers the exit status."""
+    return run("predict_server", started_server, args)
+
+
+def started_server(stop: Stop) -> PredictServer:
+    """The node, serving if its parameter `autostart` says so. Raises RequestError for a bad parameter."""
+    node = PredictServer()
+    if node.value("autostart"):
+        node.start()
+    return node
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""metadata.yaml of a rosbag2 folder, read and written (version 9, ROS 2 Jazzy)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
+
+METADATA_FILE = "metadata.yaml"
+VERSION = 9
+_ROOT = "rosbag2_bagfile_information"
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
+
+
+@dataclass(frozen=True)
+class BagMetadata:
+    """files: as relative_file_paths has them; custom_data: {record name: {key: value}}; notes: what was wrong."""
+
+    files: tuple[str, ...] = ()
+    custom_data: dict[str, Mapping[str, object]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """A topic as metadata.yaml tells it; durability is 'volatile' or 'transient_local'."""
+
+    name: str
+    type: str
+    count: int
+    type_hash: str = ""
+    depth: int = 10
+    durability: str = "volatile"
+
+
+def read_bag_metadata(folder: Path) -> BagMetadata:
+    """Read metadata.yaml; one that is absent or unreadable leaves a note.
+
+    Raises RecordingError for a bag that is not MCAP or is compressed as a whole.
+    """
+    import yaml
+
+    path = folder / METADATA_FILE
+    try:
+        information = yaml.safe_load(path.read_text())[_ROOT]
+        files = tuple(str(name) for name in information.get("relative_file_paths") or ())
+    except FileNotFoundError:
+        return BagMetadata()
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        reason = str(error).replace("\n", " ")
+        return BagMetadata(notes=[f"{path}: cannot be read ({reason}), the .mcap files are taken by name"])
+    _check(information, path)
+    return BagMetadata(files, _records(information.get("custom_data")))
+
+
+def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, object]]:
+    """The custom_data in the MCAP record `rosbag2`, where rosbag2 keeps a copy of metadata.yaml."""
+    import yaml
+
+    try:
+        information = yaml.safe_load(metadata["rosbag2"]["serialized_metadata"])
+    except (KeyError, yaml.YAMLError):
+        return {}
+    return _records(information.get("custom_data")) if isinstance(information, dict) else {}
+
+
+def bag_metadata_text(
+    file: str, start: int, duration: int, topics: list[TopicInfo], records: Mapping[str, Mapping[str, str]]
+) -> str:
+    """metadata.yaml for one file; start and duration in ns.
+
+    Records become custom_data as JSON: rosbag2 refuses to play a bag whose custom_data is not text.
+    """
+    span = {"starting_time": {"nanoseconds_since_epoch": start}, "duration": {"nanoseconds": duration}}
+    count = sum(topic.count for topic in topics)
+    information = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        "duration": span["duration"],
+        "starting_time": span["starting_time"],
+        "message_count": count,
+        "topics_with_message_count": [_topic(topic) for topic in topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file],
+        "files": [{"path": file, **span, "message_count": count}],
+        "custom_data": {name: json.dumps(record) for name, record in records.items()} or None,
+        "ros_distro": "jazzy",
+    }
+    return _plain_dump({_ROOT: information})
+
+
+def qos_text(topic: TopicInfo) -> str:
+    """The offered QoS of a topic, as a channel of the MCAP file carries it."""
+    return _plain_dump(_qos(topic)).strip()
+
+
+def _plain_dump(data: object) -> str:
+    """YAML without anchors: rosbag2 reads them, other tools may not."""
+    import yaml
+
+    class Plain(yaml.SafeDumper):  # type: ignore[misc]
+        def ignore_aliases(self, data: object) -> bool:
+            return True
+
+    return str(yaml.dump(data, Dumper=Plain, sort_keys=False))
+
+
+def _topic(topic: TopicInfo) -> dict[str, object]:
+    return {
+        "topic_metadata": {
+            "name": topic.name,
+            "type": topic.type,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": _qos(topic),
+            "type_description_hash": topic.type_hash,
+        },
+        "message_count": topic.count,
+    }
+
+
+def _qos(topic: TopicInfo) -> list[dict[str, object]]:
+    return [
+        {
+            "history": "keep_last",
+            "depth": topic.depth,
+            "reliability": "reliable",
+            "durability": topic.durability,
+            "deadline": _FOREVER,
+            "lifespan": _FOREVER,
+            "liveliness": "automatic",
+            "liveliness_lease_duration": _FOREVER,
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
+
+
+def _check(information: Mapping[str, object], path: Path) -> None:
+    if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", ""):
+        raise RecordingError(f"{path}: storage {storage!r}, mcap is accepted: `ros2 bag convert` makes it")
+    if mode := information.get("compression_mode"):
+        raise RecordingError(
+            f"{path}: compression_mode {mode!r}, chunks compressed in the .mcap are accepted: `ros2 bag convert`"
+        )
+
+
+def _records(custom_data: object) -> dict[str, Mapping[str, object]]:
+    """Records in custom_data: a mapping or its JSON text under the record's name, or a rig's keys on their own."""
+    if not isinstance(custom_data, dict):
+        return {}
+    mappings = {str(name): _mapping(value) for name, value in custom_data.items()}
+    records = {name: mapping for name, mapping in mappings.items() if mapping is not None}
+    if RECORD_NAME not in records and all(key in custom_data for key in REQUIRED):
+        records[RECORD_NAME] = custom_data
+    return records
+
+
+def _mapping(value: object) -> Mapping[str, object] | None:
+    try:
+        parsed = json.loads(value) if isinstance(value, str) else value
+    except ValueError:
+        return None
+    return parsed if isinstance(parsed, dict) else None

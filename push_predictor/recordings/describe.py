@@ -1,0 +1,64 @@
+"""What a recording or a push table holds, in words and numbers, damage included."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+from push_predictor.recordings.table_file import read_table, rig_beside
+from push_predictor.recordings.window_finder import find_windows
+
+
+def describe_recording(path: Path) -> dict[str, object]:
+    """Streams, rig, pushes and windows of a recording. Raises RecordingError where nothing can be read."""
+    recording = read_recording(path)
+    found: dict[str, object] = {"recording": recording.name, "rig": _rig(recording), "streams": _streams(recording)}
+    if recording.rig is not None:
+        windows = find_windows(recording, recording.rig)
+        found |= {"pushes": len({w.push_id for w in windows}), "windows": len(windows)}
+    return found | {"notes": list(recording.notes)}
+
+
+def describe_table(path: Path) -> dict[str, object]:
+    """Rows, pushes and ranges of a push table. Raises TableError."""
+    table, rig = read_table(path), rig_beside(path)
+    columns = np.column_stack([table.inputs, table.duration])
+    names = ("velocity", "contact", "angle", "duration")
+    ranges = {
+        name: f"{low:.4g} to {high:.4g}"
+        for name, low, high in zip(names, columns.min(axis=0), columns.max(axis=0), strict=True)
+    }
+    return {
+        "table": path.name,
+        "rows": len(table),
+        "pushes": len(table.pushes),
+        "rig": "none beside it" if rig is None else f"{rig.shape} on {rig.surface}",
+        "ranges": ranges,
+        "covariates": list(table.covariates),
+    }
+
+
+def _rig(recording: Recording) -> str:
+    rig = recording.rig
+    return "none: give it with --rig" if rig is None else f"{rig.shape} on {rig.surface}, {rig.object_mass:g} kg"
+
+
+def _streams(recording: Recording) -> dict[str, str]:
+    streams: dict[str, PoseStream | WrenchStream | ScalarStream | None] = {
+        "slider": recording.slider,
+        "pusher": recording.pusher,
+        "wrench": recording.wrench,
+        **recording.scalars,
+    }
+    return {name: _extent(stream) for name, stream in streams.items()}
+
+
+def _extent(stream: PoseStream | WrenchStream | ScalarStream | None) -> str:
+    if stream is None or not len(stream):
+        return "absent"
+    seconds = (int(stream.stamp[-1]) - int(stream.stamp[0])) * 1e-9
+    rate = (len(stream) - 1) / seconds if seconds > 0.0 else 0.0
+    return f"{len(stream)} samples, {seconds:.2f} s, {rate:.1f} Hz"

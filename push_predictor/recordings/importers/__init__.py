@@ -1,0 +1,40 @@
+"""Importers: foreign recordings of pushes become recordings and push tables, and a report of what was done to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.importers.mcube import import_mcube
+from push_predictor.recordings.importers.mit import import_mit
+from push_predictor.recordings.importers.mit_square import import_mit_square
+from push_predictor.recordings.importers.mlab import import_mlab
+from push_predictor.recordings.importers.report import ImportReport
+from push_predictor.recordings.importers.rosbag1 import import_rosbag1
+from push_predictor.recordings.rig import Rig
+
+Importer = Callable[[Sequence[Path], Path, Rig | None], ImportReport]
+IMPORTERS: dict[str, Importer] = {
+    "mit": import_mit,
+    "mit-square": import_mit_square,
+    "mlab": import_mlab,
+    "mcube": import_mcube,
+    "rosbag1": import_rosbag1,
+}
+KINDS = tuple(IMPORTERS)
+
+__all__ = ["IMPORTERS", "KINDS", "ImportReport", "import_source"]
+
+
+def import_source(kind: str, sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+    """Import files or folders of one kind into the folder `out`; either all results are written or none.
+
+    rig takes the place of the one the importer knows. Raises ImportSourceError that names the file and the line (or
+    the row, byte or topic) that cannot be read, and what is accepted.
+    """
+    if kind not in IMPORTERS:
+        raise ImportSourceError(f"kind {kind!r} is not known, give one of {', '.join(KINDS)}")
+    if not sources:
+        raise ImportSourceError(f"import {kind}: no source was given")
+    return IMPORTERS[kind]([Path(source) for source in sources], Path(out), rig)

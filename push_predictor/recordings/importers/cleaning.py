@@ -1,0 +1,78 @@
+"""Repairs that several foreign formats need: order in time, repeated rows, held poses, the heading's turns."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.importers.report import Notes
+from push_predictor.types import Array, BoolArray, IntArray
+
+
+class Samples(NamedTuple):
+    """A stream before it has a meaning: stamps (n,) in ns, values (n, k)."""
+
+    stamp: IntArray
+    values: Array
+
+    def take(self, rows: IntArray | BoolArray) -> Samples:
+        """The given rows."""
+        return Samples(self.stamp[rows], self.values[rows])
+
+
+def nanoseconds(seconds: Array) -> IntArray:
+    """Unix seconds (n,) as integer ns."""
+    whole = np.floor(seconds)
+    return whole.astype(np.int64) * 1_000_000_000 + np.round((seconds - whole) * 1e9).astype(np.int64)
+
+
+def twist(z: Array, w: Array) -> Array:
+    """The planar rotation (rad) nearest to a quaternion with these parts: the tilt of a tracked body is noise."""
+    return np.asarray(2.0 * np.arctan2(z, w))
+
+
+def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
+    """Samples that are finite, in order of time, one a stamp. Raises ImportSourceError if fewer than two remain."""
+    finite = np.all(np.isfinite(samples.values), axis=1)
+    if missing := int(np.sum(~finite)):
+        notes.dropped.append(f"{where}: {missing} rows with a value that is not finite")
+        samples = samples.take(finite)
+    if late := int(np.sum(np.diff(samples.stamp) < 0)):
+        notes.repaired.append(f"{where}: {late} rows out of order in time, sorted")
+        samples = samples.take(np.argsort(samples.stamp, kind="stable"))
+    first = np.concatenate([[True], np.diff(samples.stamp) > 0])[: len(samples.stamp)]
+    if repeated := int(np.sum(~first)):
+        notes.dropped.append(f"{where}: {repeated} rows that repeat the stamp of the row before")
+        samples = samples.take(first)
+    if len(samples.stamp) < 2:
+        raise ImportSourceError(f"{where}: {len(samples.stamp)} usable rows, at least 2 are needed")
+    return samples
+
+
+def without_held(samples: Samples, where: str, notes: Notes) -> Samples:
+    """Without rows that only hold a moving tip's last position; rows of a resting tip are kept.
+
+    A robot controller that answers faster than it updates gives stairs, of which only the first row of each step is
+    a measurement. A tip rests where three rows or more are equal.
+    """
+    same = np.all(samples.values[1:] == samples.values[:-1], axis=1)
+    as_before = np.concatenate([[False], same])
+    as_after = np.concatenate([same, [True]])
+    rested_before = np.concatenate([[True, True], same[:-1]])
+    held = as_before & ~as_after & ~rested_before
+    if count := int(np.sum(held)):
+        notes.repaired.append(
+            f"{where}: {count} of {len(held)} rows only hold the moving tip's position of the row before, left out"
+        )
+    return samples.take(~held)
+
+
+def require_overlap(streams: dict[str, IntArray], where: str) -> None:
+    """Raise ImportSourceError unless all streams (stamps in ns) share some time."""
+    start = max(int(stamp[0]) for stamp in streams.values())
+    end = min(int(stamp[-1]) for stamp in streams.values())
+    if start >= end:
+        spans = ", ".join(f"{name} {stamp[0] / 1e9:.3f} to {stamp[-1] / 1e9:.3f} s" for name, stamp in streams.items())
+        raise ImportSourceError(f"{where}: the streams share no time ({spans})")

@@ -1,0 +1,24 @@
+"""Forces of the MLab rig: from the axes of the sensor to the world's (MLab_EXP, ExtractFromLog.m)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.recordings.importers.cleaning import twist
+from push_predictor.types import Array
+
+SENSOR_TO_TOOL = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2.0)  # seen from below: a reflection
+TARE_SAMPLES = 10
+
+
+def contact_force(force: Array, robot: Array) -> Array:
+    """Mean force (2,) N of the finger on the object in the world over the second half of a push; NaN if unknown.
+
+    force: (n, 3) of t, fx, fy as logged. robot: (m, 8) of t, x, y, z, qw, qx, qy, qz.
+    """
+    if len(force) <= 2 * TARE_SAMPLES:
+        return np.full(2, np.nan)
+    qw, _, _, qz = np.median(robot[:, 4:], axis=0)
+    pressed = force[len(force) // 2 :, 1:].mean(axis=0) - force[:TARE_SAMPLES, 1:].mean(axis=0)
+    return rotate(-SENSOR_TO_TOOL @ pressed, twist(qz, qw))

@@ -1,0 +1,81 @@
+"""Writing an import's results all at once: a failure leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.importers.report import ImportReport, Notes
+from push_predictor.recordings.rig import Rig, save_rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.write import write_recording
+
+
+class Staging:
+    """Results gathered in a folder beside their destination."""
+
+    def __init__(self, out: Path, folder: Path) -> None:
+        self.out, self.folder = out, folder
+        self.written: list[Path] = []
+        self.recordings = 0
+        self.pushes = 0
+
+    def recording(self, recording: Recording, pushes: int) -> None:
+        """Write a recording as the folder of its name. Raises ImportSourceError if the name is taken."""
+        write_recording(self._claimed(recording.name), recording)
+        self.recordings += 1
+        self.pushes += pushes
+
+    def table(self, name: str, table: PushTable, rig: Rig) -> None:
+        """Write NAME.csv and NAME.rig.yaml. Raises ImportSourceError if a name is taken."""
+        write_table(self._claimed(f"{name}.csv"), table)
+        save_rig(rig, self._claimed(f"{name}.rig.yaml"))
+        self.pushes += len(table.pushes)
+
+    def report(self, kind: str, notes: Notes) -> ImportReport:
+        """The report of what has been gathered."""
+        sentences = (tuple(notes.dropped), tuple(notes.repaired), tuple(notes.assumed))
+        return ImportReport(kind, tuple(self.written), self.recordings, self.pushes, *sentences)
+
+    def _claimed(self, name: str) -> Path:
+        target = self.out / name
+        if target in self.written:
+            raise ImportSourceError(f"{target}: two sources would write it, import them into different folders")
+        if target.exists():
+            raise ImportSourceError(f"{target} exists already, remove it or give another --out")
+        self.written.append(target)
+        return self.folder / name
+
+
+@contextmanager
+def staged(out: Path) -> Iterator[Staging]:
+    """Gather results beside `out` and move them there when the block ends well; on an error none is kept."""
+    made = not out.exists()
+    folder: Path | None = None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=".import-", dir=out))
+        staging = Staging(out, folder)
+        yield staging
+        for target in staging.written:
+            os.replace(folder / target.name, target)
+    except OSError as error:
+        raise ImportSourceError(f"{error.filename or out}: {error.strerror or error}") from error
+    finally:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        if made and out.is_dir() and not any(out.iterdir()):
+            out.rmdir()
+
+
+def safe_name(text: str) -> str:
+    """`text` with everything that a file system or a shell may trip over replaced by '_'."""
+    return re.sub(r"[^A-Za-z0-9.=-]+", "_", text).strip("._") or "unnamed"

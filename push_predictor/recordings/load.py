@@ -1,0 +1,98 @@
+"""Recordings and push tables alike, as one table and one rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.errors import RecordingError, RigError
+from push_predictor.recordings.bag import open_bag
+from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
+from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
+from push_predictor.recordings.table import PushTable, concatenate
+from push_predictor.recordings.table_file import is_recording, read_table, rig_beside, rig_path
+from push_predictor.recordings.window_finder import find_windows
+from push_predictor.recordings.windows import WindowOptions, windows_to_table
+
+
+def load_data(
+    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()
+) -> PushTable:
+    """The windows of all recordings and the rows of all tables, in the order given.
+
+    rig takes the place of the recorded one. A covariate is kept where all of the data have it. Where two paths
+    give one push_id to different rows, the path's name goes before it; the same rows twice stay one push. Raises
+    RecordingError (also if there is no window in any recording), TableError or RigError.
+    """
+    tables = [_load(Path(path), rig, options) for path in paths]
+    if paths and not any(map(len, tables)):
+        raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
+    return concatenate([table for table in _distinct(paths, tables) if len(table)])
+
+
+def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
+    """The rig of these data: rig_file if given, else what the recordings and the NAME.rig.yaml beside tables say.
+
+    These must agree in outline and pusher.
+
+    Raises RigError that names the path, the key and how to give it.
+    """
+    if rig_file is not None:
+        return load_rig(Path(rig_file))
+    if not paths:
+        raise RigError(f"{RECORD_NAME}: neither data nor a rig was given; {HOW_TO_GIVE}")
+    first, *others = [(path, _rig_of(Path(path))) for path in paths]
+    for path, rig in others:
+        if _bodies(rig) != _bodies(first[1]):
+            raise RigError(
+                f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})"
+            )
+    return first[1]
+
+
+def _load(path: Path, rig: Rig | None, options: WindowOptions) -> PushTable:
+    if not is_recording(path):
+        return read_table(path)
+    recording = read_recording(path, rig=rig)
+    return windows_to_table(find_windows(recording, require_rig(recording), options))
+
+
+def _rig_of(path: Path) -> Rig:
+    if is_recording(path):
+        rig, place = recorded_rig(open_bag(path)), "the recording"
+    else:
+        rig, place = rig_beside(path), str(rig_path(path))
+    if rig is None:
+        raise RigError(f"{path}: no {RECORD_NAME} in {place}; {HOW_TO_GIVE}")
+    return rig
+
+
+def _bodies(rig: Rig) -> tuple[str | None, ...]:
+    record = rig.to_record()
+    return tuple(record.get(key) for key in ("outline", "shape_parameters", "pusher_radius"))
+
+
+def _distinct(paths: Sequence[Path], tables: list[PushTable]) -> list[PushTable]:
+    """The tables, renamed by path where a push_id means different pushes."""
+    seen: dict[str, bytes] = {}
+    for table in tables:
+        for push, rows in _rows_by_push(table).items():
+            if seen.setdefault(push, rows) != rows:
+                return [_prefixed(table, Path(path).name) for path, table in zip(paths, tables, strict=True)]
+    return tables
+
+
+def _rows_by_push(table: PushTable) -> dict[str, bytes]:
+    rows = np.column_stack([table.inputs, table.duration, table.outcomes])
+    order = np.argsort(table.push_id, kind="stable")
+    names, starts = np.unique(table.push_id[order], return_index=True)
+    parts = np.split(rows[order], starts[1:])
+    return {str(name): part.tobytes() for name, part in zip(names, parts, strict=True)}
+
+
+def _prefixed(table: PushTable, name: str) -> PushTable:
+    ids = np.array([f"{name}/{push}" for push in table.push_id.tolist()], dtype=np.str_)
+    return replace(table, push_id=ids)

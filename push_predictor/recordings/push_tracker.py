@@ -1,0 +1,121 @@
+"""Following pushes sample by sample: when contact and motion hold, and which stretches can carry windows."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from push_predictor.recordings.contact_judge import Judged
+from push_predictor.recordings.window_cut import PushContext
+from push_predictor.recordings.windows import WindowOptions
+from push_predictor.types import Array
+
+FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
+TARE_SAMPLES = 30
+NOISE_FACTOR = 5.0
+LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
+
+
+class PushTracker:
+    """Feed it judged samples in order; it says which windows (start, end in ns) have become complete."""
+
+    def __init__(self, options: WindowOptions) -> None:
+        self.options = options
+        self.counts = {"dropouts": 0, "resets": 0}
+        self.push: PushContext | None = None
+        self._start: int | None = None  # of the window being filled
+        self._last_good = -np.inf
+        self._last_time = -np.inf
+        self._idle = 0.0
+        self._pushes = 0
+        self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
+        self._first_touch: int | None = None
+
+    @property
+    def start(self) -> int | None:
+        """Start (ns) of the window that is being filled."""
+        return self._start
+
+    def step(self, sample: Judged) -> list[tuple[int, int]]:
+        """Take one sample; returns the windows that end by it."""
+        self._note_interruptions(sample)
+        self._note_free_force(sample)
+        touching = not sample.blind and self._touches(sample)
+        if touching and self._first_touch is None:
+            self._first_touch = sample.stamp
+        if touching and sample.speed >= self.options.least_speed:
+            return self._pushing(sample)
+        self._not_pushing(sample, touching)
+        return []
+
+    def _note_interruptions(self, sample: Judged) -> None:
+        lapse, self._last_time = sample.time - self._last_time, sample.time
+        if sample.broken:
+            self.counts["dropouts"] += self._start is not None
+            self._start = None
+        else:
+            self._idle += lapse if np.isfinite(lapse) else 0.0
+        if sample.jumped or (sample.broken and lapse > LONGEST_BREAK):
+            self.counts["resets"] += sample.jumped
+            self._end_push()
+
+    def _note_free_force(self, sample: Judged) -> None:
+        free = sample.height > self.options.lift or sample.gap > FREE_GAP
+        if free and sample.force is not None and not sample.blind:
+            self._free_force.append(sample.force)
+
+    def _touches(self, sample: Judged) -> bool:
+        if sample.height > self.options.lift:
+            return False
+        if sample.force is None or not self._free_force:
+            return sample.gap <= self.options.touch_gap_alone
+        zero, noise = self._zero()
+        force = float(np.hypot(*(sample.force - zero)))
+        return sample.gap <= self.options.touch_gap and force > max(self.options.least_force, NOISE_FACTOR * noise)
+
+    def _zero(self) -> tuple[Array, float]:
+        """The sensor's reading and its noise (N) without contact."""
+        readings = np.array(self._free_force)
+        return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
+
+    def _pushing(self, sample: Judged) -> list[tuple[int, int]]:
+        if self.push is None or self._idle > self.options.push_pause:
+            self._begin_push(sample)
+        self._idle = 0.0
+        self._last_good = sample.time
+        if self._start is None:
+            self._start = sample.stamp
+        return self._complete(sample.stamp)
+
+    def _complete(self, until: int) -> list[tuple[int, int]]:
+        length = round(self.options.duration * 1e9)
+        stride = round((self.options.stride or self.options.duration) * 1e9)
+        done = []
+        while self._start is not None and self._start + length <= until:
+            done.append((self._start, self._start + length))
+            self._start += stride
+        return done
+
+    def _not_pushing(self, sample: Judged, touching: bool) -> None:
+        if sample.time - self._last_good > self.options.bounce:
+            self._start = None
+        if not touching and self._idle > self.options.push_pause:
+            self._first_touch = None
+
+    def _begin_push(self, sample: Judged) -> None:
+        first = self._first_touch if self._first_touch is not None else sample.stamp
+        if self.push is not None and first == self.push.first_touch:
+            first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again
+        tare = self._zero()[0] if self._free_force else None
+        self.push = PushContext(_push_id(first), self._pushes, first, tare, None, 0)
+        self._pushes += 1
+        self._start = None
+
+    def _end_push(self) -> None:
+        self.push, self._start, self._first_touch = None, None, None
+
+
+def _push_id(stamp: int) -> str:
+    """Named by its first touch, so that the same push has the same name online, offline and in a copy."""
+    return f"push-{stamp // 10**9}.{stamp % 10**9 // 10**6:03d}"

@@ -1,0 +1,14 @@
+"""Under what names a recording holds its streams."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TopicNames:
+    """Topics of a recording (contract, section 2); a leading slash makes no difference."""
+
+    slider: str = "slider/pose"
+    pusher: str = "pusher/pose"
+    wrench: str = "pusher/wrench"

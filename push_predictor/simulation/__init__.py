@@ -1,0 +1,1 @@
+"""A rig in software: a dynamic pusher-slider on distributed support points, and the recordings it leaves."""

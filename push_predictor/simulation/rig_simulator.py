@@ -1,0 +1,59 @@
+"""Simulate a rig: from a plan of pushes to a recording."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from push_predictor.recordings.streams import Recording
+from push_predictor.simulation.batches import Batch, run_pushes
+from push_predictor.simulation.outcomes import push_outcomes
+from push_predictor.simulation.pushes import PushPlan, grid_pushes, random_pushes
+from push_predictor.simulation.sensors import (
+    Sensors,
+    feel_wrench,
+    surface_temperature,
+    track_pusher,
+    track_slider,
+)
+from push_predictor.simulation.spec import SimulationSpec, simulated_rig
+from push_predictor.simulation.timeline import PushMotion, run_in_turn
+
+__all__ = ["PushPlan", "Sensors", "SimulationSpec", "grid_pushes", "push_outcomes", "random_pushes", "simulate"]
+
+TEMPERATURE_TOPIC = "surface/temperature"
+FIRST_STAMP, STAMP_RANGE = 1_500_000_000, 10**8  # s since 1970
+
+
+def simulate(spec: SimulationSpec) -> Recording:
+    """Make the pushes of a spec and record them. Raises RigError for an unknown shape or surface."""
+    motions = {row: _motion(batch, i) for batch in run_pushes(spec) for i, row in enumerate(batch.rows.tolist())}
+    truth = run_in_turn([motions[row] for row in range(len(spec.pushes))])
+    epoch = _epoch(spec)
+    return Recording(
+        name=spec.name,
+        rig=simulated_rig(spec),
+        slider=track_slider(truth, spec.sensors, epoch, spec.rng(10)),
+        pusher=track_pusher(truth, spec.sensors, epoch, spec.rng(11)),
+        wrench=feel_wrench(truth, spec.sensors, epoch, spec.rng(12)),
+        scalars={TEMPERATURE_TOPIC: surface_temperature(truth, epoch, spec.rng(13))},
+    )
+
+
+def _motion(batch: Batch, i: int) -> PushMotion:
+    """Push i of a batch until its own end; a copy, so that the batch can go."""
+    motion = batch.motion
+    stop = int(np.searchsorted(motion.time[i], batch.end[i], side="right"))
+    streams = (motion.time, motion.slider, motion.pusher, motion.wrench)
+    return PushMotion(*(stream[i, :stop].copy() for stream in streams))
+
+
+def _epoch(spec: SimulationSpec) -> int:
+    """Stamp of the start (ns), drawn from what defines the recording: no two should share their stamps."""
+    plan = spec.pushes
+    settings = (spec.slider.name, spec.table, spec.seed, spec.surface_seed, spec.sensors, spec.name)
+    digest = hashlib.sha256(repr(settings).encode())
+    for column in (plan.contact, plan.angle, plan.speed, plan.travel):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return (FIRST_STAMP + int.from_bytes(digest.digest()[:8], "big") % STAMP_RANGE) * 10**9

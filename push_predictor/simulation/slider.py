@@ -1,0 +1,79 @@
+"""Sliders: outline, mass, moment of inertia, and the points they rest on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.errors import RigError
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.types import Array
+
+MASSES = {"rect1": 0.837, "ellip1": 0.894, "ellip2": 1.110, "ellip3": 1.334, "hex": 0.983}  # kg, the MIT set
+SUPPORT_POINTS = 36  # about so many; the grid over the outline decides
+BUILD_TILT = 0.10  # spread of the log load over the slider as it was made: real sliders do not mirror exactly
+
+
+@dataclass(frozen=True, eq=False)
+class Slider:
+    """A slider of uniform density: name, outline, mass in kg."""
+
+    name: str
+    outline: Outline
+    mass: float
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the centroid, kg m^2."""
+        return self.mass * polar_moment(self.outline)
+
+
+def slider_named(name: str) -> Slider:
+    """A slider of the MIT set. Raises RigError for a name that is not in MASSES."""
+    if name not in MASSES:
+        raise RigError(f"shape: {name!r} is not accepted, give one of {', '.join(MASSES)}")
+    return Slider(name, shape_outline(name), MASSES[name])
+
+
+def polar_moment(outline: Outline) -> float:
+    """Mean squared distance from the centroid over the outline's area, m^2."""
+    if outline.semi_axes is not None:
+        return (outline.semi_axes[0] ** 2 + outline.semi_axes[1] ** 2) / 4.0
+    here, after = outline.vertices, np.roll(outline.vertices, -1, axis=0)
+    cross = here[:, 0] * after[:, 1] - after[:, 0] * here[:, 1]
+    squares = np.sum(here * here + here * after + after * after, axis=1)
+    return float(np.sum(cross * squares) / (6.0 * np.sum(cross)))
+
+
+def support_points(outline: Outline) -> Array:
+    """Points (k, 2) in m, body frame: a square grid over the outline, symmetric where the outline is."""
+    step = np.sqrt(outline.area / SUPPORT_POINTS)
+    reach = np.max(np.abs(outline.vertices))
+    ticks = (np.arange(np.ceil(reach / step)) + 0.5) * step
+    axis = np.concatenate([-ticks[::-1], ticks])
+    grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    return np.asarray(grid[outline.project(grid).distance < 0.0])
+
+
+def built_shares(points: Array, seed: int) -> Array:
+    """Load shares (k,), summing to one, of the slider as it was made: nearly uniform, slightly lopsided."""
+    return pressure_shares(points, np.full(len(points), 1.0 / len(points)), BUILD_TILT, 1, [seed, 2])[0]
+
+
+def pressure_shares(points: Array, mean: Array, variation: float, n: int, seed: list[int]) -> Array:
+    """Load shares (n, k), rows summing to one, scattered about mean (k,).
+
+    The log load varies by `variation`: half of its variance tilts the pressure across the slider, a quarter bends
+    it (rims against middle, saddle), a quarter belongs to each point alone.
+    """
+    rng = np.random.default_rng(seed)
+    scaled = points / np.sqrt(np.mean(points**2))
+    bends = np.stack([np.sum(scaled**2, axis=1) - 2.0, scaled[:, 0] * scaled[:, 1]])
+    tilt = rng.standard_normal((n, 2)) @ scaled.T / np.sqrt(2.0)
+    bend = rng.standard_normal((n, 2)) @ bends / np.sqrt(2.0 * np.mean(bends**2))
+    each = rng.standard_normal((n, len(points)))
+    log_load = variation * (np.sqrt(0.5) * tilt + 0.5 * bend / np.sqrt(2.0) + 0.5 * each)
+    load = mean * np.exp(log_load)
+    return np.asarray(load / np.sum(load, axis=1, keepdims=True))

@@ -1,0 +1,104 @@
+"""What is simulated: slider, table, pushes, seeds; and the physics that follows from them, push by push."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from push_predictor.recordings.rig import Rig
+from push_predictor.simulation.dynamics import Physics
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.sensors import Sensors
+from push_predictor.simulation.slider import (
+    Slider,
+    built_shares,
+    pressure_shares,
+    slider_named,
+    support_points,
+)
+from push_predictor.simulation.surface import Surface, friction_field, surface_named
+from push_predictor.types import Array
+
+PUSHER_RADIUS = 0.00475  # m
+CONTACT_FRICTION = 0.25  # steel on steel, rod against slider
+ACCELERATION = 2.5  # m/s^2, of the robot
+PLACE_SPREAD, TURN_SPREAD = 0.02, 0.35  # m, rad: how exactly the slider is put back
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationSpec:
+    """A recording to be made.
+
+    shape: name of the MIT set, or a Slider. surface: name, or a Surface. seed draws what differs from push to push
+    and the sensors' noise; surface_seed draws the table and the slider, so that two recordings can share them.
+    contact_friction: mean coefficient. acceleration: the robot's, m/s^2. place_spread (m), turn_spread (rad):
+    standard deviations of where the slider is put before a push.
+    """
+
+    shape: str | Slider
+    surface: str | Surface
+    pushes: PushPlan
+    seed: int = 0
+    surface_seed: int = 0
+    name: str = "simulated"
+    contact_friction: float = CONTACT_FRICTION
+    acceleration: float = ACCELERATION
+    place_spread: float = PLACE_SPREAD
+    turn_spread: float = TURN_SPREAD
+    sensors: Sensors = field(default_factory=Sensors)
+
+    @property
+    def slider(self) -> Slider:
+        """The slider itself. Raises RigError for a name that is not known."""
+        return slider_named(self.shape) if isinstance(self.shape, str) else self.shape
+
+    @property
+    def table(self) -> Surface:
+        """The surface itself. Raises RigError for a name that is not known."""
+        return surface_named(self.surface) if isinstance(self.surface, str) else self.surface
+
+    def rng(self, purpose: int) -> np.random.Generator:
+        """An independent generator for one purpose."""
+        return np.random.default_rng([self.seed, purpose])
+
+
+def simulated_rig(spec: SimulationSpec) -> Rig:
+    """The push_rig record of a spec: nominal values, not what single pushes drew."""
+    slider = spec.slider
+    points = support_points(slider.outline)
+    shares = built_shares(points, spec.surface_seed)
+    return Rig(
+        shape=slider.name,
+        outline=slider.outline,
+        pusher_radius=PUSHER_RADIUS,
+        surface=spec.table.name,
+        object_mass=slider.mass,
+        support_points=np.asarray(np.round(np.column_stack([points, shares]), 6), dtype=np.float64),
+        contact_friction=spec.contact_friction,
+        surface_friction=spec.table.friction,
+    )
+
+
+def physics_of(spec: SimulationSpec) -> Physics:
+    """What each push of a spec meets: loads and contact friction drawn per push, the table drawn once."""
+    slider, surface, n = spec.slider, spec.table, len(spec.pushes)
+    points = support_points(slider.outline)
+    built = built_shares(points, spec.surface_seed)
+    scatter = surface.contact_variation * spec.rng(2).standard_normal(n)
+    return Physics(
+        outline=slider.outline,
+        radius=PUSHER_RADIUS,
+        mass=np.full(n, slider.mass),
+        inertia=np.full(n, slider.inertia),
+        support=points,
+        shares=pressure_shares(points, built, surface.pressure_variation, n, [spec.seed, 3]),
+        contact_friction=spec.contact_friction * np.exp(scatter),
+        surface=friction_field(surface, spec.surface_seed),
+    )
+
+
+def start_poses(spec: SimulationSpec) -> Array:
+    """Where the slider is put before each push: (n, 3) x, y in m, heading in rad."""
+    spread = np.array([spec.place_spread, spec.place_spread, spec.turn_spread])
+    return np.asarray(spread * spec.rng(1).standard_normal((len(spec.pushes), 3)))

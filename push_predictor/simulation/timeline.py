@@ -1,0 +1,96 @@
+"""From single pushes to one continuous run of the rig.
+
+The tip travels lifted, the slider is put back, the tip comes down, pushes, and lifts again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.types import Array
+
+RESET_TIME = 0.20  # s, the tip lifted; the slider is moved within the middle third
+LOWER_TIME = 0.06  # s, down and up
+LIFTED, DOWN = 0.05, 0.01  # m, height of the tip
+CLEAR = 1e-6  # s between the last knot of a phase and the first of the next
+
+
+@dataclass(frozen=True, eq=False)
+class PushMotion:
+    """One push as it went: time (t,) s from its start; slider (t, 3), pusher (t, 2), wrench (t, 3)."""
+
+    time: Array
+    slider: Array
+    pusher: Array
+    wrench: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The rig's true state at knots time (t,) s, linear between them.
+
+    slider (t, 3) with unwrapped heading, pusher (t, 3) with height, wrench (t, 3).
+    """
+
+    time: Array
+    slider: Array
+    pusher: Array
+    wrench: Array
+
+    def at(self, time: Array, stream: str) -> Array:
+        """Values (n, 3) of one of the three streams at times (n,)."""
+        values = getattr(self, stream)
+        return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
+
+
+def run_in_turn(pushes: Sequence[PushMotion]) -> Truth:
+    """String pushes together with the phases between them."""
+    parts: list[tuple[Array, Array, Array, Array]] = []
+    clock, before = 0.0, pushes[0]
+    for push in pushes:
+        for phase in (_reset(before, push), _vertical(push, 0, LIFTED, DOWN), _contact_phase(push),
+                      _vertical(push, -1, DOWN, LIFTED)):
+            parts.append((phase[0] + clock + CLEAR, *phase[1:]))
+            clock += float(phase[0][-1]) + CLEAR
+        before = push
+    return Truth(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _reset(before: PushMotion, push: PushMotion) -> tuple[Array, Array, Array, Array]:
+    share = np.linspace(0.0, 1.0, 31)
+    tip = before.pusher[-1] + _eased(share)[:, None] * (push.pusher[0] - before.pusher[-1])
+    turn = np.concatenate([[0.0, 0.0], [_shorter_turn(push.slider[0, 2] - before.slider[-1, 2])]])
+    way = np.concatenate([push.slider[0, :2] - before.slider[-1, :2], [0.0]]) + turn
+    slider = push.slider[0] - way + _eased(np.clip(3.0 * share - 1.0, 0.0, 1.0))[:, None] * way
+    return share * RESET_TIME, slider, _with_height(tip, np.full(len(share), LIFTED)), np.zeros((len(share), 3))
+
+
+def _vertical(push: PushMotion, end: int, low: float, high: float) -> tuple[Array, Array, Array, Array]:
+    share = np.linspace(0.0, 1.0, 11)
+    height = low + _eased(share) * (high - low)
+    still = np.ones((len(share), 1))
+    return (
+        share * LOWER_TIME,
+        still * push.slider[end],
+        _with_height(still * push.pusher[end], height),
+        np.zeros((len(share), 3)),
+    )
+
+
+def _contact_phase(push: PushMotion) -> tuple[Array, Array, Array, Array]:
+    return push.time, push.slider, _with_height(push.pusher, np.full(len(push.time), DOWN)), push.wrench
+
+
+def _with_height(tip: Array, height: Array) -> Array:
+    return np.column_stack([tip, height])
+
+
+def _eased(share: Array) -> Array:
+    return np.asarray(share**2 * (3.0 - 2.0 * share))
+
+
+def _shorter_turn(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,40 @@
+"""The ROS package push_predictor (ament_python), installable by pip and by colcon alike."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "push_predictor"
+NODES = ("predict_server", "push_replay", "push_validator")
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Learned and analytical models of planar pushing for ROS 2",
+    license="Apache-2.0",
+    python_requires=">=3.10",
+    packages=find_packages(include=["push_predictor", "push_predictor.*", "msg_adapters", "msg_adapters.*"]),
+    package_data={"push_predictor": ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+        (f"share/{NAME}/config", glob("config/*")),
+        # pip puts the executables into bin/ only; `ros2 run` looks here
+        (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
+    ],
+    install_requires=["numpy>=1.26", "scipy>=1.11", "mcap>=1.2", "mcap-ros2-support>=0.5", "PyYAML>=6"],
+    extras_require={
+        "report": ["matplotlib>=3.8"],
+        "live": ["rich>=13"],
+        "import": ["rosbags>=0.10", "h5py>=3.10"],
+        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6", "ruff>=0.6", "mypy>=1.11", "scikit-learn>=1.5"],
+    },
+    entry_points={
+        "console_scripts": [
+            f"{NAME} = push_predictor.cli:main",
+            *(f"{node} = push_predictor.nodes.{node}:main" for node in NODES),
+        ]
+    },
+    zip_safe=False,
+)

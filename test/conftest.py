@@ -1,0 +1,47 @@
+"""What several test files need: a small recording made up here, and the way to the measured data."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+
+MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
+
+
+@pytest.fixture(scope="session")
+def measured_data() -> Path:
+    """The folder with the data measured by others; it is no part of this repository."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get(MEASURED_DATA_VARIABLE, beside))
+    if not (folder / "mit_square").is_dir():
+        pytest.skip(
+            f"no measured data at {folder}: set {MEASURED_DATA_VARIABLE} to their folder to run this test"
+        )
+    return folder
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """A 0.09 m steel square on plywood."""
+    return Rig("rect1", shape_outline("rect1"), 0.00475, "plywood", 0.837)
+
+
+@pytest.fixture
+def recording(rig: Rig) -> Recording:
+    """One second at 250 Hz: a pusher drives at 20 mm/s, a slider follows it; force and temperature are recorded."""
+    n = 250
+    stamp = 1_700_000_000_000_000_000 + 4_000_000 * np.arange(n, dtype=np.int64)
+    travel = 0.02 * 0.004 * np.arange(n)
+    still = np.zeros(n)
+    slider = PoseStream(stamp, travel, still + 0.001, still + 0.013, 0.1 * travel)
+    pusher = PoseStream(stamp + 1_000_000, travel - 0.05, still, still + 0.02, still)
+    wrench = WrenchStream(stamp + 2_000_000, still - 1.5, 0.1 * np.sin(travel), still)
+    temperature = ScalarStream(stamp[::25] + 3_000_000, 21.0 + np.arange(10) * 0.1)
+    return Recording("made_up", rig, slider, pusher, wrench, {"/table/temperature": temperature})

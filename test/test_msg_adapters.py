@@ -1,0 +1,391 @@
+"""ROS messages and the library's types say the same thing, both ways, and bad messages are refused by field."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+
+from msg_adapters import MessageError
+from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.markers import confidence_ellipse, delete_markers, prediction_markers
+from msg_adapters.poses import (
+    PlanarPose,
+    PlanarWrench,
+    pose_from_message,
+    pose_to_message,
+    wrench_from_message,
+    wrench_to_message,
+)
+from msg_adapters.predictions import (
+    PushQuery,
+    Refused,
+    extend_batch_response,
+    fill_response,
+    prediction_from_response,
+    query_from_batch_request,
+    query_from_request,
+    query_to_batch_request,
+    query_to_request,
+    refuse,
+)
+from msg_adapters.residuals import ValidatedWindow, residual_from_message, residual_to_message
+from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
+from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.push_model import Prediction
+
+METRES = st.floats(-10.0, 10.0)
+ANGLES = st.floats(-20.0, 20.0)
+STAMPS = st.integers(0, 2**31 * 10**9 - 1)
+POSES = st.builds(PlanarPose, STAMPS, METRES, METRES, METRES, ANGLES)
+WRENCHES = st.builds(PlanarWrench, STAMPS, METRES, METRES, METRES)
+CORRELATIONS = st.floats(-0.95, 0.95)
+SPREADS = st.floats(1e-5, 1e-1)
+
+
+def over_the_wire(message):
+    return deserialize_message(serialize_message(message), type(message))
+
+
+def fields_only(message):
+    """The same fields without the ROS class, as other decoders of bags give them."""
+    if not hasattr(message, "get_fields_and_field_types"):
+        return message
+    return SimpleNamespace(**{name: fields_only(getattr(message, name)) for name in message.get_fields_and_field_types()})
+
+
+def same_turn(left: float, right: float) -> bool:
+    return abs(float(wrap_angle(np.float64(left - right)))) < 1e-12 or abs(abs(left - right) - 2.0 * np.pi) < 1e-12
+
+
+# --- stamps, poses and wrenches ---------------------------------------------------------------------------------
+
+
+@given(st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
+def test_a_stamp_survives_to_the_nanosecond(nanoseconds):
+    assert stamp_to_ns(over_the_wire(ns_to_stamp(nanoseconds))) == nanoseconds
+
+
+def test_a_stamp_beyond_the_message_is_refused():
+    with pytest.raises(MessageError, match="stamp"):
+        ns_to_stamp(2**31 * 10**9)
+
+
+@given(POSES)
+def test_a_pose_survives_up_to_whole_turns(pose):
+    back = pose_from_message(over_the_wire(pose_to_message(pose)))
+    assert (back.stamp_ns, back.x, back.y, back.z) == (pose.stamp_ns, pose.x, pose.y, pose.z)
+    assert -np.pi <= back.yaw <= np.pi
+    assert same_turn(back.yaw, float(wrap_angle(np.float64(pose.yaw))))
+
+
+@given(POSES)
+def test_a_pose_reads_the_same_without_the_ros_class(pose):
+    message = pose_to_message(pose)
+    assert pose_from_message(fields_only(message)) == pose_from_message(message)
+
+
+@given(POSES)
+def test_a_quaternion_and_its_negative_are_one_heading(pose):
+    message = pose_to_message(pose)
+    yaw = pose_from_message(message).yaw
+    turn = message.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = -turn.x, -turn.y, -turn.z, -turn.w
+    assert same_turn(pose_from_message(message).yaw, yaw)
+
+
+@given(POSES)
+def test_the_mirror_image_of_a_pose_has_the_conjugate_quaternion(pose):
+    message = pose_to_message(pose)
+    image = pose_to_message(PlanarPose(pose.stamp_ns, pose.x, -pose.y, pose.z, -pose.yaw))
+    assert image.pose.position.y == -message.pose.position.y
+    assert (image.pose.orientation.z, image.pose.orientation.w) == (
+        -message.pose.orientation.z,
+        message.pose.orientation.w,
+    )
+
+
+@given(st.floats(-np.pi, np.pi), st.floats(-1.0, 1.0))
+def test_a_level_turn_is_counter_clockwise_seen_from_above(yaw, share):
+    """Body x (1, 0, 0), turned by the message's quaternion, points along (cos yaw, sin yaw)."""
+    turn = pose_to_message(PlanarPose(0, 0.0, 0.0, 0.0, yaw)).pose.orientation
+    x, y, z, w = turn.x, turn.y, turn.z, turn.w
+    along = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])
+    assert np.allclose(along, [np.cos(yaw), np.sin(yaw), 0.0], atol=1e-12)
+
+
+@given(WRENCHES)
+def test_a_wrench_survives(wrench):
+    message = over_the_wire(wrench_to_message(wrench))
+    assert wrench_from_message(message) == wrench == wrench_from_message(fields_only(message))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_value_that_is_not_finite_is_refused_by_name(axis, bad):
+    pose, wrench = pose_to_message(PlanarPose(0, 0, 0, 0, 0)), wrench_to_message(PlanarWrench(0, 0, 0, 0))
+    setattr(pose.pose.position, axis, bad)
+    setattr(wrench.wrench.torque, axis, bad)
+    with pytest.raises(MessageError, match=rf"pose\.position\.{axis}: {bad}.*finite"):
+        pose_from_message(pose)
+    with pytest.raises(MessageError, match=rf"wrench\.torque\.{axis}: {bad}.*finite"):
+        wrench_from_message(wrench)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.99, 1.01, 2.0])
+def test_a_quaternion_that_is_not_of_unit_length_is_refused(w):
+    message = pose_to_message(PlanarPose(0, 0, 0, 0, 0))
+    message.pose.orientation.w = w
+    with pytest.raises(MessageError, match="norm.*unit quaternion"):
+        pose_from_message(message)
+
+
+def test_another_frame_is_refused_unless_any_will_do():
+    pose = pose_to_message(PlanarPose(0, 1.0, 0, 0, 0), "vicon")
+    wrench = wrench_to_message(PlanarWrench(0, 1.0, 0, 0), "tool0")
+    with pytest.raises(MessageError, match=r"header\.frame_id: 'vicon' is not accepted, give 'world'"):
+        pose_from_message(pose)
+    with pytest.raises(MessageError, match=r"header\.frame_id: 'tool0'"):
+        wrench_from_message(wrench)
+    assert pose_from_message(pose, "vicon").x == 1.0
+    assert wrench_from_message(wrench, None).fx == 1.0
+
+
+def test_a_message_error_is_one_of_the_package():
+    assert issubclass(MessageError, PushPredictorError)
+
+
+# --- predictions ------------------------------------------------------------------------------------------------
+
+
+def some_prediction(count: int, seed: int = 0) -> Prediction:
+    rng = np.random.default_rng(seed)
+    return Prediction(
+        rng.normal(size=(count, 3)),
+        rng.normal(size=(count, 3, 3)),
+        rng.normal(size=(count, 3, 3)),
+        rng.random(count) < 0.5,
+    )
+
+
+def assert_same(left: Prediction, right: Prediction) -> None:
+    for name in ("mean", "covariance", "process_covariance", "in_domain"):
+        np.testing.assert_array_equal(getattr(left, name), getattr(right, name))
+
+
+@given(st.integers(0, 5), st.integers(0, 1000))
+def test_a_batch_of_predictions_survives_bit_for_bit(count, seed):
+    from push_predictor_interfaces.srv import PredictPushBatch
+
+    prediction = some_prediction(count, seed)
+    response = PredictPushBatch.Response(success=True)
+    extend_batch_response(response, prediction)
+    response = over_the_wire(response)
+    assert_same(prediction_from_response(response), prediction)
+
+
+def test_one_prediction_survives_bit_for_bit():
+    from push_predictor_interfaces.srv import PredictPush
+
+    prediction = some_prediction(1)
+    response = PredictPush.Response()
+    fill_response(response, prediction)
+    response = over_the_wire(response)
+    assert response.success
+    assert_same(prediction_from_response(response), prediction)
+    assert np.array_equal(response.covariance, prediction.covariance[0].ravel())  # row-major
+
+
+def test_a_refusal_carries_its_reason_and_no_number():
+    from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
+
+    half_written = PredictPush.Response()
+    fill_response(half_written, some_prediction(1))
+    response = refuse(half_written, "velocity: nan")
+    assert not np.any(response.mean)
+    assert not np.any(response.covariance)
+    assert len(refuse(PredictPushBatch.Response(), "x").mean) == 0
+    with pytest.raises(Refused, match="velocity: nan"):
+        prediction_from_response(response)
+
+
+@given(st.integers(0, 4), st.integers(0, 3))
+def test_a_query_survives_with_its_covariates_push_by_push(count, width):
+    rng = np.random.default_rng(count * 10 + width)
+    covariates = {f"c{k}": rng.normal(size=count) for k in range(width)}
+    request = query_to_batch_request(PushQuery("m", rng.normal(size=(count, 3)), 0.2, covariates))
+    query = query_from_batch_request(over_the_wire(request))
+    assert query.model == "m"
+    assert query.inputs.tolist() == np.array([request.velocity, request.contact, request.angle]).T.tolist()
+    assert {name: column.tolist() for name, column in query.covariates.items()} == {
+        name: column.tolist() for name, column in covariates.items()
+    }
+    first_push = list(request.covariate_values[:width])
+    assert first_push == [column[0] for column in covariates.values() if count]
+
+
+def test_one_push_is_a_batch_of_one():
+    request = query_to_request("m", np.array([0.05, 0.1, -0.2]), 0.2, {"a": 1.0, "b": 2.0})
+    query = query_from_request(over_the_wire(request))
+    assert query.inputs.tolist() == [[0.05, 0.1, -0.2]]
+    assert (query.model, query.duration) == ("m", 0.2)
+    assert {name: column.tolist() for name, column in query.covariates.items()} == {"a": [1.0], "b": [2.0]}
+
+
+@pytest.mark.parametrize("field", ["contact", "angle"])
+def test_arrays_of_unequal_length_are_refused(field):
+    request = query_to_batch_request(PushQuery("", np.ones((3, 3)), 0.2, {}))
+    setattr(request, field, [0.1, 0.2])
+    with pytest.raises(RequestError, match=f"{field} length: 2 is not accepted, give 3"):
+        query_from_batch_request(request)
+
+
+def test_covariates_must_match_their_names():
+    request = query_to_request("", np.ones(3), 0.2, {"a": 1.0})
+    request.covariate_names = ["a", "b"]
+    with pytest.raises(RequestError, match="covariate_values length: 1 .* give 2"):
+        query_from_request(request)
+    request.covariate_names, request.covariate_values = ["a", "a"], [1.0, 2.0]
+    with pytest.raises(RequestError, match=r"covariate_names: \['a'\] .* once"):
+        query_from_request(request)
+
+
+# --- residuals --------------------------------------------------------------------------------------------------
+
+
+def window_of(covariance: np.ndarray, difference: np.ndarray) -> ValidatedWindow:
+    predicted = np.array([0.01, 0.002, 0.1])
+    return ValidatedWindow(
+        10**18 + 7, "run1/3", 4, "vhgp", np.array([0.05, 0.3, 0.2]), 0.2, predicted, covariance, predicted + difference
+    )
+
+
+@given(st.lists(SPREADS, min_size=3, max_size=3), CORRELATIONS, st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
+def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlation, units):
+    correlations = np.eye(3)
+    correlations[0, 1] = correlations[1, 0] = correlation
+    covariance = correlations * np.outer(spreads, spreads)
+    difference = np.array(units) * spreads
+    window = window_of(covariance, difference)
+    gap = window.observed - window.predicted
+    assert window.standardised @ window.standardised == pytest.approx(
+        gap @ np.linalg.solve(covariance, gap), rel=1e-6, abs=1e-9
+    )
+    assert window.standardised[0] == pytest.approx(gap[0] / spreads[0], rel=1e-9)
+
+
+def test_a_residual_survives():
+    window = window_of(np.diag([1e-6, 4e-6, 1e-2]), np.array([1e-3, -4e-3, 0.2]))
+    message = over_the_wire(residual_to_message(window))
+    assert message.header.frame_id == "world"
+    np.testing.assert_allclose(message.standardised, [1.0, -2.0, 2.0])
+    back = residual_from_message(message)
+    for name, value in vars(window).items():
+        np.testing.assert_array_equal(getattr(back, name), value)
+
+
+def test_a_covariance_that_is_none_is_refused():
+    with pytest.raises(MessageError, match="covariance.*positive definite"):
+        residual_to_message(window_of(np.diag([1.0, 1.0, -1.0]), np.ones(3)))
+
+
+# --- diagnostics ------------------------------------------------------------------------------------------------
+
+
+def test_a_status_names_its_values():
+    values = {"p99_us": 123.456789, "models": ["a", "b"], "last": None, "active": True, "served": 12}
+    status = diagnostic_status("predict_server", Level.WARN, "one model failed", values, "rig")
+    array = over_the_wire(diagnostic_array(3 * 10**9 + 5, status))
+    assert stamp_to_ns(array.header.stamp) == 3 * 10**9 + 5
+    (back,) = array.status
+    assert (back.name, back.level, back.message, back.hardware_id) == (
+        "predict_server",
+        Level.WARN.value,
+        "one model failed",
+        "rig",
+    )
+    assert {pair.key: pair.value for pair in back.values} == {
+        "p99_us": "123.457",
+        "models": "a, b",
+        "last": "-",
+        "active": "true",
+        "served": "12",
+    }
+
+
+def test_levels_rise():
+    assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [b"\0", b"\1", b"\2", b"\3"]
+
+
+# --- markers ----------------------------------------------------------------------------------------------------
+
+
+def points_of(marker) -> np.ndarray:
+    return np.array([[point.x, point.y] for point in marker.points])
+
+
+def by_name(array) -> dict:
+    return {marker.ns: marker for marker in array.markers}
+
+
+def some_markers(mirror: float = 1.0) -> dict:
+    flip = np.array([1.0, mirror, mirror])
+    covariance = np.array([[4e-6, mirror * 1e-6], [mirror * 1e-6, 1e-6]])
+    vertices = shape_outline("rect1").vertices
+    poses = [flip * pose for pose in ([0.1, 0.2, 0.3], [0.11, 0.22, 0.4], [0.112, 0.219, 0.45])]
+    return by_name(prediction_markers(vertices, *poses[:2], covariance, poses[2], "world", 5))
+
+
+def test_markers_lie_where_the_slider_is():
+    markers = {name: over_the_wire(marker) for name, marker in some_markers().items()}
+    for name, pose in {"start_outline": [0.1, 0.2], "predicted_outline": [0.11, 0.22]}.items():
+        outline = points_of(markers[name])
+        assert np.allclose(outline[0], outline[-1])  # closed
+        assert np.allclose(outline[:-1].mean(axis=0), pose)
+        assert np.allclose(np.linalg.norm(np.diff(outline, axis=0), axis=1), 0.09)
+    centre = markers["observed_centre"].pose.position
+    assert (centre.x, centre.y) == (0.112, 0.219)
+    assert {marker.header.frame_id for marker in markers.values()} == {"world"}
+    assert len({(marker.ns, marker.id) for marker in markers.values()}) == len(markers)
+
+
+def test_the_mirror_image_of_a_window_has_mirrored_markers():
+    markers, images = some_markers(), some_markers(mirror=-1.0)
+    centre = np.array([0.11, -0.22])
+    image = points_of(images["predicted_ellipse"]) - centre
+    flipped = np.linalg.inv([[4e-6, -1e-6], [-1e-6, 1e-6]])
+    assert np.allclose(np.einsum("ni,ij,nj->n", image, flipped, image), 5.991464547, rtol=1e-9)
+    extent = np.sort(np.abs(points_of(markers["predicted_ellipse"]) - centre * [1, -1]), axis=0)
+    assert np.allclose(extent.max(axis=0), np.abs(image).max(axis=0), rtol=1e-2)
+    hull = {tuple(point) for point in np.round(points_of(markers["observed_outline"]) * [1, -1], 9)}
+    turned = points_of(images["observed_outline"])
+    assert all(min(np.hypot(*(np.array(point) - other)) for other in turned) < 1e-8 for point in hull)
+
+
+@given(SPREADS, SPREADS, CORRELATIONS)
+def test_every_point_of_the_ellipse_has_the_same_mahalanobis_distance(sx, sy, correlation):
+    covariance = np.array([[sx * sx, correlation * sx * sy], [correlation * sx * sy, sy * sy]])
+    away = confidence_ellipse(np.array([0.3, -0.1]), covariance) - [0.3, -0.1]
+    inverse = np.linalg.inv(covariance)
+    assert np.allclose(np.einsum("ni,ij,nj->n", away, inverse, away), -2.0 * np.log(0.05), rtol=1e-3)
+    assert np.allclose(away[0], away[-1])
+
+
+def test_the_ellipse_holds_95_percent():
+    covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
+    draws = np.random.default_rng(0).multivariate_normal([0.0, 0.0], covariance, size=40_000)
+    radius = np.einsum("ni,ij,nj->n", draws, np.linalg.inv(covariance), draws)
+    edge = confidence_ellipse(np.zeros(2), covariance)
+    bound = np.mean(np.einsum("ni,ij,nj->n", edge, np.linalg.inv(covariance), edge))
+    assert np.mean(radius < bound) == pytest.approx(0.95, abs=0.004)
+
+
+def test_deleting_clears_everything():
+    (marker,) = delete_markers("world", 5).markers
+    assert marker.action == marker.DELETEALL
