@@ -51,7 +51,7 @@ def pose_from_message(message: Any, frame_id: str | None = WORLD) -> PlanarPose:
     norm = sqrt(turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2)
     if abs(norm - 1.0) > NORM_TOLERANCE:
         raise MessageError("pose.orientation norm", norm, f"a unit quaternion (within {NORM_TOLERANCE:g})")
-    yaw = yaw_of_quaternion(*(np.float64(part) for part in (turn.x, turn.y, turn.z, turn.w)))
+    yaw = yaw_of_quaternion(*(np.asarray(part) for part in (turn.x, turn.y, turn.z, turn.w)))
     return PlanarPose(stamp_to_ns(message.header.stamp), position.x, position.y, position.z, float(yaw))
 
 
@@ -61,7 +61,7 @@ def pose_to_message(pose: PlanarPose, frame_id: str = WORLD) -> PoseStamped:
     message.header.stamp, message.header.frame_id = ns_to_stamp(pose.stamp_ns), frame_id
     position, turn = message.pose.position, message.pose.orientation
     position.x, position.y, position.z = float(pose.x), float(pose.y), float(pose.z)
-    z, w = quaternion_of_yaw(np.float64(pose.yaw))
+    z, w = quaternion_of_yaw(np.asarray(pose.yaw))
     turn.x, turn.y, turn.z, turn.w = 0.0, 0.0, float(z), float(w)
     return message
 

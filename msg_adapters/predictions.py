@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import Prediction
 from push_predictor.types import Array
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
-Response = TypeVar("Response")
 
-
-class Refused(PushPredictorError):
+class RefusedError(PushPredictorError):
     """The server answered success=false; the text is its message."""
 
 
 @dataclass(frozen=True, eq=False)
 class PushQuery:
     """n pushes asked of one model: inputs (n, 3: velocity m/s, contact, angle rad), one duration (s) for all,
-    covariates (n,) by name. model: a name, empty for the default one."""
+    covariates (n,) by name. model: a name, empty for the default one.
+    """
 
     model: str
     inputs: Array
@@ -84,15 +83,15 @@ def extend_batch_response(response: PredictPushBatch.Response, prediction: Predi
     response.in_domain.extend(prediction.in_domain.tolist())
 
 
-def refuse(response: Response, reason: str) -> Response:
+def refuse(response: Any, reason: str) -> Any:
     """A fresh response of the same kind: no number in it, success false, and the reason."""
     return type(response)(success=False, message=reason)
 
 
 def prediction_from_response(response: Any) -> Prediction:
-    """The predictions of either response; n = 1 for PredictPush. Raises Refused with the server's reason."""
+    """The predictions of either response; n = 1 for PredictPush. Raises RefusedError with the server's reason."""
     if not response.success:
-        raise Refused(response.message)
+        raise RefusedError(response.message)
     in_domain = response.in_domain
     return Prediction(
         np.array(response.mean, dtype=np.float64).reshape(-1, 3),

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from push_predictor_interfaces.msg import PushResidual
 
 from msg_adapters import MessageError
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.types import Array
+from push_predictor_interfaces.msg import PushResidual
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class ValidatedWindow:
 
     @property
     def standardised(self) -> Array:
-        """L^-1 (observed - predicted) with L L' = covariance, (3,). Raises MessageError for a covariance that is none."""
+        """L^-1 (observed - predicted), (3,), with L L' = covariance. Raises MessageError if there is no such L."""
         try:
             factor = np.linalg.cholesky(self.covariance)
         except np.linalg.LinAlgError:

@@ -21,9 +21,7 @@ def measured_data() -> Path:
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     folder = Path(os.environ.get(MEASURED_DATA_VARIABLE, beside))
     if not (folder / "mit_square").is_dir():
-        pytest.skip(
-            f"no measured data at {folder}: set {MEASURED_DATA_VARIABLE} to their folder to run this test"
-        )
+        pytest.skip(f"no measured data at {folder}: set {MEASURED_DATA_VARIABLE} to their folder to run this test")
     return folder
 
 

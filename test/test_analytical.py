@@ -129,12 +129,18 @@ def test_a_pusher_that_leaves_moves_nothing():
         assert one_contact((-0.045, 0.02), angle, 0.5, Support((0.0, 0.0), 0.034))["contact"] == pytest.approx([0, 0])
 
 
-def test_friction_beyond_all_bounds_sticks():
-    support = Support((0.0, 0.0), 0.034)
-    for angle in np.linspace(-1.5, 1.5, 13):
-        move = one_contact((-0.045, 0.02), angle, 1e6, support)
+@settings(max_examples=200, deadline=None)
+@given(st.tuples(coordinates, coordinates), directions, supports)
+def test_friction_beyond_all_bounds_sticks_wherever_the_pusher_need_not_pull(point, angle, support):
+    move = one_contact(point, angle, 1e9, support)
+    lever = np.array([-move["arm"][1], move["arm"][0]]) / support.length
+    to_stick = np.linalg.solve(np.eye(2) + np.outer(lever, lever), move["pusher"])
+    if to_stick[0] > 1e-6:
         assert move["slip"] == 0
         assert move["contact"] == pytest.approx(move["pusher"], abs=1e-12)
+    elif to_stick[0] < -1e-6:
+        assert move["slip"] != 0
+        assert move["force"][0] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_without_friction_the_force_is_along_the_normal():
@@ -169,7 +175,7 @@ def test_even_pressure_under_a_square_has_the_known_mean_distance():
 
 @EVERY_OUTLINE
 def test_even_pressure_equals_a_sum_over_a_grid(outline):
-    ticks = np.linspace(-0.11, 0.11, 881)
+    ticks = np.linspace(-0.11, 0.11, 881) + 1.3e-5  # off the edges
     points = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
     inside = points[outline.project(points).distance < 0.0]
     support = uniform_support(outline)
@@ -275,6 +281,25 @@ def test_a_pusher_that_slides_off_leaves_the_slider_behind():
     assert long == pytest.approx(short, abs=1e-7)
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 0.013), st.floats(-0.03, 0.03))
+def test_a_disc_moves_the_slider_only_from_where_it_touches(distance, y):
+    contact = DiscContact(square(0.09), RADIUS, 0.3, Support((0.0, 0.0), 0.034))
+    start, ahead = np.array([[-0.045 - RADIUS - distance, y]]), np.array([[1.0, 0.0]])
+    after_gap = slide(contact, Sweep(start, ahead, np.array([0.014])))
+    at_once = slide(contact, Sweep(start + distance * ahead, ahead, np.array([0.014 - distance])))
+    assert after_gap == pytest.approx(at_once, abs=5e-4 * 0.014 / LEVER)
+
+
+def test_a_disc_crosses_a_notch_and_pushes_its_far_side():
+    notch = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.07, 0.06], [0.07, 0.03], [0.03, 0.03], [0.03, 0.06], [0.0, 0.06]]
+    outline = Outline(np.array(notch))
+    contact = DiscContact(outline, RADIUS, 0.3, Support((0.05, 0.05), 0.03))
+    start, travel = np.array([[0.03 + RADIUS + 1e-4, 0.05]]), np.array([0.035])
+    pose = slide(contact, Sweep(start, np.array([[1.0, 0.0]]), travel))
+    assert pose[0] == pytest.approx([0.035 - (0.04 - 2 * RADIUS - 1e-4), 0.0, 0.0], abs=3e-5)
+
+
 def test_a_pusher_that_turns_away_moves_nothing():
     model = AnalyticalPush(square(0.09), RADIUS)
     assert np.all(model.displacement(np.array([[0.02, 0.1, 2.0]]), np.array([0.2])) == 0.0)
@@ -338,7 +363,7 @@ def _seconds(model: AnalyticalPush, inputs: np.ndarray, duration: np.ndarray) ->
     return time.process_time() - begin
 
 
-# --- fit and refusals --------------------------------------------------------------------------------------------------
+# --- fit and refusals --------------------------------------------------------------------------------------
 
 
 def test_the_fit_finds_the_parameters_that_made_the_outcomes():

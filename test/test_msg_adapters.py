@@ -23,7 +23,7 @@ from msg_adapters.poses import (
 )
 from msg_adapters.predictions import (
     PushQuery,
-    Refused,
+    RefusedError,
     extend_batch_response,
     fill_response,
     prediction_from_response,
@@ -57,7 +57,9 @@ def fields_only(message):
     """The same fields without the ROS class, as other decoders of bags give them."""
     if not hasattr(message, "get_fields_and_field_types"):
         return message
-    return SimpleNamespace(**{name: fields_only(getattr(message, name)) for name in message.get_fields_and_field_types()})
+    return SimpleNamespace(
+        **{name: fields_only(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    )
 
 
 def same_turn(left: float, right: float) -> bool:
@@ -142,7 +144,7 @@ def test_a_value_that_is_not_finite_is_refused_by_name(axis, bad):
 def test_a_quaternion_that_is_not_of_unit_length_is_refused(w):
     message = pose_to_message(PlanarPose(0, 0, 0, 0, 0))
     message.pose.orientation.w = w
-    with pytest.raises(MessageError, match="norm.*unit quaternion"):
+    with pytest.raises(MessageError, match=r"norm.*unit quaternion"):
         pose_from_message(message)
 
 
@@ -211,7 +213,7 @@ def test_a_refusal_carries_its_reason_and_no_number():
     assert not np.any(response.mean)
     assert not np.any(response.covariance)
     assert len(refuse(PredictPushBatch.Response(), "x").mean) == 0
-    with pytest.raises(Refused, match="velocity: nan"):
+    with pytest.raises(RefusedError, match="velocity: nan"):
         prediction_from_response(response)
 
 
@@ -249,7 +251,7 @@ def test_arrays_of_unequal_length_are_refused(field):
 def test_covariates_must_match_their_names():
     request = query_to_request("", np.ones(3), 0.2, {"a": 1.0})
     request.covariate_names = ["a", "b"]
-    with pytest.raises(RequestError, match="covariate_values length: 1 .* give 2"):
+    with pytest.raises(RequestError, match=r"covariate_values length: 1 .* give 2"):
         query_from_request(request)
     request.covariate_names, request.covariate_values = ["a", "a"], [1.0, 2.0]
     with pytest.raises(RequestError, match=r"covariate_names: \['a'\] .* once"):
@@ -262,11 +264,23 @@ def test_covariates_must_match_their_names():
 def window_of(covariance: np.ndarray, difference: np.ndarray) -> ValidatedWindow:
     predicted = np.array([0.01, 0.002, 0.1])
     return ValidatedWindow(
-        10**18 + 7, "run1/3", 4, "vhgp", np.array([0.05, 0.3, 0.2]), 0.2, predicted, covariance, predicted + difference
+        10**18 + 7,
+        "run1/3",
+        4,
+        "vhgp",
+        np.array([0.05, 0.3, 0.2]),
+        0.2,
+        predicted,
+        covariance,
+        predicted + difference,
     )
 
 
-@given(st.lists(SPREADS, min_size=3, max_size=3), CORRELATIONS, st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
+@given(
+    st.lists(SPREADS, min_size=3, max_size=3),
+    CORRELATIONS,
+    st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
+)
 def test_the_standardised_residual_has_the_mahalanobis_length(spreads, correlation, units):
     correlations = np.eye(3)
     correlations[0, 1] = correlations[1, 0] = correlation
@@ -291,7 +305,7 @@ def test_a_residual_survives():
 
 
 def test_a_covariance_that_is_none_is_refused():
-    with pytest.raises(MessageError, match="covariance.*positive definite"):
+    with pytest.raises(MessageError, match=r"covariance.*positive definite"):
         residual_to_message(window_of(np.diag([1.0, 1.0, -1.0]), np.ones(3)))
 
 
@@ -320,7 +334,12 @@ def test_a_status_names_its_values():
 
 
 def test_levels_rise():
-    assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [b"\0", b"\1", b"\2", b"\3"]
+    assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [
+        b"\0",
+        b"\1",
+        b"\2",
+        b"\3",
+    ]
 
 
 # --- markers ----------------------------------------------------------------------------------------------------

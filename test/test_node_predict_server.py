@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ros_harness as harness
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.qos import QoSProfile
@@ -30,8 +30,10 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.train import train_model
+from push_predictor.nodes.predict_server import PARAMETERS
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 SERVICES = {
     "predict_push": PredictPush,
@@ -44,6 +46,7 @@ SERVICES = {
     "push_predictor/get_parameters": GetParameters,
     "push_predictor/describe_parameters": DescribeParameters,
 }
+CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
 GOOD = np.array([0.02, 0.1, 0.2])
 MANY = np.column_stack([np.full(20, 0.02), np.linspace(0.01, 0.99, 20), np.linspace(-0.9, 0.9, 20)])
 
@@ -106,7 +109,10 @@ class Server:
         return self.call("push_predictor/change_state", request).success
 
     def set(self, name, value):
-        kinds = {str: (ParameterType.PARAMETER_STRING, "string_value"), float: (ParameterType.PARAMETER_DOUBLE, "double_value")}
+        kinds = {
+            str: (ParameterType.PARAMETER_STRING, "string_value"),
+            float: (ParameterType.PARAMETER_DOUBLE, "double_value"),
+        }
         if isinstance(value, list):
             kind, field = ParameterType.PARAMETER_STRING_ARRAY, "string_array_value"
         else:
@@ -131,11 +137,11 @@ class Server:
 def server_of(models, **params):
     domain = harness.free_domain()
     params = {"models": [str(path) for path in models], "diagnostics_period": 0.2, **params}
-    with harness.node_process("predict_server", domain=domain, params=params) as process:
-        with harness.ros_context(domain) as node:
-            server = Server(process, node)
-            server.state()  # the node answers
-            yield server
+    running = harness.node_process("predict_server", domain=domain, params=params)
+    with running as process, harness.ros_context(domain) as node:
+        server = Server(process, node)
+        server.state()  # the node answers
+        yield server
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +230,11 @@ def test_one_bad_push_refuses_the_batch_and_is_named_by_index(server, field, val
 
 @pytest.mark.parametrize("duration", [np.nan, np.inf, 0.0, -0.2, 5.0])
 def test_a_bad_duration_is_refused(server, duration):
-    for response in (server.push(duration=duration), server.batch(MANY, duration), server.batch([], duration)):
+    for response in (
+        server.push(duration=duration),
+        server.batch(MANY, duration),
+        server.batch([], duration),
+    ):
         assert not response.success
         assert response.message.startswith(f"duration: {duration!r} is not accepted")
 
@@ -300,7 +310,7 @@ def test_a_node_without_a_model_says_so_and_takes_one_later(folder):
         refusal = server.push()
         assert not refusal.success
         assert "no model is loaded" in refusal.message
-        status, values = server.next_status()
+        status, _ = server.next_status()
         assert status.level == b"\2"
         assert "no model is loaded" in status.message
         assert server.load(folder / "vhgp.model").success
@@ -438,7 +448,7 @@ def test_introspection_shows_requests_when_it_is_asked_for(server):
     )
     assert server.set("introspection", "contents").successful
     harness.wait_for_publisher(server.node, "/predict_push/_service_event")
-    push = GOOD + [0.001, 0.0, 0.0]
+    push = np.array([0.0201, 0.1, 0.2])
 
     def shown() -> bool:
         server.push(push)
@@ -454,13 +464,18 @@ def test_introspection_shows_requests_when_it_is_asked_for(server):
     assert not events
 
 
-def test_names_follow_the_namespace(folder):
+def test_the_shipped_configuration_states_the_defaults():
+    (rows,) = yaml.safe_load(CONFIG.read_text()).values()
+    assert rows["ros__parameters"] == {param.name: param.default for param in PARAMETERS}
+
+
+def test_names_follow_the_namespace_with_the_shipped_configuration(folder):
     domain = harness.free_domain()
-    params = {"models": [str(folder / "gp.model")]}
-    with harness.node_process("predict_server", domain=domain, namespace="/cell1", params=params):
-        with harness.ros_context(domain, namespace="/cell1") as node:
-            client = node.create_client(PredictPush, "/cell1/predict_push")
-            assert harness.call(client, query_to_request("", GOOD, 0.2)).success
+    arguments = ("--params-file", str(CONFIG), "-p", f"models:=['{folder / 'gp.model'}']")
+    running = harness.node_process("predict_server", *arguments, domain=domain, namespace="/cell1")
+    with running, harness.ros_context(domain) as node:
+        client = node.create_client(PredictPush, "/cell1/predict_push")
+        assert harness.call(client, query_to_request("", GOOD, 0.2)).success
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 
 from push_predictor.errors import RecordingError, RigError
@@ -52,7 +55,7 @@ def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options:
     return path
 
 
-def test_a_bare_file_and_a_folder_with_and_without_metadata_yaml_read_alike(recording: Recording, tmp_path: Path) -> None:
+def test_a_file_and_a_folder_with_and_without_metadata_yaml_read_alike(recording: Recording, tmp_path: Path) -> None:
     write_recording(tmp_path / "push", recording)
     shutil.copytree(tmp_path / "push", tmp_path / "copy")
     (tmp_path / "copy" / "metadata.yaml").unlink()
@@ -121,7 +124,7 @@ def test_all_that_stands_before_a_cut_is_used_and_the_cut_is_noted(
         assert any("cut.mcap at byte" in note for note in bag.notes) or kept == whole
         counts.append(len(kept))
     assert counts == sorted(counts)
-    assert 0 < counts[2] or compression == "zstd"
+    assert counts[2] > 0
 
 
 def test_a_file_without_its_last_bytes_loses_no_message(recording: Recording, tmp_path: Path) -> None:
@@ -135,17 +138,41 @@ def test_a_file_without_its_last_bytes_loses_no_message(recording: Recording, tm
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
-def test_a_damaged_chunk_is_left_out_and_noted_the_others_are_used(tmp_path: Path, compression: CompressionType) -> None:
+def test_a_damaged_chunk_is_left_out_and_noted(tmp_path: Path, compression: CompressionType) -> None:
     path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
     offsets = chunk_offsets(path)
     data = bytearray(path.read_bytes())
-    middle = (offsets[2] + offsets[3]) // 2
-    data[middle - 30 : middle] = bytes(b ^ 0xA5 for b in data[middle - 30 : middle])
+    hit = slice(offsets[2] + 80, offsets[2] + 110)
+    data[hit] = bytes(byte ^ 0xA5 for byte in data[hit])
     path.write_bytes(data)
     read = read_recording(path)
     assert 0 < len(read.slider) < N
     assert set(read.slider.stamp.tolist()) < set(STAMP.tolist())
-    assert [f"a.mcap at byte {offsets[2]}: a chunk was skipped" in note for note in read.notes] == [True]
+    skipped, counted = read.notes
+    assert f"a.mcap at byte {offsets[2]}: a chunk was skipped" in skipped
+    assert f"messages were found, the summary counts {2 * N}" in counted
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
+)
+def test_no_damage_whatever_is_more_than_a_note_or_a_recording_error(
+    hits: list[tuple[float, int]], data: st.DataObject
+) -> None:
+    compression = data.draw(st.sampled_from([CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE]))
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_mcap(Path(folder) / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
+        damaged = bytearray(path.read_bytes())
+        for place, change in hits:
+            damaged[int(place * len(damaged))] ^= change
+        path.write_bytes(damaged)
+        try:
+            read = read_recording(path)
+        except (RecordingError, RigError):
+            return
+        assert len(read.slider) <= N
+        assert len(read.slider) == N or read.notes or len(hits) > 1  # the summary may be hit as well
 
 
 def chunk_offsets(path: Path) -> list[int]:
@@ -175,15 +202,15 @@ def test_a_file_that_is_no_recording_is_named_and_told_what_it_is(tmp_path: Path
 
 
 def test_a_folder_without_recordings_and_a_path_to_nothing_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="holds no .mcap file"):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap file"):
         read_recording(tmp_path)
-    with pytest.raises(RecordingError, match="absent.mcap: cannot be read"):
+    with pytest.raises(RecordingError, match=r"absent\.mcap: cannot be read"):
         read_recording(tmp_path / "absent.mcap")
 
 
 def test_a_missing_topic_is_told_with_the_topics_that_are_there(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / "a.mcap", {"/vicon/square/square": pose_topics()["/slider/pose"]})
-    with pytest.raises(RecordingError, match="no topic /slider/pose and /pusher/pose .*/vicon/square/square"):
+    with pytest.raises(RecordingError, match=r"no topic /slider/pose and /pusher/pose .*/vicon/square/square"):
         read_recording(path)
 
 
@@ -221,7 +248,8 @@ def test_samples_that_say_nothing_are_dropped_and_counted(tmp_path: Path) -> Non
 def test_a_tip_needs_no_orientation(tmp_path: Path) -> None:
     values = POSES.copy()
     values[:, 3:] = 0.0
-    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/pusher/pose": (POSE, encode(STAMP, values, POSE_STAMPED))})
+    tip = {"/pusher/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **tip})
     read = read_recording(path)
     np.testing.assert_array_equal(read.pusher.x, POSES[:, 0])
     assert any("/pusher/pose: 40 samples have no orientation" in note for note in read.notes)
@@ -231,7 +259,8 @@ def test_a_quaternion_gives_its_heading_whatever_its_length_and_sign(tmp_path: P
     heading = np.linspace(-3.1, 3.1, N)
     values = POSES.copy()
     values[:, 5], values[:, 6] = -1.7 * np.sin(heading / 2.0), -1.7 * np.cos(heading / 2.0)
-    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))})
+    turned = {"/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **turned})
     np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
 
 
@@ -244,7 +273,8 @@ def test_header_stamps_count_not_log_times_and_file_order_is_kept(tmp_path: Path
     stamp = STAMP.copy()
     stamp[[4, 5]] = stamp[[5, 4]]
     messages = encode(stamp, POSES, POSE_STAMPED)
-    path = write_mcap(tmp_path / "a.mcap", {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}, STAMP + 7)
+    topics = {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
+    path = write_mcap(tmp_path / "a.mcap", topics, STAMP + 7)
     np.testing.assert_array_equal(read_recording(path).slider.stamp, stamp)
 
 
@@ -274,7 +304,9 @@ def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
 
 def test_a_rig_that_is_missing_is_told_with_how_to_give_it(tmp_path: Path, recording: Recording) -> None:
     path = write_mcap(tmp_path / "a.mcap", pose_topics())
-    with pytest.raises(RigError, match="no push_rig record; give it with --rig FILE.yaml or the node parameter 'rig'"):
+    with pytest.raises(
+        RigError, match=r"no push_rig record; give it with --rig FILE\.yaml or the node parameter 'rig'"
+    ):
         require_rig(read_recording(path))
     assert require_rig(read_recording(path, rig=recording.rig)) is recording.rig
 
@@ -310,7 +342,7 @@ def test_two_rigs_that_differ_are_noted_and_the_files_own_counts(tmp_path: Path,
 
 
 @pytest.mark.parametrize("text", ["{", "rosbag2_bagfile_information: 3", "other: {}", ""])
-def test_a_damaged_metadata_yaml_is_noted_and_the_files_are_used(tmp_path: Path, recording: Recording, text: str) -> None:
+def test_a_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, text: str) -> None:
     write_recording(tmp_path / "a", recording)
     (tmp_path / "a" / "metadata.yaml").write_text(text)
     read = read_recording(tmp_path / "a")
@@ -438,12 +470,45 @@ def test_rosbags_reads_it_and_we_read_what_rosbags_writes(tmp_path: Path, record
     assert set(again.scalars) == {"/table/temperature"}
 
 
+@pytest.mark.parametrize("mode", ["MESSAGE", "FILE"])
+def test_what_rosbag2_compresses_on_top_of_mcap_is_unpacked(tmp_path: Path, recording: Recording, mode: str) -> None:
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    write_recording(tmp_path / "plain", recording)
+    bag = open_bag(tmp_path / "plain")
+    writer = rosbag2.Writer(tmp_path / "packed", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+    writer.set_compression(rosbag2.CompressionMode[mode], rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        topics = {name: writer.add_connection(name, kind, typestore=store) for name, kind in bag.topics.items()}
+        for message in bag.messages():
+            writer.write(topics[message.topic], message.log_time, message.data)
+    read = read_recording(tmp_path / "packed")
+    assert read.notes == ()
+    np.testing.assert_array_equal(read.slider.x, recording.slider.x)
+    if mode == "FILE":
+        (tmp_path / "packed" / "packed.mcap.zstd").write_bytes(b"no zstd")
+        with pytest.raises(RecordingError, match=r"packed\.mcap\.zstd: cannot be unpacked"):
+            read_recording(tmp_path / "packed")
+
+
+def test_messages_that_cannot_be_unpacked_are_dropped_and_counted(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a", recording)
+    text = (tmp_path / "a" / "metadata.yaml").read_text()
+    told = text.replace("compression_format: ''", "compression_format: zstd")
+    (tmp_path / "a" / "metadata.yaml").write_text(told.replace("compression_mode: ''", "compression_mode: MESSAGE"))
+    bag = open_bag(tmp_path / "a")
+    assert list(bag.messages()) == []
+    assert bag.notes == [f"{tmp_path / 'a'}: 760 messages cannot be unpacked and were dropped"]
+
+
 def test_definitions_and_hashes_are_those_of_ros(tmp_path: Path) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     for kind in (POSE, WRENCH, FLOAT64):
         parsed = typesys.get_types_from_msg(kind.definition, kind.name)
-        assert {name: parsed[name] for name in parsed} == {name: parsed[name] for name in parsed if name in store.fielddefs}
+        assert set(parsed) <= set(store.fielddefs)
         assert store.hash_rihs01(kind.name) == kind.type_hash
         ours = typesys.get_typestore(typesys.Stores.EMPTY)
         ours.register(parsed)
@@ -463,4 +528,7 @@ def test_rclpy_reads_our_bytes_and_writes_the_same() -> None:
     wrench = encode(STAMP[1:2], values[:, :6], WRENCH_STAMPED)[0]
     scalar = encode(STAMP[1:2], values[:, :1], Layout(False, 1))[0]
     for data, kind in ((ours, PoseStamped), (wrench, WrenchStamped), (scalar, Float64)):
-        assert serialization.serialize_message(serialization.deserialize_message(data, kind)) == data
+        theirs = serialization.serialize_message(serialization.deserialize_message(data, kind))
+        padding = slice(22, 28) if kind is not Float64 else slice(0, 0)  # left uninitialised by Fast CDR
+        assert bytearray(theirs)[: padding.start] == bytearray(data)[: padding.start]
+        assert theirs[padding.stop :] == data[padding.stop :]

@@ -1,9 +1,10 @@
-"""Push tables as CSV: exact there and back, and every fault told with file, line, column, value and what is accepted."""
+"""Push tables as CSV: exact there and back; a fault is told with file, line, column, value and what is accepted."""
 
 from __future__ import annotations
 
 import gzip
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import hypothesis.extra.numpy as arrays
@@ -12,7 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from push_predictor.errors import RigError, TableError
+from push_predictor.errors import RecordingError, RigError, TableError
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.streams import Recording
@@ -113,14 +115,15 @@ def test_a_file_that_is_no_table_is_told(tmp_path: Path, content: str | bytes, t
 
 
 def test_a_file_that_is_absent_is_told(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match="absent.csv: cannot be read"):
+    with pytest.raises(TableError, match=r"absent\.csv: cannot be read"):
         read_table(tmp_path / "absent.csv")
 
 
 def test_further_columns_of_numbers_are_covariates_and_words_are_left_out(tmp_path: Path) -> None:
     """Columns come in any order; an empty cell of a covariate is not known; a mark of byte order does no harm."""
     header = "\ufeffoperator,warmth,push_id,dtheta,dy,dx,duration,angle,contact,velocity"
-    path = written(tmp_path / "a.csv", *(f"Ann,{w},p,0.3,0.2,0.1,0.5,-1,0.75,0.04" for w in ("21.5", "", "nan")), header=header)
+    rows = [f"Ann,{warmth},p,0.3,0.2,0.1,0.5,-1,0.75,0.04" for warmth in ("21.5", "", "nan")]
+    path = written(tmp_path / "a.csv", *rows, header=header)
     table = read_table(path)
     np.testing.assert_array_equal(table.inputs[0], [0.04, 0.75, -1.0])
     np.testing.assert_array_equal(table.outcomes[0], [0.1, 0.2, 0.3])
@@ -143,13 +146,10 @@ def test_the_rig_stands_beside_the_table(tmp_path: Path, rig: Rig, name: str) ->
 
 
 def test_rigs_of_several_data_must_have_the_same_bodies(tmp_path: Path, recording: Recording, rig: Rig) -> None:
-    from dataclasses import replace
-
-    from push_predictor.geometry.shapes import shape_outline
-
     write_recording(tmp_path / "square", recording)
     write_recording(tmp_path / "on_delrin", replace(recording, rig=replace(rig, surface="delrin")))
-    write_recording(tmp_path / "hexagon", replace(recording, rig=replace(rig, shape="hex", outline=shape_outline("hex"))))
+    hexagon = replace(rig, shape="hex", outline=shape_outline("hex"))
+    write_recording(tmp_path / "hexagon", replace(recording, rig=hexagon))
     save_rig(rig, tmp_path / "given.yaml")
     same = [tmp_path / "square", tmp_path / "on_delrin"]
     assert load_rig_for(same).surface == "plywood"
@@ -164,3 +164,26 @@ def test_pushes_of_different_tables_stay_different_and_a_copy_stays_one(tmp_path
     other = written(tmp_path / "other.csv", GOOD.replace("0.25", "0.5"))
     assert load_data([first, copy]).pushes == ["a"]
     assert load_data([first, other]).pushes == ["first.csv/a", "other.csv/a"]
+
+
+def test_a_recording_loads_as_the_table_of_its_windows(tmp_path: Path, recording: Recording, rig: Rig) -> None:
+    write_recording(tmp_path / "push", recording)
+    table = load_data([tmp_path / "push"])
+    assert len(table) > 0
+    np.testing.assert_allclose(table.inputs[:, 0], 0.02, rtol=1e-9)
+    write_table(tmp_path / "push.csv", table)
+    both = load_data([tmp_path / "push", tmp_path / "push.csv"])
+    assert len(both) == 2 * len(table) and both.pushes == table.pushes
+    write_recording(tmp_path / "bare", replace(recording, rig=None))
+    with pytest.raises(RigError, match="no push_rig record"):
+        load_data([tmp_path / "bare"])
+    np.testing.assert_array_equal(load_data([tmp_path / "bare"], rig).outcomes, table.outcomes)
+
+
+def test_data_without_a_push_is_told(tmp_path: Path, recording: Recording) -> None:
+    away = replace(recording, pusher=replace(recording.pusher, x=recording.pusher.x - 1.0), wrench=None)
+    write_recording(tmp_path / "away", away)
+    with pytest.raises(RecordingError, match="away: no push was found"):
+        load_data([tmp_path / "away"])
+    with pytest.raises(TableError, match="no push table was given"):
+        load_data([])

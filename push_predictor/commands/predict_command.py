@@ -50,7 +50,9 @@ def run(options: argparse.Namespace) -> None:
         return
     sd, noise = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(prediction.process_covariance[0]))
     for k, (name, unit, scale) in enumerate((("dx", "mm", 1e3), ("dy", "mm", 1e3), ("dtheta", "deg", np.degrees(1.0)))):
-        print(f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (noise alone {noise[k] * scale:.3f})")
+        print(
+            f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (noise alone {noise[k] * scale:.3f})"
+        )
     print("inside the training data" if result["in_domain"] else "outside the training data: take with care")
 
 

@@ -59,4 +59,6 @@ def run(options: argparse.Namespace) -> None:
         "n_rows": len(table),
     }
     if not write_json(options, result):
-        print(f"{options.out}: {model.kind}, {len(model.training)} of {len(table)} windows, {result['n_pushes']} pushes")
+        print(
+            f"{options.out}: {model.kind}, {len(model.training)} of {len(table)} windows, {result['n_pushes']} pushes"
+        )

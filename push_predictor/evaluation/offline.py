@@ -32,26 +32,29 @@ def window_options(model: PushModel) -> WindowOptions:
     return WindowOptions(duration=float(model.training.duration[0]))
 
 
-def validate_recording(
-    model: PushModel, path: Path, rig: Rig | None = None
-) -> tuple[list[PushWindow], Comparison]:
+def validate_recording(model: PushModel, path: Path, rig: Rig | None = None) -> tuple[list[PushWindow], Comparison]:
     """Predict every window of a recording."""
     windows, table = recorded_windows(model, path, rig)
     check_table(model, table)
     return windows, compare(model, table)
 
 
-def report_recording(
-    models: Sequence[PushModel], path: Path, out: Path
-) -> tuple[Path, list[dict[str, object]]]:
+def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
     """Write the HTML report of several models, the first the main one, on one recording; returns page and metrics."""
-    from push_predictor.evaluation.report import write_validation_report
-
     windows, table = recorded_windows(models[0], path)
     comparisons = [compare(model, table) for model in models]
-    seen = trained_on(models[0], table)
-    split = f"{len(seen)} of its pushes were trained on" if seen else "a recording not used in training, pushes whole"
-    page = write_validation_report(
-        out, f"Validation on {path.name}", table, windows, models, comparisons, {"recording": path.name, "split": split}, ()
-    )
+    page = report_windows(models, windows, comparisons, out, path.name)
     return page, [metrics_json(comparison) for comparison in comparisons]
+
+
+def report_windows(
+    models: Sequence[PushModel], windows: Sequence[PushWindow], comparisons: Sequence[Comparison], out: Path, name: str
+) -> Path:
+    """The same for windows that were predicted already, by a server for instance."""
+    from push_predictor.evaluation.report import write_validation_report  # matplotlib: only where pictures are made
+
+    table = windows_to_table(windows)
+    seen = trained_on(models[0], table)
+    split = f"{len(seen)} of the pushes were trained on" if seen else "pushes that were not trained on, kept whole"
+    facts = {"recording": name, "split": split}
+    return write_validation_report(out, f"Validation on {name}", table, windows, models, comparisons, facts, ())

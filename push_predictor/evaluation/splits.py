@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import Array, BoolArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 BOOTSTRAP_DRAWS = 1000
 
 
-def push_folds(table: PushTable, folds: int = 5, seed: int = 0) -> Array:
+def push_folds(table: PushTable, folds: int = 5, seed: int = 0) -> IntArray:
     """Fold number (n,) of every row; all rows of a push share it. Pushes are dealt by default_rng(seed)."""
     pushes, index = np.unique(table.push_id, return_inverse=True)
-    return np.random.default_rng(seed).permutation(len(pushes))[index] % folds
+    return np.asarray(np.random.default_rng(seed).permutation(len(pushes))[index] % folds)
 
 
 def held_out_pushes(table: PushTable, share: float, seed: int = 0) -> BoolArray:

@@ -16,7 +16,8 @@ from push_predictor.errors import RigError
 from push_predictor.types import Array, BoolArray, IntArray
 
 SMOOTH_TABLE = 8192  # chords that stand for the arc length of an ellipse: relative error 1e-8
-NEWTON_STEPS = 12
+NEWTON_STEPS = 60  # enough for bisection alone
+PARAMETER_TOLERANCE = 1e-14  # rad
 SAME_LENGTH = 1e-6  # m; vertices closer than this to their image are a symmetry
 
 
@@ -88,7 +89,8 @@ class Outline:
         """Contact fractions (E + 1,) at which the edges begin, the last entry 1; a smooth outline is one edge."""
         if self.semi_axes is not None:
             return np.array([0.0, 1.0])
-        return np.asarray(self._arc / self._arc[-1])
+        # Rounded, so that the k-th side of a square begins at k / 4 and not a bit beside it.
+        return np.round(self._arc / self._arc[-1], 15)
 
     def edge(self, contact: Array) -> tuple[IntArray, Array]:
         """Edge index (n,) and fraction along that edge (n,) of contacts (n,) in [0, 1)."""
@@ -135,7 +137,9 @@ class Outline:
 
     @cached_property
     def _arc(self) -> Array:
-        points = self._curve(self._table) if self.semi_axes is not None else np.vstack([self.vertices, self.vertices[:1]])
+        points = (
+            self._curve(self._table) if self.semi_axes is not None else np.vstack([self.vertices, self.vertices[:1]])
+        )
         return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
     def _unchanged_by_turn(self, order: int) -> bool:
@@ -199,15 +203,21 @@ class Outline:
         return Projection(contact, nearest, normal, distance, np.zeros(len(points), dtype=np.bool_))
 
     def _nearest_parameter(self, points: Array) -> Array:
+        """Safeguarded Newton in the first quadrant, where the nearest point is the slope's only root."""
         a, b = self.semi_axes or (1.0, 1.0)
-        x, y = points.T
-        t = np.arctan2(a * y, b * x)
+        x, y = np.abs(points.T)
+        t, low, high = np.arctan2(a * y, b * x), np.zeros_like(x), np.full_like(x, np.pi / 2.0)
         for _ in range(NEWTON_STEPS):  # stationarity of |curve(t) - point|^2
             cos, sin = np.cos(t), np.sin(t)
             slope = (b * b - a * a) * cos * sin + x * a * sin - y * b * cos
             bend = (b * b - a * a) * (cos * cos - sin * sin) + x * a * cos + y * b * sin
-            t = t - np.clip(slope / np.where(np.abs(bend) < 1e-12, 1e-12, np.abs(bend)), -0.3, 0.3)
-        return t
+            low, high = np.where(slope > 0.0, low, t), np.where(slope > 0.0, t, high)
+            newton = t - slope / np.where(bend > 0.0, bend, np.inf)
+            usable = (bend > 0.0) & (newton >= low) & (newton <= high)
+            before, t = t, np.where(usable, newton, (low + high) / 2.0)
+            if np.all(np.abs(t - before) < PARAMETER_TOLERANCE):
+                break
+        return np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0]))
 
 
 def _signed_area(vertices: Array) -> float:

@@ -18,8 +18,10 @@ from push_predictor.types import Array
 TEXTBOOK_FRICTION = 0.3
 FRICTION_BOUNDS = (0.0, 2.0)  # of the fit; above 2 the motion cone of a usual slider covers all pushes
 LENGTH_BOUNDS = (0.02, 1.0)  # of the fit, as shares of the farthest the support can reach
-WEIGHTING_ROUNDS = 4
+WEIGHTING_ROUNDS = 3
 DIFFERENCE_STEP = 1e-3  # relative, above the noise that the integration's tolerance leaves
+PARAMETER_TOLERANCE = 1e-5  # relative
+INTEGRATION_NOISE = 1e-4  # relative; residuals below it say nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +80,16 @@ def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcom
     def residuals(parameters: Array) -> Array:
         return _with(model, parameters).displacement(inputs, duration) - outcomes
 
+    noise = INTEGRATION_NOISE * _root_mean_square(outcomes) + np.finfo(np.float64).tiny
     for _ in range(WEIGHTING_ROUNDS):
-        scale = np.maximum(np.sqrt(np.mean(residuals(estimate) ** 2, axis=0)), 1e-12)
+        scale = np.maximum(_root_mean_square(residuals(estimate)), noise)
         estimate = least_squares(
             lambda p, unit=scale: (residuals(p) / unit).ravel(),
             estimate,
             bounds=(low, high),
             x_scale=high - low,
             diff_step=DIFFERENCE_STEP,
+            xtol=PARAMETER_TOLERANCE,
         ).x
     return _with(model, estimate)
 
@@ -95,6 +99,10 @@ def _check_request(velocity: Array, contact: Array, angle: Array, duration: Arra
         wrong = ~np.isfinite(values) | (name in ("velocity", "duration")) & (values < 0.0)
         if np.any(wrong):
             raise RequestError(name, float(values[wrong][0]), "a finite number, velocity and duration >= 0")
+
+
+def _root_mean_square(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
 
 
 def _with(model: AnalyticalPush, parameters: Array) -> AnalyticalPush:

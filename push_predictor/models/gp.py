@@ -52,7 +52,7 @@ class GaussianProcess:
 
     @property
     def log_marginal_likelihood(self) -> float:
-        """log p(outputs | inputs), nats."""
+        """Log p(outputs | inputs), nats."""
         constant = len(self.outputs) * np.log(2.0 * np.pi)
         return -0.5 * float(self.outputs @ self._weights + self._posterior.log_determinant + constant)
 
@@ -87,10 +87,8 @@ def fit_gp(
     return GaussianProcess(inputs, outputs, _parameters(found.x))
 
 
-def log_likelihood_and_gradient(
-    inputs: Array, outputs: Array, parameters: GpParameters
-) -> tuple[float, Array]:
-    """log p(outputs | inputs) and its derivative wrt (log lengthscales, log signal sd, log noise sd), (D + 2,).
+def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:
+    """Log p(outputs | inputs) and its derivative wrt (log lengthscales, log signal sd, log noise sd), (D + 2,).
 
     Raises LinAlgError where the kernel matrix plus noise is not positive definite.
     """

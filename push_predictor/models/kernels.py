@@ -28,11 +28,11 @@ class SquaredExponential:
         return float(np.exp(2.0 * self.log_sd))
 
     def matrix(self, inputs: Array) -> Array:
-        """k between all rows of inputs (n, D), shape (n, n), exactly symmetric."""
+        """Kernel between all rows of inputs (n, D), shape (n, n), exactly symmetric."""
         return self.cross(inputs, inputs)
 
     def cross(self, left: Array, right: Array) -> Array:
-        """k between the rows of left (n, D) and right (m, D), shape (n, m)."""
+        """Kernel between the rows of left (n, D) and right (m, D), shape (n, m)."""
         a, b = self._scaled(left), self._scaled(right)
         if len(a) == 1:
             exponent = -0.5 * ((a - b) ** 2).sum(axis=1)[None, :]
@@ -42,7 +42,8 @@ class SquaredExponential:
             exponent -= 0.5 * (a * a).sum(axis=1)[:, None] + 0.5 * (b * b).sum(axis=1)
             np.minimum(exponent, 0.0, out=exponent)
         exponent += 2.0 * self.log_sd
-        return np.exp(exponent, out=exponent)
+        np.exp(exponent, out=exponent)
+        return np.asarray(exponent)
 
     def gradient(self, inputs: Array, matrix: Array, weights: Array) -> Array:
         """sum_ij weights_ij d matrix_ij / d(log_lengthscales, log_sd), shape (D + 1,).

@@ -106,9 +106,7 @@ def _moment_arms(contact_point: Array, inward_normal: Array, support: Support) -
     return rx * ny - ry * nx, rx * nx + ry * ny
 
 
-def _contact_force(
-    p: Array, q: Array, along: Array, across: Array, friction: float
-) -> tuple[Array, Array, IntArray]:
+def _contact_force(p: Array, q: Array, along: Array, across: Array, friction: float) -> tuple[Array, Array, IntArray]:
     """Force (scaled to k = 1) along the normal and its left, and slip, each (n,), from moment arms p, q.
 
     A has the elements 1 + p^2, p q, 1 + q^2 in the basis of normal and left. Where an edge's image has no

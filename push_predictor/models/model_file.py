@@ -48,7 +48,8 @@ def save_model(model: PushModel, path: Path) -> None:
     arrays = _table_arrays(model.training)
     header = _header(model, arrays)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **{HEADER: np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)}, **arrays)
+    arrays[HEADER] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import blas
 
-from push_predictor.models.ridge import cholesky
+from push_predictor.models.ridge import cholesky_in_place
 from push_predictor.types import Array
 
 
@@ -17,13 +17,13 @@ class KernelPosterior:
     """
 
     def __init__(self, kernel_matrix: Array, noise_variances: Array) -> None:
-        regularised = np.array(kernel_matrix, order="F")
+        regularised = np.array(kernel_matrix, order="C")
         regularised.flat[:: len(regularised) + 1] += noise_variances
-        self._factor = cholesky(regularised)
+        self._factor = cholesky_in_place(regularised)
 
     @property
     def log_determinant(self) -> float:
-        """log det(K + noise)."""
+        """Log det(K + noise)."""
         return 2.0 * float(np.log(np.diagonal(self._factor)).sum())
 
     def weights(self, values: Array) -> Array:
@@ -41,4 +41,4 @@ class KernelPosterior:
             half = blas.dtrsv(self._factor, cross[0], lower=1)
             return np.array([half @ half])
         half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
-        return np.einsum("ij,ij->j", half, half)
+        return np.asarray(np.einsum("ij,ij->j", half, half))

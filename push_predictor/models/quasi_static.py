@@ -62,7 +62,7 @@ def slide(contact: DiscContact, sweep: Sweep) -> Array:
     rows = np.flatnonzero(sweep.travel > 0.0)
     while rows.size:
         paths, before, at = sweep.rows(rows), pose[rows], done[rows]
-        step = np.minimum(length[rows], paths.travel - at)
+        step = np.minimum(np.minimum(length[rows], paths.travel - at), _free_travel(contact, paths, before, at))
         coarse = advance(contact, paths, before, at, step)
         middle = advance(contact, paths, before, at, step / 2.0)
         fine = advance(contact, paths, middle, at + step / 2.0, step / 2.0)
@@ -90,6 +90,14 @@ def advance(contact: DiscContact, sweep: Sweep, pose: Array, done: Array, step: 
     k4, _ = _rate(contact, pose + length * k3, sweep.centre(done + step), sweep.direction)
     motion = length / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
     return pose + np.where((gap < TOUCHING)[:, None], motion, 0.0)
+
+
+def _free_travel(contact: DiscContact, sweep: Sweep, pose: Array, done: Array) -> Array:
+    """Travel (n,) in m within which a disc that comes nearer cannot touch; infinite for one in contact or leaving."""
+    nearest = contact.outline.project(to_body(sweep.centre(done), pose))
+    gap = nearest.distance - contact.pusher_radius
+    nearing = np.einsum("nj,nj->n", rotate(sweep.direction, -pose[:, 2]), nearest.normal) < 0.0
+    return np.where(nearing & (gap >= TOUCHING), gap, np.inf)
 
 
 def _rate(contact: DiscContact, pose: Array, centre: Array, direction: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ class Ridge(Protocol):
 
     @property
     def log_determinant(self) -> float:
-        """log det(I + w^1/2 K w^1/2)."""
+        """Log det(I + w^1/2 K w^1/2)."""
 
     @property
     def posterior_diagonal(self) -> Array:
@@ -58,7 +58,7 @@ def factorise(matrix: Array) -> RegularisableKernel:
     n = len(matrix)
     if n < _SMALLEST_FACTORISED:
         return RegularisableKernel(matrix, None)
-    factor, pivots, rank, _ = lapack.dpstrf(matrix, tol=_DROPPED * matrix[0, 0], lower=1)
+    factor, pivots, rank, _ = lapack.dpstrf(matrix.T, tol=_DROPPED * matrix[0, 0], lower=1)
     if rank > _LARGEST_SHARE * n:
         return RegularisableKernel(matrix, None)
     root = np.empty((rank, n))
@@ -66,9 +66,12 @@ def factorise(matrix: Array) -> RegularisableKernel:
     return RegularisableKernel(matrix, root)
 
 
-def cholesky(matrix: Array) -> Array:
-    """Lower Cholesky factor in Fortran order; raises LinAlgError where the matrix is not positive definite."""
-    factor, info = lapack.dpotrf(matrix, lower=1, clean=1)
+def cholesky_in_place(matrix: Array) -> Array:
+    """Lower Cholesky factor in the memory of a symmetric C-ordered matrix, itself in Fortran order.
+
+    Raises LinAlgError where the matrix is not positive definite.
+    """
+    factor, info = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
     # Whether LAPACK notices a NaN depends on where it stands.
     if info != 0 or not np.isfinite(factor[-1, -1]):
         raise LinAlgError(f"matrix of {len(matrix)} rows is not positive definite")
@@ -86,14 +89,14 @@ class _LowRankRidge:
         weighted = root * np.sqrt(weights)
         inner = weighted @ weighted.T
         inner.flat[:: len(inner) + 1] += 1.0
-        factor = cholesky(inner)
+        factor = cholesky_in_place(inner)
         # T' L' = root' solved from the right, so that LAPACK's columns are our rows
         shrunk = blas.dtrsm(1.0, factor, root.T, side=1, lower=1, trans_a=1).T
         return cls(weights, _log_determinant(factor), shrunk)
 
     @property
     def posterior_diagonal(self) -> Array:
-        return np.einsum("ij,ij->j", self.shrunk_root, self.shrunk_root)
+        return np.asarray(np.einsum("ij,ij->j", self.shrunk_root, self.shrunk_root))
 
     def residual(self, values: Array) -> Array:
         return values - (self.shrunk_root @ values) @ self.shrunk_root * self.weights
@@ -118,13 +121,15 @@ class _DenseRidge:
         inner = matrix * scale
         inner *= scale[:, None]
         inner.flat[:: len(inner) + 1] += 1.0
-        factor = cholesky(inner)
-        inverse, _ = lapack.dtrtri(factor, lower=1)
-        return cls(weights, _log_determinant(factor), inverse)
+        factor = cholesky_in_place(inner)
+        log_determinant = _log_determinant(factor)
+        inverse, _ = lapack.dtrtri(factor, lower=1, overwrite_c=1)
+        return cls(weights, log_determinant, inverse)
 
     @property
     def posterior_diagonal(self) -> Array:
-        return (1.0 - np.einsum("ij,ij->j", self.inverse_root, self.inverse_root)) / self.weights
+        explained = np.einsum("ij,ij->j", self.inverse_root, self.inverse_root)
+        return np.asarray((1.0 - explained) / self.weights)
 
     def residual(self, values: Array) -> Array:
         scale = np.sqrt(self.weights)

@@ -21,9 +21,7 @@ from push_predictor.types import Array
 class VHGP:
     """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound."""
 
-    def __init__(
-        self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array
-    ) -> None:
+    def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
         problem = VhgpProblem.of(inputs, outputs, parameters)
@@ -35,7 +33,7 @@ class VHGP:
         self._noise_weights = bound.mean_weights
 
     def predict(self, inputs: Array) -> LatentPrediction:
-        """f and g at inputs (m, D)."""
+        """Predict f and g at inputs (m, D)."""
         signal, noise = self.parameters.signal, self.parameters.noise
         of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
         # The jitter is independent of the data, so it is what the variance of f cannot fall below.
@@ -49,9 +47,7 @@ class VHGP:
         )
 
 
-def fit_vhgp(
-    inputs: Array, outputs: Array, start: GaussianProcess | None = None, *, most_iterations: int = 40
-) -> VHGP:
+def fit_vhgp(inputs: Array, outputs: Array, start: GaussianProcess | None = None, *, most_iterations: int = 40) -> VHGP:
     """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
 
     inputs (n, D) and outputs (n,) standardised. start: a homoscedastic process of the same rows, else one is
@@ -61,4 +57,3 @@ def fit_vhgp(
     gp = start or fit_gp(inputs, outputs)
     bound = maximise_bound(inputs, outputs, gp.parameters, most_iterations)
     return VHGP(inputs, outputs, bound.problem.parameters, bound.site_precisions)
-

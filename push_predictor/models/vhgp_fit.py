@@ -19,8 +19,8 @@ from push_predictor.types import Array
 # Logarithms, for inputs and outputs of unit spread; they keep line searches where the kernels are sane.
 _LENGTHSCALES = (np.log(1e-2), np.log(1e3))
 _SIGNAL_SD = (np.log(1e-3), np.log(1e2))
-_NOISE_SD = (np.log(1e-3), np.log(1e1))
-_NOISE_MEAN = (np.log(1e-12), np.log(1e2))
+_NOISE_SD = (np.log(1e-3), np.log(3.0))
+_NOISE_MEAN = (np.log(1e-8), np.log(1e2))
 _REFUSED = 1e10
 _SEARCH_TOLERANCE = 2e-2  # nats
 _FINAL_TOLERANCE = 1e-9
@@ -49,16 +49,14 @@ def maximise_bound(inputs: Array, outputs: Array, near: GpParameters, most_itera
     minimize(search.cost, centre, jac=True, method="L-BFGS-B", bounds=box, options=options)
     if search.best is None:
         raise TrainingError(f"the variational bound of {len(outputs)} rows is not finite anywhere")
-    return maximise_over_noise(search.best.problem, search.best, _FINAL_TOLERANCE)
+    return maximise_over_noise(search.best.problem, search.best, _FINAL_TOLERANCE, most_steps=200)
 
 
 def _prior_centre(gp: GpParameters) -> VhgpParameters:
     noise_lengthscales = np.full(len(gp.log_lengthscales), _NOISE_LENGTHSCALE)
     # so that the mean of exp(g) is the homoscedastic noise variance
     noise_mean = 2.0 * gp.log_noise_sd - 0.5 * float(np.exp(2.0 * _NOISE_LOG_SD))
-    return VhgpParameters(
-        gp.log_lengthscales, gp.log_signal_sd, noise_lengthscales, _NOISE_LOG_SD, noise_mean
-    )
+    return VhgpParameters(gp.log_lengthscales, gp.log_signal_sd, noise_lengthscales, _NOISE_LOG_SD, noise_mean)
 
 
 class _Search:

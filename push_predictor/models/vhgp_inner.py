@@ -16,9 +16,7 @@ _SMALLEST_PRECISION = 1e-7  # below it S loses its digits
 _SHORTEST_STEP = 1.0 / 64.0
 
 
-def maximise_over_noise(
-    problem: VhgpProblem, start: Bound | None, tolerance: float, most_steps: int = 60
-) -> Bound:
+def maximise_over_noise(problem: VhgpProblem, start: Bound | None, tolerance: float, most_steps: int = 60) -> Bound:
     """The bound at its maximum over (mean weights, site precisions), found to `tolerance` nats.
 
     start: a bound of neighbouring hyperparameters on the same rows; its q(g) is where the search begins.

@@ -52,7 +52,7 @@ class Param:
             return not self.choices or value in self.choices
         return isinstance(self.default, bool) or self._within(value)
 
-    def _within(self, value: float) -> bool:
+    def _within(self, value: Any) -> bool:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
 
 
@@ -62,13 +62,13 @@ def declare(node: Node, params: Sequence[Param]) -> None:
     Raises RequestError that names the parameter, its value and what is accepted.
     """
     table = {param.name: param for param in params}
-    node.add_on_set_parameters_callback(lambda changed: _verdict(table, changed))
     for param in params:
         given = given_value(node, param.name)
         if given is not None and not param.allows(given):
             raise RequestError(param.name, given, param.accepted)
         value = param.default if given is None else _native(param, given)
         node.declare_parameter(param.name, value, _descriptor(param), ignore_override=True)
+    node.add_on_set_parameters_callback(lambda changed: _verdict(table, changed))
 
 
 def given_value(node: Node, name: str) -> Any:
@@ -124,4 +124,3 @@ def _is_texts(value: Any) -> bool:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
-

@@ -6,10 +6,9 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
-from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -26,6 +25,7 @@ from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.request_log import RequestLog
 from push_predictor.nodes.runtime import Stop, run
+from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 SERVICE_QOS = QoSProfile(depth=100)  # ten, the default, loses requests of a client with more in flight
 INTROSPECTION = {
@@ -52,7 +52,7 @@ PARAMETERS = (
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )
 NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
-Response = TypeVar("Response")
+Answer: TypeAlias = Callable[[ModelShelf, Any, Any], None]  # fills the response, or raises
 
 
 class InactiveError(PushPredictorError):
@@ -157,9 +157,7 @@ class PredictServer(LifecycleNode):
             self.trigger_activate()
         return response
 
-    def _prediction(
-        self, answer: Callable[[ModelShelf, Any, Response], None], request: Any, response: Response
-    ) -> Response:
+    def _prediction(self, answer: Answer, request: Any, response: Any) -> Any:
         start = perf_counter()
         response = self._guarded(answer if self._state == "active" else self._inactive, request, response)
         self._log.add(perf_counter() - start, None if response.success else response.message)
@@ -168,9 +166,7 @@ class PredictServer(LifecycleNode):
     def _inactive(self, shelf: ModelShelf, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")
 
-    def _guarded(
-        self, answer: Callable[[ModelShelf, Any, Response], None], request: Any, response: Response
-    ) -> Response:
+    def _guarded(self, answer: Answer, request: Any, response: Any) -> Any:
         """A callback that raises would end the node, so every failure becomes an answer."""
         try:
             answer(self._shelf, request, response)
@@ -205,9 +201,7 @@ class PredictServer(LifecycleNode):
 
     def _introspect(self, mode: str) -> None:
         for service in self._offered:
-            service.configure_introspection(
-                self.get_clock(), qos_profile_system_default, INTROSPECTION[mode]
-            )
+            service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
 
     def _publish_diagnostics(self) -> None:
         level, message = self._health()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -62,7 +63,7 @@ class ReplayPlayer:
         self._source, self._clock, self._wall, self._outlet = source, clock, wall, outlet
         self._size, self._loop, self._delay = window, loop, delay
         self._changed = threading.Condition()
-        self._waiting = 0
+        self._waiting, self._counting = 0, threading.Lock()
         self._ahead: ReadAhead | None = None
         self._range = PlayRange()
         self._todo: int | None = None
@@ -74,8 +75,10 @@ class ReplayPlayer:
 
     def run(self) -> None:
         """Play whenever play() or seek() asks, until close()."""
-        while self._has_work():
-            self._play()
+        while (position := self._next_position()) is not None:
+            while self._wait_delay() and self._play_through(position) and self._loop:
+                position = self._range.first(self._source.start)
+            self._finish()
 
     def play(self, what: PlayRange) -> bool:
         """Play from the range's start. False while playing."""
@@ -102,6 +105,24 @@ class ReplayPlayer:
         """Pause or resume."""
         (self.resume if self._clock.paused else self.pause)()
 
+    @property
+    def paused(self) -> bool:
+        """Does it stand still?"""
+        return self._clock.paused
+
+    @property
+    def rate(self) -> float:
+        """Recorded seconds per second."""
+        return self._clock.rate
+
+    def set_rate(self, rate: float) -> bool:
+        """Play at another rate from now on. False for one that is not a positive number."""
+        if not (math.isfinite(rate) and rate > 0.0):
+            return False
+        with self._control():
+            self._clock.set_rate(rate)
+        return True
+
     def play_next(self) -> bool:
         """Publish the next message now. False if not paused, or after the last."""
         return self.burst(1) == 1
@@ -113,8 +134,8 @@ class ReplayPlayer:
             while self._clock.paused and (count == 0 or done < count) and (head := self._head()) is not None:
                 self._send(head)
                 done += 1
-                if (after := self._head()) is None or done == count:
-                    self._clock.jump(head.log_time if after is None else min(head.log_time, after.log_time))
+            if done and self._time is not None:
+                self._clock.jump(self._time)
         return done
 
     def seek(self, time: int) -> None:
@@ -160,25 +181,25 @@ class ReplayPlayer:
     @contextmanager
     def _control(self) -> Iterator[None]:
         """Hold the lock. The count makes the player step aside: a Python lock is not fair to those who wait."""
-        self._waiting += 1
+        self._count_waiting(1)
         try:
             with self._changed:
                 yield
                 self._changed.notify_all()
         finally:
-            self._waiting -= 1
+            self._count_waiting(-1)
 
-    def _has_work(self) -> bool:
+    def _count_waiting(self, change: int) -> None:
+        with self._counting:
+            self._waiting += change
+
+    def _next_position(self) -> int | None:
+        """Wait for work; None after close()."""
         with self._changed:
             while self._todo is None and not self._closed:
                 self._wall.wait(self._changed, None)
-            return not self._closed
-
-    def _play(self) -> None:
-        position, self._todo, self._stopped = self._todo or 0, None, False
-        while self._wait_delay() and self._play_through(position) and self._loop:
-            position = self._range.first(self._source.start)
-        self._finish()
+            position, self._todo, self._stopped = self._todo, None, self._closed
+            return None if self._closed else position
 
     def _wait_delay(self) -> bool:
         """Sleep the delay; False if told to stop."""
@@ -189,14 +210,15 @@ class ReplayPlayer:
         return not self._stopped
 
     def _play_through(self, position: int) -> bool:
-        """One pass; False if it was stopped."""
+        """One pass; False if it was stopped or held no message."""
+        before = self.published + self.failed
         with self._changed:
             self._go_to(position)
             self._announce()
         while self._step():
             while self._waiting:
                 self._wall.sleep(50_000)
-        return not self._stopped
+        return not self._stopped and self.published + self.failed > before
 
     def _step(self) -> bool:
         """One message, or one look; False at the end."""
@@ -221,12 +243,12 @@ class ReplayPlayer:
 
     def _send(self, message: RawMessage) -> None:
         assert self._ahead is not None
+        self._ahead.pop()
+        self._time = message.log_time
         if self._outlet.publish(message):
             self.published += 1
         else:
             self.failed += 1
-        self._time = message.log_time
-        self._ahead.pop()
 
     def _head(self) -> RawMessage | None:
         head = self._ahead.peek() if self._ahead else None

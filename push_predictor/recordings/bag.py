@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
+import zstandard
+
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag_compression import unpack_file, unpack_message
 from push_predictor.recordings.bag_metadata import (
     METADATA_FILE,
     BagMetadata,
@@ -25,11 +29,19 @@ class Bag:
     while messages are read.
     """
 
-    def __init__(self, path: Path, files: list[McapFile], described: BagMetadata) -> None:
+    def __init__(
+        self,
+        path: Path,
+        files: list[McapFile],
+        described: BagMetadata,
+        scratch: tempfile.TemporaryDirectory[str] | None = None,
+    ) -> None:
         self.path = path
         self.name = path.name if path.is_dir() else path.stem
         self.files = files
         self._described = described
+        self._unreadable = 0
+        self._scratch = scratch  # where unpacked files lie as long as the bag lives
 
     @property
     def topics(self) -> dict[str, str]:
@@ -57,6 +69,8 @@ class Bag:
     def notes(self) -> list[str]:
         """What was found damaged or out of order so far, in words."""
         own = [*self._described.notes, *(note for file in self.files for note in file.notes)]
+        if self._unreadable:
+            own.append(f"{self.path}: {self._unreadable} messages cannot be unpacked and were dropped")
         return own + [
             f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which counts"
             for name, record in self._described.custom_data.items()
@@ -68,8 +82,20 @@ class Bag:
 
         Raises RecordingError for a given topic that is not in CDR.
         """
+        if self._described.compression == "message":
+            yield from self._unpacked(topics)
+            return
         for file in self.files:
             yield from file.messages(topics)
+
+    def _unpacked(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
+        self._unreadable = 0
+        for file in self.files:
+            for message in file.messages(topics):
+                try:
+                    yield message._replace(data=unpack_message(message.data))
+                except zstandard.ZstdError:
+                    self._unreadable += 1
 
 
 def open_bag(path: Path) -> Bag:
@@ -83,7 +109,11 @@ def open_bag(path: Path) -> Bag:
     described = read_bag_metadata(path)
     if not (files := _listed(path, described) or _found(path)):
         raise RecordingError(f"{path}: holds no .mcap file, give an MCAP bag")
-    return Bag(path, [McapFile(file) for file in files], described)
+    if described.compression != "file":
+        return Bag(path, [McapFile(file) for file in files], described)
+    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_")
+    unpacked = [unpack_file(file, Path(scratch.name)) for file in files]
+    return Bag(path, [McapFile(file) for file in unpacked], described, scratch)
 
 
 def _listed(folder: Path, described: BagMetadata) -> list[Path]:

@@ -18,10 +18,14 @@ _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """files: as relative_file_paths has them; custom_data: {record name: {key: value}}; notes: what was wrong."""
+    """files: as relative_file_paths has them; custom_data: {record name: {key: value}}; notes: what was wrong.
+
+    compression: what rosbag2 compressed on top of MCAP, 'file', 'message' or ''.
+    """
 
     files: tuple[str, ...] = ()
     custom_data: dict[str, Mapping[str, object]] = field(default_factory=dict)
+    compression: str = ""
     notes: list[str] = field(default_factory=list)
 
 
@@ -40,21 +44,20 @@ class TopicInfo:
 def read_bag_metadata(folder: Path) -> BagMetadata:
     """Read metadata.yaml; one that is absent or unreadable leaves a note.
 
-    Raises RecordingError for a bag that is not MCAP or is compressed as a whole.
+    Raises RecordingError for a bag that is not MCAP, or compressed in a way that rosbag2 does not come with.
     """
     import yaml
 
     path = folder / METADATA_FILE
     try:
-        information = yaml.safe_load(path.read_text())[_ROOT]
+        information = yaml.safe_load(path.read_text(encoding="utf-8"))[_ROOT]
         files = tuple(str(name) for name in information.get("relative_file_paths") or ())
     except FileNotFoundError:
         return BagMetadata()
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
         reason = str(error).replace("\n", " ")
         return BagMetadata(notes=[f"{path}: cannot be read ({reason}), the .mcap files are taken by name"])
-    _check(information, path)
-    return BagMetadata(files, _records(information.get("custom_data")))
+    return BagMetadata(files, _records(information.get("custom_data")), _compression(information, path))
 
 
 def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, object]]:
@@ -103,7 +106,7 @@ def _plain_dump(data: object) -> str:
     """YAML without anchors: rosbag2 reads them, other tools may not."""
     import yaml
 
-    class Plain(yaml.SafeDumper):  # type: ignore[misc]
+    class Plain(yaml.SafeDumper):
         def ignore_aliases(self, data: object) -> bool:
             return True
 
@@ -139,13 +142,17 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
     ]
 
 
-def _check(information: Mapping[str, object], path: Path) -> None:
+def _compression(information: Mapping[str, object], path: Path) -> str:
+    """Check that this is an MCAP bag; how rosbag2 compressed it on top of MCAP's own: 'file', 'message' or ''."""
     if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", ""):
         raise RecordingError(f"{path}: storage {storage!r}, mcap is accepted: `ros2 bag convert` makes it")
-    if mode := information.get("compression_mode"):
-        raise RecordingError(
-            f"{path}: compression_mode {mode!r}, chunks compressed in the .mcap are accepted: `ros2 bag convert`"
-        )
+    mode = str(information.get("compression_mode") or "none").lower()
+    form = str(information.get("compression_format") or "").lower()
+    if mode == "none":
+        return ""
+    if mode not in ("file", "message") or form != "zstd":
+        raise RecordingError(f"{path}: compression {form!r} of each {mode}, zstd of each file or message is accepted")
+    return mode
 
 
 def _records(custom_data: object) -> dict[str, Mapping[str, object]]:

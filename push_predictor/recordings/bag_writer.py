@@ -81,9 +81,7 @@ class BagWriter:
         metadata = {"offered_qos_profiles": qos_text(topic), "topic_type_hash": type_hash}
         self._topics[topic.name] = topic
         self._counts[topic.name] = 0
-        self._channels[topic.name] = self._writer.register_channel(
-            topic.name, "cdr", self._schemas[type], metadata
-        )
+        self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
         """Write an MCAP Metadata record; a folder's metadata.yaml carries it too."""
@@ -116,7 +114,7 @@ class BagWriter:
         self._stream.flush()
         os.fsync(self._stream.fileno())
         if not self._bare:
-            (self._unfinished / METADATA_FILE).write_text(self._metadata_text())
+            (self._unfinished / METADATA_FILE).write_text(self._metadata_text(), encoding="utf-8")
         earlier = self._unfinished.with_suffix(".earlier")
         if self.path.is_dir():
             self.path.rename(earlier)

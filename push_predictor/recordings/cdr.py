@@ -59,7 +59,8 @@ def decode(messages: Sequence[bytes], layout: Layout) -> Columns:
     for rows, block, order, frame_length in _groups(messages, layout):
         start = layout.start(frame_length)
         numbers = block[:, start : start + layout.count * layout.size]
-        values[rows] = np.ascontiguousarray(numbers).view(f"{order}f{layout.size}")
+        with np.errstate(invalid="ignore"):  # widening a signalling NaN
+            values[rows] = np.ascontiguousarray(numbers).view(f"{order}f{layout.size}")
         valid[rows] = True
         if layout.header:
             seconds, nanoseconds = _word(block, _STAMP, order, "i"), _word(block, _STAMP + 4, order, "u")
@@ -83,7 +84,7 @@ def encode(stamp: IntArray, values: Array, layout: Layout, frame_id: str = "worl
         block[:, _STAMP:_FRAME] = np.frombuffer(_header_words(stamp, len(text)), np.uint8).reshape(-1, 12)
         block[:, _FRAME : _FRAME + len(text)] = np.frombuffer(text, np.uint8)
     numbers = np.ascontiguousarray(values, f"<f{layout.size}").view(np.uint8)
-    block[:, start:] = numbers.reshape(len(values), -1)
+    block[:, start:] = numbers.reshape(len(values), size - start)
     data = block.tobytes()
     return [data[i : i + size] for i in range(0, len(data), size)]
 

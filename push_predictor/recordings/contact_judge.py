@@ -49,13 +49,23 @@ def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: i
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     broken, blind = _silences([t for t in (slider, pusher, wrench) if t is not None], before, time)
     forces = _forces(wrench, time)
-    speed = np.minimum(_speed(pusher, time - MOTION_HALF_SPAN, time + MOTION_HALF_SPAN), _speed(pusher, time, time + FORWARD_SPAN))
+    speed = np.minimum(
+        _speed(pusher, time - MOTION_HALF_SPAN, time + MOTION_HALF_SPAN), _speed(pusher, time, time + FORWARD_SPAN)
+    )
     jumped = _jumps(slider, first, last)
     for k in range(len(time)):
         force = None if np.isnan(forces[k, 0]) else forces[k]
         gap, height = float(touch.distance[k]) - rig.pusher_radius, float(tip[k, 2] - pose[k, 2])
         yield Judged(
-            int(stamp[k]), float(time[k]), gap, height, force, float(speed[k]), bool(blind[k]), bool(broken[k]), bool(jumped[k])
+            int(stamp[k]),
+            float(time[k]),
+            gap,
+            height,
+            force,
+            float(speed[k]),
+            bool(blind[k]),
+            bool(broken[k]),
+            bool(jumped[k]),
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from push_predictor.recordings.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout
 
 _RULE = "=" * 80
-_HEADER = f"""{_RULE}
+HEADER_DEFINITION = f"""{_RULE}
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
@@ -44,7 +44,7 @@ float64 x 0
 float64 y 0
 float64 z 0
 float64 w 1
-{_HEADER}""",
+{HEADER_DEFINITION}""",
     "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
 )
 WRENCH = MessageType(
@@ -57,7 +57,7 @@ geometry_msgs/Vector3 force
 geometry_msgs/Vector3 torque
 {_RULE}
 MSG: geometry_msgs/Vector3
-{_XYZ}{_HEADER}""",
+{_XYZ}{HEADER_DEFINITION}""",
     "RIHS01_8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77",
 )
 FLOAT64 = MessageType(

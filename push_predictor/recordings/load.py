@@ -18,9 +18,7 @@ from push_predictor.recordings.window_finder import find_windows
 from push_predictor.recordings.windows import WindowOptions, windows_to_table
 
 
-def load_data(
-    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()
-) -> PushTable:
+def load_data(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> PushTable:
     """The windows of all recordings and the rows of all tables, in the order given.
 
     rig takes the place of the recorded one. A covariate is kept where all of the data have it. Where two paths
@@ -47,9 +45,7 @@ def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
     first, *others = [(path, _rig_of(Path(path))) for path in paths]
     for path, rig in others:
         if _bodies(rig) != _bodies(first[1]):
-            raise RigError(
-                f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})"
-            )
+            raise RigError(f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})")
     return first[1]
 
 

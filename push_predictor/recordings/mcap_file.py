@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,6 +59,7 @@ class McapFile:
         self.notes: list[str] = []
         self._types: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
+        self._listed: int | None = None  # messages, as the summary counts them
         self._size = _checked_size(path)
         if not self._read_summary():
             for _ in self.messages(topics=()):
@@ -70,11 +71,14 @@ class McapFile:
         Raises RecordingError for a given topic that is not in CDR.
         """
         wanted: _Wanted = {}
+        seen = 0
         for channel in self._channels.values():
             self._want(channel, topics, wanted)
         for opcode, offset, body, whole in self._records():
             content = self._chunk_content(offset, body, whole) if opcode == Opcode.CHUNK else body
-            yield from self._decoded(content, offset, topics, wanted)
+            seen += yield from self._decoded(content, offset, topics, wanted)
+        if self._listed not in (None, seen):
+            self._note(self._size, f"{seen} messages were found, the summary counts {self._listed}")
 
     def _chunk_content(self, offset: int, body: bytes, whole: bool) -> bytes:
         try:
@@ -93,7 +97,7 @@ class McapFile:
                     return
                 end = offset + HEAD.size + length
                 if opcode == 0 or end > self._size:
-                    self._note(offset, f"damaged or cut off, {self._size - offset} bytes from there are lost")
+                    self._note(offset, f"damaged or cut off, {self._size - offset} bytes from there are lost in part")
                     if opcode == Opcode.CHUNK:
                         yield opcode, offset, head + stream.read(), False
                     return
@@ -106,11 +110,16 @@ class McapFile:
 
     def _decoded(
         self, content: bytes, offset: int, topics: Collection[str] | None, wanted: _Wanted
-    ) -> Iterator[RawMessage]:
-        """The wanted messages in a run of records; channels, schemas and metadata on the way are kept."""
+    ) -> Generator[RawMessage, None, int]:
+        """The wanted messages in a run of records, and how many messages there are in all.
+
+        Channels, schemas and metadata on the way are kept.
+        """
+        seen = 0
         try:
             for opcode, start, end in split(content):
                 if opcode == Opcode.MESSAGE:
+                    seen += 1
                     channel, _, log_time, _ = MESSAGE.unpack_from(content, start)
                     if found := wanted.get(channel):
                         yield RawMessage(*found, log_time, content[start + MESSAGE.size : end])
@@ -120,6 +129,7 @@ class McapFile:
                     self._want(described, topics, wanted)
         except UNREADABLE as error:
             self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
+        return seen
 
     def _want(self, channel: Channel, topics: Collection[str] | None, wanted: _Wanted) -> None:
         encoding = channel.message_encoding
@@ -168,8 +178,10 @@ class McapFile:
                 self._register(opcode, summary, start, end)
         for place in places:
             self._read_metadata(place.offset)
-        complete = statistics and statistics.channel_count == len(self._channels)
-        return bool(complete and statistics and statistics.metadata_count == len(places))
+        if statistics is None or statistics.channel_count != len(self._channels):
+            return False
+        self._listed = statistics.message_count
+        return bool(statistics.metadata_count == len(places))
 
     def _read_metadata(self, offset: int) -> None:
         with self.path.open("rb") as stream:

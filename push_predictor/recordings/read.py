@@ -21,7 +21,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 __all__ = ["TopicNames", "read_recording", "recorded_rig", "require_rig"]
 
 FRAME = "world"
-SMALLEST_NORM = 1e-6  # a quaternion shorter than this tells no heading
+SMALLEST_COMPONENT = 1e-6  # a quaternion with no component above this tells no heading
 
 
 def read_recording(path: Path, *, rig: Rig | None = None, topics: TopicNames = TopicNames()) -> Recording:
@@ -40,14 +40,12 @@ def read_recording(path: Path, *, rig: Rig | None = None, topics: TopicNames = T
     slider = _slider(found[_named(bag, topics.slider)], notes)
     pusher = _pusher(found[_named(bag, topics.pusher)], notes)
     wrench = _wrench(found.get(_named(bag, topics.wrench)), notes)
-    scalars = {t: _scalar(s, notes) for t, s in found.items() if s.type in SCALAR_LAYOUTS and s.messages}
+    scalars = {topic: _scalar(s, notes) for topic, s in found.items() if s.type in SCALAR_LAYOUTS}
     for topic, stream in ((topics.slider, slider), (topics.pusher, pusher)):
         if not len(stream):
-            raise RecordingError(
-                f"{bag.path}: topic {absolute(topic)} has no usable sample ({'; '.join(notes)})"
-            )
+            raise RecordingError(f"{bag.path}: topic {absolute(topic)} has no usable sample ({'; '.join(notes)})")
     rig = rig if rig is not None else recorded_rig(bag)
-    return Recording(bag.name, rig, slider, pusher, wrench, scalars, (*bag.notes, *notes))
+    return Recording(bag.name, rig, slider, pusher, wrench, _with_samples(scalars), (*bag.notes, *notes))
 
 
 def recorded_rig(bag: Bag) -> Rig | None:
@@ -89,9 +87,7 @@ def _layouts(bag: Bag, topics: TopicNames) -> dict[str, tuple[str, Layout]]:
     if missing := [t for t, (kind, _) in expected.items() if t not in bag.topics and kind == POSE.name]:
         there = ", ".join(bag.topics) or "no topic"
         raise RecordingError(f"{bag.path}: no topic {' and '.join(missing)} of {POSE.name}, it holds {there}")
-    scalars = {
-        topic: (kind, SCALAR_LAYOUTS[kind]) for topic, kind in bag.topics.items() if kind in SCALAR_LAYOUTS
-    }
+    scalars = {topic: (kind, SCALAR_LAYOUTS[kind]) for topic, kind in bag.topics.items() if kind in SCALAR_LAYOUTS}
     return {topic: what for topic, what in {**scalars, **expected}.items() if topic in bag.topics}
 
 
@@ -111,9 +107,8 @@ def _collected(bag: Bag, layouts: dict[str, tuple[str, Layout]]) -> dict[str, _S
 
 def _slider(samples: _Samples, notes: list[str]) -> PoseStream:
     columns = decode(samples.messages, samples.layout)
-    norm = np.linalg.norm(columns.values[:, 3:], axis=1)
-    usable: BoolArray = np.isfinite(columns.values).all(axis=1) & (norm > SMALLEST_NORM)
-    kept = _kept(samples, columns, usable, notes)
+    finite = _finite(columns.values)
+    kept = _kept(samples, columns, finite & _turned(columns.values), notes)
     values = columns.values[kept]
     return _poses(columns.stamp[kept], values, _heading(values))
 
@@ -121,10 +116,10 @@ def _slider(samples: _Samples, notes: list[str]) -> PoseStream:
 def _pusher(samples: _Samples, notes: list[str]) -> PoseStream:
     """A tip is a point: one that comes without an orientation is as good."""
     columns = decode(samples.messages, samples.layout)
-    kept = _kept(samples, columns, np.isfinite(columns.values[:, :3]).all(axis=1), notes)
+    finite = _finite(columns.values[:, :3])
+    kept = _kept(samples, columns, finite, notes)
     values = columns.values[kept]
-    with np.errstate(invalid="ignore"):
-        turned = np.isfinite(values).all(axis=1) & (np.linalg.norm(values[:, 3:], axis=1) > SMALLEST_NORM)
+    turned = _turned(values)
     if not turned.all():
         notes.append(f"{samples.topic}: {np.sum(~turned)} samples have no orientation, heading 0 was taken")
     values[~turned, 3:] = 0.0, 0.0, 0.0, 1.0
@@ -142,10 +137,14 @@ def _wrench(samples: _Samples | None, notes: list[str]) -> WrenchStream | None:
 
 def _scalar(samples: _Samples, notes: list[str]) -> ScalarStream:
     columns = decode(samples.messages, samples.layout)
-    stamp = columns.stamp if samples.layout.header else np.array(samples.log_times, np.int64)
+    stamp = columns.stamp if samples.layout.header else np.array(samples.log_times, np.uint64).astype(np.int64)
     value = columns.values[:, 0]
     kept = _kept(samples, columns, np.isfinite(value), notes)
     return ScalarStream(stamp[kept], value[kept])
+
+
+def _with_samples(scalars: dict[str, ScalarStream]) -> dict[str, ScalarStream]:
+    return {topic: stream for topic, stream in scalars.items() if len(stream)}
 
 
 def _kept(samples: _Samples, columns: Columns, usable: BoolArray, notes: list[str]) -> BoolArray:
@@ -159,8 +158,19 @@ def _kept(samples: _Samples, columns: Columns, usable: BoolArray, notes: list[st
     return columns.valid & usable
 
 
+def _finite(values: Array) -> BoolArray:
+    return np.asarray(np.isfinite(values).all(axis=1))
+
+
+def _turned(values: Array) -> BoolArray:
+    """Which poses have an orientation at all."""
+    largest = np.abs(values[:, 3:]).max(axis=1)
+    return np.isfinite(largest) & (largest > SMALLEST_COMPONENT)
+
+
 def _heading(values: Array) -> Array:
-    unit = values[:, 3:] / np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+    quaternion = values[:, 3:] / np.abs(values[:, 3:]).max(axis=1, keepdims=True)
+    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     return yaw_of_quaternion(*unit.T)
 
 

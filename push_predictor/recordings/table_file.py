@@ -35,8 +35,6 @@ def read_table(path: Path) -> PushTable:
     """
     path = Path(path)
     header, rows, lines = _cells(path)
-    if missing := [name for name in COLUMNS if name not in header]:
-        raise TableError(f"{path} line 1: lacks column {', '.join(missing)}, it has {', '.join(header)!r}")
     columns = dict(zip(header, zip(*rows, strict=True), strict=True))
     numbers = {name: _required(path, name, columns[name], lines) for name in NUMBERS}
     others = [name for name in header if name not in COLUMNS]
@@ -98,6 +96,8 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
     header = found[0][1]
     if len(set(header)) != len(header):
         raise TableError(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")
+    if missing := [name for name in COLUMNS if name not in header]:
+        raise TableError(f"{path} line 1: lacks column {', '.join(missing)}, it has {', '.join(header)!r}")
     for line, row in found[1:]:
         if len(row) != len(header):
             raise TableError(f"{path} line {line}: {len(row)} cells, the header has {len(header)}")

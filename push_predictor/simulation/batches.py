@@ -41,4 +41,4 @@ def run_pushes(spec: SimulationSpec) -> Iterator[Batch]:
 
 def _end_times(path: PusherPath, friction: float) -> Array:
     """When pushes (n,) are over, s: the tip is back and a slider that flew off has come to rest."""
-    return np.asarray(path.total_time + SETTLE + path.speed / (0.5 * friction * GRAVITY))
+    return np.asarray(path.total_time + SETTLE + path.speed / (0.7 * friction * GRAVITY))

@@ -84,9 +84,7 @@ class _Drag:
 
     def solve(self, b: Array) -> Array:
         """A^-1 b for b (n, 3)."""
-        turn = (b[:, 2] - (self.e * b[:, 0] + self.f * b[:, 1]) / self.a) / (
-            self.i - (self.e**2 + self.f**2) / self.a
-        )
+        turn = (b[:, 2] - (self.e * b[:, 0] + self.f * b[:, 1]) / self.a) / (self.i - (self.e**2 + self.f**2) / self.a)
         return np.stack([(b[:, 0] - self.e * turn) / self.a, (b[:, 1] - self.f * turn) / self.a, turn], axis=1)
 
 
@@ -210,9 +208,7 @@ def _with_contact(
     return free - push[:, None] * back_n + rub[:, None] * back_t, push, rub
 
 
-def _impulses(
-    gnn: Array, gnt: Array, gtt: Array, r: Array, s: Array, friction: Array
-) -> tuple[Array, Array]:
+def _impulses(gnn: Array, gnt: Array, gtt: Array, r: Array, s: Array, friction: Array) -> tuple[Array, Array]:
     determinant = gnn * gtt - gnt * gnt
     push = (r * gtt + gnt * s) / determinant
     rub = (gnn * s + gnt * r) / determinant

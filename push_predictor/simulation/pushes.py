@@ -72,9 +72,7 @@ def grid_pushes(
     """
     contact, angle = (grid.ravel() for grid in np.meshgrid(contacts, angles, indexing="ij"))
     n = len(contact) * repetitions
-    return PushPlan(
-        np.tile(contact, repetitions), np.tile(angle, repetitions), np.full(n, speed), np.full(n, travel)
-    )
+    return PushPlan(np.tile(contact, repetitions), np.tile(angle, repetitions), np.full(n, speed), np.full(n, travel))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +137,7 @@ def ramp_distance(time: Array, length: Array, speed: Array, acceleration: float)
     first = np.clip(time, 0.0, ramp)
     last = np.clip(time - ramp - cruise, 0.0, ramp)
     middle = np.clip(time - ramp, 0.0, cruise)
-    return np.asarray(
-        acceleration * first**2 / 2.0 + peak * middle + peak * last - acceleration * last**2 / 2.0
-    )
+    return np.asarray(acceleration * first**2 / 2.0 + peak * middle + peak * last - acceleration * last**2 / 2.0)
 
 
 def _demand(field: str, values: Array, good: np.ndarray, accepted: str) -> None:

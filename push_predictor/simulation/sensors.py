@@ -78,9 +78,7 @@ def surface_temperature(truth: Truth, epoch: int, rng: np.random.Generator) -> S
     return ScalarStream(stamp, _stepped(drift, TEMPERATURE_STEP))
 
 
-def _ticks(
-    truth: Truth, sensors: Sensors, rate: float, epoch: int, rng: np.random.Generator
-) -> tuple[Array, IntArray]:
+def _ticks(truth: Truth, sensors: Sensors, rate: float, epoch: int, rng: np.random.Generator) -> tuple[Array, IntArray]:
     """Sample times (n,) in s and their stamps (n,), strictly increasing, with the dropouts taken out."""
     period = 1.0 / rate
     n = int((truth.time[-1] - period) * rate)

@@ -59,7 +59,8 @@ def support_points(outline: Outline) -> Array:
 
 def built_shares(points: Array, seed: int) -> Array:
     """Load shares (k,), summing to one, of the slider as it was made: nearly uniform, slightly lopsided."""
-    return pressure_shares(points, np.full(len(points), 1.0 / len(points)), BUILD_TILT, 1, [seed, 2])[0]
+    even = np.full(len(points), 1.0 / len(points))
+    return np.asarray(pressure_shares(points, even, BUILD_TILT, 1, [seed, 2])[0])
 
 
 def pressure_shares(points: Array, mean: Array, variation: float, n: int, seed: list[int]) -> Array:

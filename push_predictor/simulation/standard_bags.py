@@ -22,7 +22,7 @@ WRENCH_RATE = 50.0  # Hz; half of the poses', to keep the recordings small
 def standard_bags() -> dict[str, SimulationSpec]:
     """The specs by name. square_abs_* share slider and table; every recording has pushes of its own."""
     specs = (
-        _spec("square_abs_train", "rect1", "abs", _random(140, 1), 1),
+        _spec("square_abs_train", "rect1", "abs", _random(136, 1), 1),
         _spec("square_abs_test", "rect1", "abs", _random(48, 2), 2),
         _spec("square_abs_repeats", "rect1", "abs", _repeats(), 3),
         _spec("ellipse_plywood", "ellip2", "plywood", _random(15, 4), 4),

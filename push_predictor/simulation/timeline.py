@@ -51,8 +51,12 @@ def run_in_turn(pushes: Sequence[PushMotion]) -> Truth:
     parts: list[tuple[Array, Array, Array, Array]] = []
     clock, before = 0.0, pushes[0]
     for push in pushes:
-        for phase in (_reset(before, push), _vertical(push, 0, LIFTED, DOWN), _contact_phase(push),
-                      _vertical(push, -1, DOWN, LIFTED)):
+        for phase in (
+            _reset(before, push),
+            _vertical(push, 0, LIFTED, DOWN),
+            _contact_phase(push),
+            _vertical(push, -1, DOWN, LIFTED),
+        ):
             parts.append((phase[0] + clock + CLEAR, *phase[1:]))
             clock += float(phase[0][-1]) + CLEAR
         before = push

@@ -10,6 +10,8 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.report import Notes
 from push_predictor.types import Array, BoolArray, IntArray
 
+LAST_STAMP = 2**31 * 1_000_000_000  # ns; a ROS stamp has seconds of 31 bits
+
 
 class Samples(NamedTuple):
     """A stream before it has a meaning: stamps (n,) in ns, values (n, k)."""
@@ -24,7 +26,7 @@ class Samples(NamedTuple):
 
 def nanoseconds(seconds: Array) -> IntArray:
     """Unix seconds (n,) as integer ns."""
-    whole = np.floor(seconds)
+    whole = np.floor(np.clip(seconds, -1.0, 9e9))  # within 64 bits; what is out of range is refused later
     return whole.astype(np.int64) * 1_000_000_000 + np.round((seconds - whole) * 1e9).astype(np.int64)
 
 
@@ -34,7 +36,13 @@ def twist(z: Array, w: Array) -> Array:
 
 
 def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
-    """Samples that are finite, in order of time, one a stamp. Raises ImportSourceError if fewer than two remain."""
+    """Samples that are finite, in order of time, one a stamp.
+
+    Raises ImportSourceError if fewer than two remain, or a stamp is none that a message can carry.
+    """
+    if np.any(wrong := (samples.stamp < 0) | (samples.stamp >= LAST_STAMP)):
+        row = int(np.argmax(wrong))
+        raise ImportSourceError(f"{where}[{row}]: time {samples.stamp[row] / 1e9:.9g} s, give Unix time before 2038")
     finite = np.all(np.isfinite(samples.values), axis=1)
     if missing := int(np.sum(~finite)):
         notes.dropped.append(f"{where}: {missing} rows with a value that is not finite")

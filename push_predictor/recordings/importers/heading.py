@@ -8,6 +8,7 @@ the jump can be undone; on another one nobody knows which side of the jump is ri
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,5 +66,4 @@ def _fast_runs(time: Array, heading: Array) -> list[tuple[int, int]]:
 
 
 def _longest(bounds: list[int]) -> tuple[int, int]:
-    pieces = list(zip(bounds[:-1], bounds[1:], strict=True))
-    return max(pieces, key=lambda piece: piece[1] - piece[0])
+    return max(pairwise(bounds), key=lambda piece: piece[1] - piece[0])

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_held
-from push_predictor.recordings.importers.mcube_rig import TIP_LATE, Block, block_of
+from push_predictor.recordings.importers.mcube_rig import CLOCK, FORCE, HEIGHT, TIP_LATE, Block, block_of
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.staging import safe_name, staged
 from push_predictor.recordings.rig import Rig
@@ -26,7 +26,7 @@ AT_REST = 5e-4  # m; the tip has not left its first position
 LEAST_TARE = 5
 STOPS_EARLY = 1_000_000_000  # ns
 NEAR_HALF_TURN = 0.05  # |qw| below which the lost sign of qw may change
-AT_HALF_TURN = 0.02
+TREND = 8  # samples that tell how the heading goes on
 
 
 def import_mcube(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
@@ -45,7 +45,8 @@ def read_mcube(obj: Path, rig: Rig | None, notes: Notes) -> Recording:
     raw = {kind: in_order(read_numbers(path, WIDTHS[kind], notes), str(path), notes) for kind, path in files.items()}
     body = Samples(raw["obj"].stamp, np.column_stack([raw["obj"].values[:, :2], headings(raw["obj"].values[:, 3:])]))
     name = safe_name(f"{obj.resolve().parent.name}_{stem}")
-    return assemble(name, str(obj.with_name(stem)), block_of(obj, int(body.stamp[0])), rig, body, raw["tcp"], raw["ft"], notes)
+    block = block_of(obj, int(body.stamp[0]))
+    return assemble(name, str(obj.with_name(stem)), block, rig, body, raw["tcp"], raw["ft"], notes)
 
 
 def assemble(
@@ -56,13 +57,14 @@ def assemble(
     body: (n, 3) x, y, heading in Vicon's world. tip: (n, 2) x, y in the robot's base, or (n, 3) with its height.
     force: (n, 2) fx, fy of the sensor, or (n, 3) with tz.
     """
-    block.assume(notes)
+    for sentence in (CLOCK, FORCE, HEIGHT, block.assumed_frames, *(() if rig else (block.assumed_rig,))):
+        notes.assume(sentence)
     force = tared(force, tip, where, notes)
     tip = without_held(tip, f"{where}: tip", notes)
     tip = tip._replace(stamp=tip.stamp - TIP_LATE)
     require_overlap({"slider": body.stamp, "tip": tip.stamp, "force": force.stamp}, where)
     if (missing := int(body.stamp[-1] - tip.stamp[-1])) > STOPS_EARLY:
-        notes.dropped.append(f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's, no push beyond that")
+        notes.dropped.append(f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's, no push beyond")
     return Recording(
         name=name,
         rig=rig or block.rig,
@@ -88,17 +90,21 @@ def read_numbers(path: Path, width: int, notes: Notes) -> Samples:
 
 
 def headings(quaternion: Array) -> Array:
-    """Headings (n,) rad, continuous, from qx, qy, qz (n, 3); qw has lost its sign and is taken to pass through zero
-    where the heading passes through half a turn."""
+    """Headings (n,) rad, continuous, from qx, qy, qz (n, 3).
+
+    qw has lost its sign. It is taken as positive at first; near half a turn, where it may change, the heading that
+    goes on as the samples before is taken.
+    """
     qw = np.sqrt(np.maximum(0.0, 1.0 - np.sum(quaternion**2, axis=1)))
-    low = np.concatenate([[False], qw < NEAR_HALF_TURN, [False]])
-    starts, ends = np.flatnonzero(low[1:] & ~low[:-1]), np.flatnonzero(~low[1:] & low[:-1])
-    sign = np.ones(len(qw))
-    for start, end in zip(starts, ends, strict=True):
-        crossing = start + int(np.argmin(qw[start:end]))
-        if 0 < start and end < len(qw) and qw[crossing] < AT_HALF_TURN:
-            sign[crossing:] *= -1.0
-    return np.unwrap(twist(quaternion[:, 2], sign * qw))
+    sign, found = 1.0, np.empty(len(qw))
+    for k, (z, w) in enumerate(zip(quaternion[:, 2], qw, strict=True)):
+        before = found[max(0, k - TREND) : k]
+        expected = before[-1] + (before[-1] - before[0]) / max(1, len(before) - 1) if k else twist(z, w)
+        off = wrap_angle(twist(z, np.array([sign, -sign]) * w) - expected)
+        if w < NEAR_HALF_TURN and abs(off[1]) < abs(off[0]):
+            sign, off = -sign, off[::-1]
+        found[k] = expected + off[0]
+    return found
 
 
 def tared(force: Samples, tip: Samples, where: str, notes: Notes) -> Samples:
@@ -111,7 +117,7 @@ def tared(force: Samples, tip: Samples, where: str, notes: Notes) -> Samples:
         return force
     zero = force.values[before].mean(axis=0)
     notes.repaired.append(
-        f"{where}: force tared by {', '.join(f'{value:.3f}' for value in zero[:2])} N (mean of {int(np.sum(before))} samples at rest)"
+        f"{where}: force tared by {zero[0]:.3f}, {zero[1]:.3f} N (mean of {int(np.sum(before))} samples at rest)"
     )
     return force._replace(values=force.values - zero)
 
@@ -137,7 +143,8 @@ def _number(path: Path, line: int, word: str, kind: type[int] | type[float]) -> 
     try:
         return kind(word)
     except ValueError:
-        raise ImportSourceError(f"{path}:{line}: {word[:40]!r}, expected {'a time in ns' if kind is int else 'a number'}") from None
+        wanted = "a whole number of ns" if kind is int else "a number"
+        raise ImportSourceError(f"{path}:{line}: {word[:40]!r}, expected {wanted}") from None
 
 
 def _runs(sources: Sequence[Path]) -> list[Path]:

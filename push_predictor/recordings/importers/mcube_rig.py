@@ -11,29 +11,30 @@ from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.geometry.shapes import square
-from push_predictor.recordings.importers.report import Notes
 from push_predictor.recordings.rig import Rig
 
 PUSHER_RADIUS = 0.004745  # m
 THICKNESS = 0.0132  # m; that of the MIT set's steel square, 0.837 kg on 0.09 m x 0.09 m
-TIP_LATE = 15_000_000  # ns; see MCUBE_CLOCK
-MCUBE_CLOCK = (
-    "clock: tip stamps are 15 ms late against the tracker's and were set back by that: delay test with held rows left "
-    "out, 15.0 ms, rms 0.17 mm; with the held rows, which are 12 ms old, 20 to 21 ms; tracker and force share a clock"
+TIP_LATE = 15_000_000  # ns; see CLOCK
+CLOCK = (
+    "clock: tip stamps are 15 ms late against the tracker's and were set back by that (delay test with held rows left "
+    "out: 15.0 ms, rms 0.17 mm; with the held rows, which are 12 ms old: 20 to 21 ms); tracker and force share a clock"
 )
-MCUBE_FORCE = (
-    "force: the sensor looks down, world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag; over all "
-    "runs the force then lies within 3 degrees of the contact normal on the mean; it is what the slider exerts on the "
-    "pusher, tared by the mean before the tip first moves"
+FORCE = (
+    "force: the sensor looks down, world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag; axes "
+    "fitted to the contact normals of each block agree within 3 degrees; it is what the slider exerts on the pusher, "
+    "tared by the mean before the tip first moves"
 )
-MCUBE_SURFACE = "surface unknown"
-MCUBE_HEIGHT = "tip and slider at height 0 where the files hold no height of the tip"
+HEIGHT = "tip and slider at height 0 where the files hold no height of the tip"
 
 
 @dataclass(frozen=True)
 class Block:
-    """One of the blocks. half_side m; density kg/m^3; base: Vicon's origin in the robot's base (x, y) m;
-    centre: the block's centre in the tracker's body frame (x, y) m; days: Unix seconds of its sessions."""
+    """One of the blocks.
+
+    half_side m; density kg/m^3; base: Vicon's origin in the robot's base (x, y) m; centre: the block's centre in the
+    tracker's body frame (x, y) m; days: Unix seconds of its sessions.
+    """
 
     name: str
     half_side: float
@@ -48,27 +49,32 @@ class Block:
         mass = self.density * 4.0 * self.half_side**2 * THICKNESS
         return Rig(f"{self.name}_block", square(2.0 * self.half_side), PUSHER_RADIUS, "unknown", round(mass, 3))
 
-    def assume(self, notes: Notes) -> None:
-        """Tell what is not in the files."""
-        for sentence in (MCUBE_CLOCK, MCUBE_FORCE, MCUBE_SURFACE, MCUBE_HEIGHT):
-            notes.assume(sentence)
-        notes.assume(
-            f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from the distance of tip and centre in contact; "
-            f"mass {self.rig.object_mass} kg from density {self.density:.0f} kg/m3 and thickness "
-            f"{THICKNESS * 1e3:.1f} mm, that of the MIT set's square: not measured"
+    @property
+    def assumed_rig(self) -> str:
+        """What is assumed of the block."""
+        rig = self.rig
+        return (
+            f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from tip's and centre's distance in contact; "
+            f"mass {rig.object_mass} kg from density {self.density:.0f} kg/m3 and thickness {THICKNESS * 1e3:.1f} mm, "
+            "that of the MIT set's square: not measured; surface unknown"
         )
-        notes.assume(
-            f"{self.name}: world is Vicon's; its origin in the robot's base ({self.base[0]:.4f}, {self.base[1]:.4f}) m, "
-            f"the block's centre in the tracked body ({1e3 * self.centre[0]:.2f}, {1e3 * self.centre[1]:.2f}) mm"
-            + ("" if self.base == RECORDED_BASE else ", fitted to the contact: the recorded transforms are off by 10 mm")
+
+    @property
+    def assumed_frames(self) -> str:
+        """What is assumed of the frames."""
+        (bx, by), (cx, cy) = self.base, self.centre
+        source = (
+            "the recorded transforms" if self.base == RECORDED_BASE else "fitted to the contact, recorded 10 mm off"
+        )
+        return (
+            f"{self.name}: world is Vicon's; its origin in the robot's base ({bx:.4f}, {by:.4f}) m ({source}); the "
+            f"block's centre in the tracked body ({1e3 * cx:.2f}, {1e3 * cy:.2f}) mm"
         )
 
 
 RECORDED_BASE = (0.3958, 0.0019)  # from /tf of the bag
 STEEL = Block("steel", 0.0489, 7850.0, RECORDED_BASE, (0.0, 0.0), (1439424000.0, 1439596800.0))
-ALUMINIUM = Block(
-    "aluminium", 0.0496, 2700.0, (0.3906, -0.0064), (0.00085, 0.0016), (1438560000.0, 1438732800.0)
-)
+ALUMINIUM = Block("aluminium", 0.0496, 2700.0, (0.3906, -0.0064), (0.00085, 0.0016), (1438560000.0, 1438732800.0))
 FOLDERS = {"St": STEEL, "Al": ALUMINIUM}
 
 

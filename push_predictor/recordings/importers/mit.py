@@ -81,7 +81,6 @@ def read_mit(file: MitFile, rig: Rig | None, notes: Notes) -> Recording:
         slider=_poses(body),
         pusher=_poses(tip._replace(values=_unwound(tip.values))),
         wrench=None if wrench is None else WrenchStream(wrench.stamp, *wrench.values.T),
-        notes=(*own.dropped, *own.repaired, FRAME, FORCE, CLOCK, HEIGHT),
     )
 
 

@@ -53,7 +53,7 @@ def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
 
 def file_metadata(name: str) -> dict[str, str]:
     """What the file name says: surface, shape, a, v (mm/s), i, s, t (rad). Raises ImportSourceError."""
-    found = {key: value for key, value in METADATA.findall(name.rsplit("/", 1)[-1])}
+    found: dict[str, str] = dict(METADATA.findall(name.rsplit("/", 1)[-1]))
     if missing := [key for key in ("surface", "shape") if key not in found]:
         raise ImportSourceError(
             f"{name}: the file name lacks {' and '.join(f'{key}=' for key in missing)}; "

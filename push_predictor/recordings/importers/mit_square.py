@@ -62,11 +62,10 @@ def read_mit_square(source: Path, outline: Outline) -> PushTable:
     c = columns["c"]
     if np.any(bad := (c < 0.0) | (c > 1.0)):
         row = int(np.argmax(bad))
-        raise ImportSourceError(f"{source}: c[{row}] is {c[row]!r}, give a fraction of the side, 0 to 1")
+        raise ImportSourceError(f"{source}: c[{row}] is {float(c[row])!r}, give a fraction of the side, 0 to 1")
     rows = len(c)
-    contact = np.array([outline.contact_on_edge(EDGE, float(value)) for value in c])
     return PushTable(
-        np.column_stack([np.full(rows, VELOCITY), contact, columns["beta"]]),
+        np.column_stack([np.full(rows, VELOCITY), outline.contact_on_edge(EDGE, c), columns["beta"]]),
         np.full(rows, DURATION),
         np.column_stack([columns["dx"], -columns["dy"], columns["dtheta"]]),
         np.array([str(int(group)) for group in columns["push_group_est"]]),
@@ -131,4 +130,4 @@ def _require(wanted: Sequence[str], found: Sequence[str], source: Path) -> None:
 def _check_finite(column: Array, name: str, source: Path) -> None:
     if np.any(bad := ~np.isfinite(column)):
         row = int(np.argmax(bad))
-        raise ImportSourceError(f"{source}: {name}[{row}] is {column[row]!r}, give a finite number")
+        raise ImportSourceError(f"{source}: {name}[{row}] is {float(column[row])!r}, give a finite number")

@@ -17,7 +17,7 @@ from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.importers.cleaning import twist
 from push_predictor.recordings.importers.mlab_force import contact_force
-from push_predictor.recordings.importers.mlab_log import LogPush, read_log
+from push_predictor.recordings.importers.mlab_log import LogPush, read_log, report_oddities
 from push_predictor.recordings.importers.mlab_rig import CENTROID, folder_rig
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.staging import safe_name, staged
@@ -27,7 +27,6 @@ from push_predictor.types import Array
 
 MILLIMETRE = 1e-3
 FEWEST_POSES = 4
-MOVED_BY_HAND = 1e-3  # m between two pushes
 ASSUMED = (
     "contact begins where the tip's straight path meets the outline at rest and lasts until the tip stops; "
     "velocity times duration is the travel in contact",
@@ -52,7 +51,7 @@ class PushRow:
     tangential_force: float
 
 
-class NotAPush(Exception):
+class NotAPushError(Exception):
     """Why a logged push cannot become a row."""
 
 
@@ -78,46 +77,51 @@ def read_mlab(path: Path, name: str, rig: Rig, notes: Notes) -> PushTable:
     for push in pushes:
         try:
             rows.append((push, push_row(push, rig.outline)))
-        except NotAPush as reason:
+        except NotAPushError as reason:
             notes.dropped.append(f"{path}:{push.line}: push {push.number}: {reason}")
-    _report_oddities(path, pushes, notes)
-    start = min((push.time for push, _ in rows), default=0.0)
+    report_oddities(path, pushes, notes)
     found = [row for _, row in rows]
     return PushTable(
         np.array([[row.velocity, row.contact, row.angle] for row in found]).reshape(-1, 3),
         np.array([row.duration for row in found]),
         np.array([row.outcome for row in found]).reshape(-1, 3),
         np.array([f"{name}/{push.number}" for push, _ in rows], dtype=np.str_),
-        {
-            "elapsed_time": np.array([push.time - start for push, _ in rows]),
-            "push_index": np.array([float(push.number) for push, _ in rows]),
-            "slider_x": np.array([row.slider[0] for row in found]),
-            "slider_y": np.array([row.slider[1] for row in found]),
-            "slider_heading": np.array([float(wrap_angle(row.slider[2])) for row in found]),
-            "push_heading": np.array([row.heading for row in found]),
-            "edge": np.array([float(row.edge) for row in found]),
-            "normal_force": np.array([row.normal_force for row in found]),
-            "tangential_force": np.array([row.tangential_force for row in found]),
-        },
+        _covariates(rows),
     )
 
 
+def _covariates(rows: list[tuple[LogPush, PushRow]]) -> dict[str, Array]:
+    start = min((push.time for push, _ in rows), default=0.0)
+    columns: dict[str, list[float]] = {
+        "elapsed_time": [push.time - start for push, _ in rows],
+        "push_index": [float(push.number) for push, _ in rows],
+        "slider_x": [float(row.slider[0]) for _, row in rows],
+        "slider_y": [float(row.slider[1]) for _, row in rows],
+        "slider_heading": [float(wrap_angle(row.slider[2])) for _, row in rows],
+        "push_heading": [row.heading for _, row in rows],
+        "edge": [float(row.edge) for _, row in rows],
+        "normal_force": [row.normal_force for _, row in rows],
+        "tangential_force": [row.tangential_force for _, row in rows],
+    }
+    return {name: np.array(column) for name, column in columns.items()}
+
+
 def push_row(push: LogPush, outline: Outline) -> PushRow:
-    """One push as a row. Raises NotAPush."""
+    """One push as a row. Raises NotAPushError."""
     if len(push.robot) < FEWEST_POSES:
-        raise NotAPush(f"{len(push.robot)} robot poses, at least {FEWEST_POSES} are needed")
+        raise NotAPushError(f"{len(push.robot)} robot poses, at least {FEWEST_POSES} are needed")
     before, after = centroid_pose(push.before), centroid_pose(push.after)
     tip = push.robot[:, 1:3] * MILLIMETRE
     path = tip[-1] - tip[0]
     travel = float(np.hypot(*path))
     if travel == 0.0:
-        raise NotAPush("the tip does not move")
+        raise NotAPushError("the tip does not move")
     heading = float(np.arctan2(path[1], path[0]))
     edge, fraction, reach = first_touch(outline, to_body(tip[0], before), rotate(path / travel, -before[2]))
     if reach >= travel:
-        raise NotAPush(f"the tip moves {travel * 1e3:.1f} mm, the outline is {reach * 1e3:.1f} mm away")
+        raise NotAPushError(f"the tip moves {travel * 1e3:.1f} mm, the outline is {reach * 1e3:.1f} mm away")
     duration = _contact_time(push.robot[:, 0], (tip - tip[0]) @ path / travel, reach)
-    contact = outline.contact_on_edge(edge, fraction)
+    contact = float(outline.contact_on_edge(edge, fraction))
     normal = rotate(outline.inward_normal(np.array([contact]))[0], before[2])
     force = contact_force(push.force, push.robot)
     return PushRow(
@@ -143,18 +147,18 @@ def centroid_pose(logged: Array) -> Array:
 def first_touch(outline: Outline, tip: Array, direction: Array) -> tuple[int, float, float]:
     """Where a tip (2,) that moves along a unit vector (2,) enters the polygon: edge, fraction of it, distance m.
 
-    Raises NotAPush if it never does.
+    Raises NotAPushError if it never does.
     """
     starts = outline.vertices
     along = np.roll(starts, -1, axis=0) - starts
     offset = starts - tip
     cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]  # below 0 where the path enters
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         reach = (offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]) / cross
         fraction = (offset[:, 0] * direction[1] - offset[:, 1] * direction[0]) / cross
     enters = np.flatnonzero((cross < 0.0) & (reach > 0.0) & (fraction >= 0.0) & (fraction <= 1.0))
     if not len(enters):
-        raise NotAPush("the tip's path does not meet the outline from outside")
+        raise NotAPushError("the tip's path does not meet the outline from outside")
     edge = int(enters[np.argmin(reach[enters])])
     return edge, float(fraction[edge]), float(reach[edge])
 
@@ -167,29 +171,8 @@ def _contact_time(time: Array, travelled: Array, reach: float) -> float:
     share = (reach - travelled[last]) / (travelled[last + 1] - travelled[last])
     duration = float(time[-1] - (time[last] + share * (time[last + 1] - time[last])))
     if not duration > 0.0:
-        raise NotAPush("the robot's stamps do not increase")
+        raise NotAPushError("the robot's stamps do not increase")
     return duration
-
-
-def _report_oddities(path: Path, pushes: list[LogPush], notes: Notes) -> None:
-    if bare := [push.number for push in pushes if not len(push.force)]:
-        notes.dropped.append(f"{path}: {len(bare)} pushes without forces, normal_force and tangential_force are empty")
-    repeats = sum(int(np.sum(np.all(np.diff(push.robot[:, 1:], axis=0) == 0.0, axis=1))) for push in pushes)
-    if repeats:
-        notes.repaired.append(f"{path}: {repeats} robot poses that repeat the one before, not used for the contact time")
-    timed = [push for push in pushes if len(push.force) or len(push.robot)]
-    for one, two in zip(timed[:-1], timed[1:], strict=True):
-        if (back := one.time - two.time) > 0.0:
-            notes.repaired.append(
-                f"{path}:{two.line}: after push {one.number} the clock goes back by {back:.0f} s: sessions were joined, "
-                "elapsed_time counts from the earliest"
-            )
-            continue
-        moved = float(np.hypot(*(two.before - one.after)[:2])) * MILLIMETRE
-        if moved > MOVED_BY_HAND:
-            notes.assume(
-                f"{path}:{two.line}: object moved by hand {moved * 1e3:.1f} mm before push {two.number}, not by a push"
-            )
 
 
 def _logs(sources: Sequence[Path]) -> list[Path]:

@@ -6,7 +6,7 @@ is certain. So a recording gets a rig only if the caller gives one, in the track
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,16 @@ from push_predictor.recordings.importers.rosbag1_file import Stamped, bag_time, 
 from push_predictor.recordings.importers.staging import safe_name
 from push_predictor.recordings.rig import HOW_TO_GIVE, Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
-from push_predictor.types import Array
+from push_predictor.types import IntArray
 
+TOPICS = ("/Mocap", "/netft_data", "/robot_CartesianLog")
 MILLIMETRE = 1e-3
 UNIT = 0.02  # a quaternion whose length is off by more belongs to an untracked frame
 PAUSE = 0.3  # s
 MOVING = 0.001  # m/s
 BODY = (
-    "mlab bags: slider pose is the tracked body's own (origin at its markers, heading of its x axis); where the object's "
-    "outline lies in it is not recorded, only displacement and change of heading are certain"
+    "mlab bags: slider pose is the tracked body's own (origin at its markers, heading of its x axis); where the "
+    "object's outline lies in it is not recorded, only displacement and change of heading are certain"
 )
 FORCE = (
     "mlab bags: force in the world on the pusher = R(tool yaw) diag(-1, 1) (F - zero); the axes were found from the "
@@ -36,10 +37,9 @@ FORCE = (
 )
 
 
-def read_mlab_bag(
-    path: Path, mocap: Sequence[Stamped], netft: Sequence[Stamped], robot: Sequence[Stamped], rig: Rig | None, notes: Notes
-) -> Recording:
-    """A recording from the messages of /Mocap, /netft_data and /robot_CartesianLog. Raises ImportSourceError."""
+def read_mlab_bag(path: Path, messages: Mapping[str, Sequence[Stamped]], rig: Rig | None, notes: Notes) -> Recording:
+    """A recording from the messages of TOPICS. Raises ImportSourceError."""
+    mocap, netft, robot = (messages[topic] for topic in TOPICS)
     body = in_order(samples_of(_tracked(path, mocap, notes), _body, bag_time), f"{path}: /Mocap", notes)
     force = in_order(samples_of(netft, _force, bag_time), f"{path}: /netft_data", notes)
     tool = in_order(samples_of(robot, _tool, bag_time), f"{path}: /robot_CartesianLog", notes)
@@ -91,12 +91,13 @@ def _on_pusher(force: Samples, tool: Samples, path: Path, notes: Notes) -> Wrenc
     return WrenchStream(force.stamp, world[:, 0], world[:, 1], -tz)
 
 
-def _least_pressed(force: Samples, tool: Samples) -> Array:
+def _least_pressed(force: Samples, tool: Samples) -> IntArray:
     """Rows of the force in the pause of the tip in which it is smallest along the mean force of the moving tip."""
     time = (force.stamp - force.stamp[0]) * 1e-9
     when = (tool.stamp - force.stamp[0]) * 1e-9
     edges = np.arange(0.0, time[-1], PAUSE)
-    places = np.column_stack([np.interp(np.append(edges, edges[-1] + PAUSE), when, axis) for axis in tool.values[:, :2].T])
+    ends = np.append(edges, edges[-1] + PAUSE)
+    places = np.column_stack([np.interp(ends, when, axis) for axis in tool.values[:, :2].T])
     speed = np.hypot(*np.diff(places, axis=0).T) / PAUSE
     slot = np.minimum((time / PAUSE).astype(np.int64), len(speed) - 1)
     moving = speed > MOVING

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import zlib
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.report import Notes
 from push_predictor.types import Array
 
+MOVED_BY_HAND = 1.0  # mm between two pushes
 POSE_WIDTH, FORCE_WIDTH, ROBOT_WIDTH = 7, 3, 8
 
 
@@ -37,7 +39,7 @@ class LogPush:
         return float((self.force if len(self.force) else self.robot)[0, 0])
 
 
-class _Ended(Exception):
+class _EndedError(Exception):
     """The file ends within a push."""
 
 
@@ -61,7 +63,7 @@ class _Lines:
 
     def row(self, width: int, what: str) -> list[float]:
         if not self:
-            raise _Ended
+            raise _EndedError
         number, words = self.lines[self.next]
         self.next += 1
         try:
@@ -83,7 +85,7 @@ class _Lines:
     def table(self, width: int, what: str) -> Array:
         count = self.count(f"the number of {what}s")
         if len(self.lines) - self.next < count:
-            raise _Ended
+            raise _EndedError
         return np.array([self.row(width, what) for _ in range(count)]).reshape(-1, width)
 
 
@@ -103,13 +105,35 @@ def read_log(path: Path, notes: Notes) -> list[LogPush]:
     return pushes
 
 
+def report_oddities(path: Path, pushes: list[LogPush], notes: Notes) -> None:
+    """Tell what is odd about a log's pushes taken together: no forces, held poses, clock set back, moved by hand."""
+    if bare := [push.number for push in pushes if not len(push.force)]:
+        notes.dropped.append(f"{path}: {len(bare)} pushes without forces, normal_force and tangential_force are empty")
+    repeats = sum(int(np.sum(np.all(np.diff(push.robot[:, 1:], axis=0) == 0.0, axis=1))) for push in pushes)
+    if repeats:
+        notes.repaired.append(f"{path}: {repeats} robot poses repeat the one before, not used for the contact time")
+    timed = [push for push in pushes if len(push.force) or len(push.robot)]
+    for one, two in pairwise(timed):
+        if (back := one.time - two.time) > 0.0:
+            notes.repaired.append(
+                f"{path}:{two.line}: after push {one.number} the clock goes back by {back:.0f} s: sessions were "
+                "joined, elapsed_time counts from the earliest"
+            )
+            continue
+        moved = float(np.hypot(*(two.before - one.after)[:2]))
+        if moved > MOVED_BY_HAND:
+            notes.assume(
+                f"{path}:{two.line}: object moved by hand {moved:.1f} mm before push {two.number}, not by a push"
+            )
+
+
 def _pushes(lines: _Lines, notes: Notes) -> list[LogPush]:
     pushes: list[LogPush] = []
     while lines:
         first = lines.line()
         try:
             pushes.append(_push(lines, len(pushes), first))
-        except _Ended:
+        except _EndedError:
             notes.dropped.append(f"{lines.path}:{first}: push {len(pushes)} is cut off by the end of the file")
             break
     return pushes
@@ -118,7 +142,8 @@ def _pushes(lines: _Lines, notes: Notes) -> list[LogPush]:
 def _push(lines: _Lines, number: int, first: int) -> LogPush:
     before = np.array(lines.row(POSE_WIDTH, "the object's pose before the push"))
     after = np.array(lines.row(POSE_WIDTH, "the object's pose after the push"))
-    return LogPush(number, first, before, after, lines.table(FORCE_WIDTH, "force"), lines.table(ROBOT_WIDTH, "robot pose"))
+    force = lines.table(FORCE_WIDTH, "force")
+    return LogPush(number, first, before, after, force, lines.table(ROBOT_WIDTH, "robot pose"))
 
 
 def _text(path: Path) -> str:

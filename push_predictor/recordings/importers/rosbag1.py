@@ -11,6 +11,7 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.cleaning import Samples, in_order, twist
 from push_predictor.recordings.importers.mcube import assemble
 from push_predictor.recordings.importers.mcube_rig import block_of
+from push_predictor.recordings.importers.mlab_bag import TOPICS as MLAB
 from push_predictor.recordings.importers.mlab_bag import read_mlab_bag
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.rosbag1_file import (
@@ -27,10 +28,10 @@ from push_predictor.recordings.streams import Recording
 TRANSFORM = "geometry_msgs/TransformStamped"
 FORCE = "/netft_data"
 TIP = "/tip_pose"
-MLAB = ("/Mocap", FORCE, "/robot_CartesianLog")
 ACCEPTED = (
     f"mcube (/vicon/NAME/NAME {TRANSFORM}, {FORCE} geometry_msgs/WrenchStamped, {TIP} geometry_msgs/PoseStamped) or "
-    f"mlab (/Mocap Mocap/mocap_frame, {FORCE} geometry_msgs/WrenchStamped, /robot_CartesianLog robot_comm/robot_CartesianLog)"
+    f"mlab (/Mocap Mocap/mocap_frame, {FORCE} geometry_msgs/WrenchStamped, /robot_CartesianLog "
+    "robot_comm/robot_CartesianLog)"
 )
 
 
@@ -46,8 +47,7 @@ def import_rosbag1(sources: Sequence[Path], out: Path, rig: Rig | None = None) -
             if body := _vicon_body(topics):
                 staging.recording(read_mcube_bag(path, body, rig, notes), pushes=1)
             elif all(topic in topics for topic in MLAB):
-                messages = bag_messages(path, MLAB)
-                staging.recording(read_mlab_bag(path, *(messages[topic] for topic in MLAB), rig, notes), pushes=0)
+                staging.recording(read_mlab_bag(path, bag_messages(path, MLAB), rig, notes), pushes=0)
             else:
                 found = ", ".join(f"{topic} {kind}" for topic, kind in sorted(topics.items())) or "none"
                 raise ImportSourceError(f"{path}: topics found: {found}; accepted: {ACCEPTED}")

@@ -32,7 +32,9 @@ def bag_topics(path: Path) -> dict[str, str]:
 
 def bag_messages(path: Path, topics: Collection[str]) -> dict[str, list[Stamped]]:
     """All messages of the given topics in the bag's order. Raises ImportSourceError if one cannot be read."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.rosbag1 import ReaderError
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC)
     found: dict[str, list[Stamped]] = {topic: [] for topic in topics}
@@ -46,8 +48,9 @@ def bag_messages(path: Path, topics: Collection[str]) -> dict[str, list[Stamped]
             for c, time, data in reader.messages(connections=wanted):
                 found[c.topic].append(Stamped(time, store.deserialize_ros1(data, _lower_package(c.msgtype))))
                 count += 1
-        except DAMAGE as error:
-            raise ImportSourceError(f"{path}: message {count} cannot be read ({type(error).__name__}: {error})") from None
+        except (ReaderError, SerdeError, TypesysError, *DAMAGE) as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise ImportSourceError(f"{path}: message {count} cannot be read ({reason})") from None
     return found
 
 

@@ -1,0 +1,20 @@
+"""The definition of PushResidual as a bag stores it, so that a recording of residuals explains itself."""
+
+from __future__ import annotations
+
+from push_predictor.recordings.definitions import HEADER_DEFINITION
+
+RESIDUAL_TYPE = "push_predictor_interfaces/msg/PushResidual"
+RESIDUAL_DEFINITION = f"""std_msgs/Header header
+string push_id
+uint32 window
+string model
+float64 velocity
+float64 contact
+float64 angle
+float64 duration
+float64[3] predicted
+float64[9] covariance
+float64[3] observed
+float64[3] standardised
+{HEADER_DEFINITION}"""

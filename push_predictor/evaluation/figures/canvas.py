@@ -1,0 +1,97 @@
+"""What all pictures share: matplotlib, imported only when a picture is drawn, colours, units, saving."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from push_predictor.errors import PushPredictorError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DPI = 160
+UNITS = (1e3, 1e3, 180.0 / np.pi)  # from m, m, rad to what is shown
+UNIT_NAMES = ("mm", "mm", "deg")
+SYMBOLS = (r"$\Delta x$", r"$\Delta y$", r"$\Delta\theta$")
+COLOURS = ("#0072B2", "#D55E00", "#009E73")  # Okabe and Ito: told apart by colour-blind readers
+PREDICTED, OBSERVED, NEARBY, START = "#0072B2", "#D55E00", "#6b6b6b", "#b0b0b0"
+EMPTY = "#ececec"
+STYLE = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": False,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "hatch.color": "#c4c4c4",
+    "hatch.linewidth": 0.6,
+    "legend.frameon": False,
+    "mathtext.fontset": "dejavusans",
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn picture: the file, its text for those who do not see it, and a caption."""
+
+    path: Path
+    alt: str
+    caption: str
+
+
+def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None]) -> Path:
+    """Paint a figure of that size (inches) and write it as PNG; the file appears whole or not at all.
+
+    Raises PushPredictorError if matplotlib is not installed.
+    """
+    try:
+        from matplotlib import rc_context
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise PushPredictorError(
+            f"{path.name}: pictures need matplotlib ({error}); pip install 'push_predictor[report]'"
+        ) from None
+    image = io.BytesIO()
+    with rc_context(STYLE):
+        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        paint(figure)
+        figure.savefig(image, format="png")
+    write_whole(path, image.getvalue())
+    return path
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file by way of a temporary one beside it, so that no reader sees half of it."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def output_label(index: int) -> str:
+    """An output with its unit, for an axis."""
+    return f"{SYMBOLS[index]} ({UNIT_NAMES[index]})"
+
+
+def grid(axes: Axes) -> None:
+    """A faint grid behind the data."""
+    axes.grid(True, linewidth=0.6)

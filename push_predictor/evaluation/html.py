@@ -1,0 +1,109 @@
+"""A page of plain HTML that stands alone: style and pictures are in it, and everything that is shown is escaped."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from push_predictor.evaluation.figures.canvas import Picture
+
+NOTHING = "–"
+STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, -apple-system, "Segoe UI", "Liberation Sans", Arial, sans-serif; color: #1c1c1c;
+  background: #fff; max-width: 62rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; overflow-wrap: break-word; }
+h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .4rem; }
+h2 { font-size: 1.25rem; margin: 2.4rem 0 .6rem; border-bottom: 1px solid #d8d8d8; padding-bottom: .2rem; }
+p, li { max-width: 46rem; }
+.lead { font-size: 1.05rem; }
+.warning { border-left: 4px solid #d55e00; padding: .3rem .8rem; background: #fdf1ea; }
+.table { overflow-x: auto; margin: .8rem 0 1.4rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .95rem; }
+caption { text-align: left; font-size: .9rem; color: #333; padding-bottom: .35rem; max-width: 46rem; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
+td { white-space: nowrap; }
+thead th { border-bottom: 2px solid #888; vertical-align: bottom; font-weight: 600; }
+th:first-child { text-align: left; padding-left: 0; }
+.interval { color: #555; font-size: .85em; display: block; }
+figure { margin: 1rem 0 1.8rem; }
+img { max-width: 100%; height: auto; display: block; }
+figcaption { font-size: .9rem; color: #333; max-width: 46rem; margin-top: .5rem; }
+dl { display: grid; grid-template-columns: minmax(7rem, max-content) 1fr; gap: .15rem 1.2rem; }
+dt { color: #555; }
+dd { margin: 0; }
+@media (max-width: 36rem) {
+  dl { display: block; } dd { margin: 0 0 .4rem; }
+  .picture { overflow-x: auto; } .picture img { max-width: none; width: 44rem; }
+  caption { max-width: calc(100vw - 2rem); }
+}
+"""
+
+
+def page(title: str, parts: Sequence[str]) -> str:
+    """A whole page of parts that are HTML already."""
+    body = "\n".join(parts)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        f"<h1>{escape(title)}</h1>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def heading(text: str) -> str:
+    """A section's heading."""
+    return f"<h2>{escape(text)}</h2>"
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """A paragraph; kind is '', 'lead' or 'warning'."""
+    return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
+
+
+def bullets(texts: Sequence[str]) -> str:
+    """A list."""
+    return "<ul>\n" + "\n".join(f"<li>{escape(text)}</li>" for text in texts) + "\n</ul>"
+
+
+def definitions(facts: Mapping[str, str]) -> str:
+    """Names and what belongs to them."""
+    rows = "\n".join(f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
+    return f"<dl>\n{rows}\n</dl>"
+
+
+def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of text; the first column names the rows, a line break in a cell sets off an interval."""
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    body = "\n".join(f'<tr><th scope="row">{escape(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>' for row in rows)
+    return (
+        f'<div class="table"><table>\n<caption>{escape(caption)}</caption>\n'
+        f"<thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>"
+    )
+
+
+def figure(picture: Picture) -> str:
+    """A picture, embedded, with its caption."""
+    data = base64.b64encode(picture.path.read_bytes()).decode("ascii")
+    return (
+        f'<figure><div class="picture"><img alt="{escape(picture.alt)}" src="data:image/png;base64,{data}"></div>\n'
+        f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
+    )
+
+
+def number(value: float | None) -> str:
+    """Four digits, with a minus sign; a dash for what is not determined."""
+    return NOTHING if value is None else f"{value:.4g}".replace("-", "−")
+
+
+def with_interval(value: float | None, interval: Mapping[str, float | None] | None) -> str:
+    """A number and, on a line of its own, its interval where there is one."""
+    if interval is None:
+        return number(value)
+    return f"{number(value)}\n[{number(interval['low'])}, {number(interval['high'])}]"
+
+
+def _cell(text: str) -> str:
+    value, _, interval = text.partition("\n")
+    beneath = f'<span class="interval">{escape(interval)}</span>' if interval else ""
+    return f"<td>{escape(value)}{beneath}</td>"

@@ -1,0 +1,66 @@
+"""What a replay says about itself: the diagnostics each second and the summary at the end. No ROS here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """State of a replay; late_* in us, behind in s, acknowledged None where nobody has asked yet."""
+
+    recording: str
+    state: str
+    rate: float
+    published: int
+    late_p50: float
+    late_p99: float
+    late_max: float
+    behind: float
+    lost: int
+    acknowledged: bool | None
+    skipped: Mapping[str, str] = field(default_factory=dict)
+    unstamped: Sequence[str] = ()
+    damage: Sequence[str] = ()
+    rig: str = ""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know, most serious first."""
+        said = [f"{self.lost} messages may be lost"] if self.lost else []
+        said += ["not all messages were acknowledged"] if self.acknowledged is False else []
+        said += [f"damaged: {text}" for text in self.damage]
+        said += [f"{self.behind:.3f} s behind"] if self.behind > 0.1 else []
+        said += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
+        said += [f"not restamped: {topic} (its type has no header in front)" for topic in self.unstamped]
+        return said + ([self.rig] if self.rig else [])
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Key and value of each figure, as /diagnostics wants them."""
+        return {
+            "state": self.state,
+            "recording": self.recording,
+            "rate": f"{self.rate:g}",
+            "published": str(self.published),
+            "late_p50_us": f"{self.late_p50:.1f}",
+            "late_p99_us": f"{self.late_p99:.1f}",
+            "late_max_us": f"{self.late_max:.1f}",
+            "behind_s": f"{self.behind:.6f}",
+            "lost": str(self.lost),
+            "acknowledged": {None: "unknown", True: "yes", False: "no"}[self.acknowledged],
+            "not_published": json.dumps(dict(self.skipped)),
+            "damage": "; ".join(self.damage),
+        }
+
+    @property
+    def summary(self) -> str:
+        """One line for the log."""
+        figures = (
+            f"{self.state}: published {self.published} messages of {self.recording} at rate {self.rate:g}, "
+            f"late p50 {self.late_p50:.0f} us, p99 {self.late_p99:.0f} us, max {self.late_max:.0f} us, "
+            f"lost {self.lost}, acknowledged {self.values['acknowledged']}"
+        )
+        return "; ".join([figures, *self.warnings])

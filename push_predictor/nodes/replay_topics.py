@@ -1,0 +1,170 @@
+"""From recorded topics to publishers: types, restamping, sending with back pressure."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import struct
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidTopicNameException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import HistoryPolicy, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+
+from push_predictor.errors import PushPredictorError
+from push_predictor.nodes.qos import overridden, replay_profile
+from push_predictor.nodes.replay_clock import SECOND
+from push_predictor.recordings.bag import RawMessage
+
+OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
+_TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
+_PATIENCE = 0.25  # s a subscriber may hold the replay up before it is left behind
+_FAST = 0.1  # s: a history filled within this time is not overwritten unasked
+
+
+def message_class(kind: str) -> type:
+    """The Python class of a message type such as std_msgs/msg/String. Raises PushPredictorError if there is none."""
+    if not (match := _TYPE.fullmatch(kind)):
+        raise PushPredictorError(f"type {kind!r} is not of the form package/msg/Name")
+    try:
+        found: type = getattr(importlib.import_module(f"{match[1]}.msg"), match[2])
+    except (ImportError, AttributeError) as error:
+        raise PushPredictorError(f"type {kind} is not installed ({error})") from None
+    return found
+
+
+class Restamper:
+    """One offset for the whole replay, so that the first message to go out is stamped as of now."""
+
+    def __init__(self, wall_time: Callable[[], int] = time.time_ns) -> None:
+        self._wall_time = wall_time
+        self.offset: int | None = None
+
+    def settle(self, log_time: int) -> None:
+        """Fix the offset, if this is the first message."""
+        if self.offset is None:
+            self.offset = self._wall_time() - log_time
+
+    def restamped(self, data: bytes) -> bytes:
+        """CDR of a message that begins with a header: bytes 4..11 are its stamp, in the byte order byte 1 names."""
+        order = "<" if data[1] & 1 else ">"
+        seconds, nanoseconds = struct.unpack_from(f"{order}iI", data, 4)
+        stamp = divmod(seconds * SECOND + nanoseconds + (self.offset or 0), SECOND)
+        return data[:4] + struct.pack(f"{order}iI", *stamp) + data[12:]
+
+
+class TopicSender:
+    """Publishes one topic's serialized messages; overwritten: messages a subscriber may have lost to KEEP_LAST."""
+
+    def __init__(self, publisher: Publisher, restamper: Restamper | None) -> None:
+        self.publisher = publisher
+        self.overwritten = 0
+        self._restamper = restamper
+        profile = publisher.qos_profile
+        bounded = profile.history == HistoryPolicy.KEEP_LAST and profile.reliability == ReliabilityPolicy.RELIABLE
+        self._depth = profile.depth if bounded else 0
+        self._sent, self._since = 0, time.monotonic()
+
+    def send(self, message: RawMessage) -> None:
+        """Publish. Raises RCLError or struct.error if that cannot be done."""
+        if self._restamper is not None:
+            self._restamper.settle(message.log_time)
+            self.publisher.publish(self._restamper.restamped(message.data))
+        else:
+            self.publisher.publish(message.data)
+        self._sent += 1
+        if self._depth and self._sent >= self._depth:
+            self._hold_back()
+
+    def acknowledged(self) -> bool:
+        """Has every matched reliable subscriber got everything?"""
+        # Always with timeout 0: the call keeps the interpreter lock, so a wait here would stop every thread.
+        return bool(self.publisher.wait_for_all_acked(Duration(seconds=0)))
+
+    def _hold_back(self) -> None:
+        """At high rates, wait for the readers before the history overwrites what they have not got yet."""
+        now = time.monotonic()
+        if now - self._since < _FAST:
+            while not (done := self.acknowledged()) and time.monotonic() - now < _PATIENCE:
+                time.sleep(0.0002)
+            self.overwritten += 0 if done else self._sent
+        self._sent, self._since = 0, time.monotonic()
+
+
+class ReplayTopics:
+    """The publishers of a replay.
+
+    senders: {recorded topic: sender}; skipped: {recorded topic: why it is not published}; unstamped: topics that
+    restamping leaves as recorded, because their type does not begin with a header.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topics: Mapping[str, str],
+        recorded_qos: Mapping[str, str],
+        overrides: Mapping[str, Mapping[str, Any]],
+        restamper: Restamper | None,
+    ) -> None:
+        self._node, self._qos, self._overrides, self._restamper = node, recorded_qos, overrides, restamper
+        self.senders: dict[str, TopicSender] = {}
+        self.skipped: dict[str, str] = {}
+        self.unstamped: list[str] = []
+        for topic, kind in topics.items():
+            self._open(topic, kind)
+
+    def send(self, message: RawMessage) -> bool:
+        """Publish a message; False if that failed."""
+        try:
+            self.senders[message.topic].send(message)
+        except (rclpy_implementation.RCLError, struct.error, IndexError) as error:
+            self._node.get_logger().error(
+                f"{message.topic}: a message of {len(message.data)} bytes cannot be published ({error})",
+                throttle_duration_sec=5.0,
+            )
+            return False
+        return True
+
+    def acknowledged(self) -> bool:
+        """Have all matched reliable subscribers got everything?"""
+        return all(sender.acknowledged() for sender in self.senders.values())
+
+    @property
+    def overwritten(self) -> int:
+        """Messages that a subscriber may have lost, because it did not acknowledge in time."""
+        return sum(sender.overwritten for sender in self.senders.values())
+
+    def _open(self, topic: str, kind: str) -> None:
+        name = topic.lstrip("/")
+        if name in OWN_TOPICS:
+            self.skipped[topic] = "push_replay publishes this topic itself"
+            return
+        try:
+            found = message_class(kind)
+        except PushPredictorError as error:
+            self.skipped[topic] = str(error)
+            return
+        stamped = list(found.get_fields_and_field_types().values())[:1] == ["std_msgs/Header"]  # type: ignore[attr-defined]
+        if self._restamper is not None and not stamped:
+            self.unstamped.append(topic)
+        try:
+            publisher = self._publisher(topic, name, found)
+        except InvalidTopicNameException as error:
+            self.skipped[topic] = " ".join(str(error).split())
+            return
+        self.senders[topic] = TopicSender(publisher, self._restamper if stamped else None)
+
+    def _publisher(self, topic: str, name: str, found: type) -> Publisher:
+        overrides = self._overrides.get(topic.strip("/"), {})
+        profile = overridden(replay_profile(self._qos.get(topic, "")), overrides, topic)
+        try:
+            options = QoSOverridingOptions.with_default_policies()
+            return self._node.create_publisher(found, name, profile, qos_overriding_options=options)
+        except (InvalidQosOverridesError, ParameterException, RuntimeError, TypeError) as error:
+            raise PushPredictorError(f"qos_overrides.{topic}.publisher: {error}, give a QoS policy") from None

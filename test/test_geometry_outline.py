@@ -1,0 +1,205 @@
+"""Outlines: contacts, normals, nearest points and symmetry agree with the shapes' own geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import ellipe
+
+from push_predictor.errors import RigError
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
+
+TRIANGLE = Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))
+ELL = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.1], [0.0, 0.1]]))
+OUTLINES = {name: shape_outline(name) for name in SHAPES} | {"triangle": TRIANGLE, "ell": ELL}
+EVERY_OUTLINE = pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
+CONVEX = pytest.mark.parametrize("name", [name for name in OUTLINES if name != "ell"])
+
+some_outline = st.sampled_from(list(OUTLINES.values()))
+contacts = st.floats(0.0, 1.0, exclude_max=True)
+GRID = (np.arange(400) + 0.37) / 400
+
+
+@EVERY_OUTLINE
+def test_contacts_run_counter_clockwise_at_even_speed(outline):
+    fine = np.arange(4000) / 4000
+    points = outline.point(fine)
+    steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    expected = outline.perimeter / 4000
+    assert np.quantile(np.abs(steps - expected), 0.99) < 2e-4 * expected  # all but the steps across a corner
+    assert np.sum(steps) == pytest.approx(outline.perimeter, rel=1e-3)
+    area = 0.5 * np.sum(points[:, 0] * np.roll(points[:, 1], -1) - np.roll(points[:, 0], -1) * points[:, 1])
+    assert area == pytest.approx(outline.area, rel=1e-3)
+
+
+@EVERY_OUTLINE
+def test_the_first_contact_is_the_first_vertex(outline):
+    assert outline.point(np.zeros(1))[0] == pytest.approx(outline.vertices[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.0525, 0.0525), (0.0785, 0.0525), (0.03, 0.06)])
+def test_perimeter_and_area_of_an_ellipse_are_those_of_the_curve(a, b):
+    outline, large, small = ellipse(a, b), max(a, b), min(a, b)
+    assert outline.perimeter == pytest.approx(4.0 * large * ellipe(1.0 - (small / large) ** 2), rel=1e-6)
+    assert outline.area == pytest.approx(np.pi * a * b)
+
+
+@EVERY_OUTLINE
+def test_inward_normals_have_length_one_stand_on_the_outline_and_point_in(outline):
+    normal, point = outline.inward_normal(GRID), outline.point(GRID)
+    along = outline.point(GRID + 1e-6) - outline.point(GRID - 1e-6)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0)
+    assert np.abs(np.sum(normal * along, axis=1)).max() < 1e-4
+    assert np.all(outline.project(point + 1e-4 * normal).distance < 0.0)
+    assert np.all(outline.project(point - 1e-4 * normal).distance > 0.0)
+
+
+@pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
+@pytest.mark.parametrize("offset", [-0.002, 0.0, 0.003])
+def test_a_point_off_the_outline_projects_back_to_its_contact(outline, offset):
+    near_corner = np.min(np.abs(GRID[:, None] - outline.edge_starts[None]), axis=1) * outline.perimeter < 0.006
+    contact = GRID if outline.semi_axes is not None else GRID[~near_corner]
+    foot = outline.point(contact)
+    found = outline.project(foot - offset * outline.inward_normal(contact))
+    assert found.contact == pytest.approx(contact, abs=2e-7)
+    assert found.point == pytest.approx(foot, abs=1e-9)
+    assert found.distance == pytest.approx(offset, abs=1e-9)
+    assert found.normal == pytest.approx(-outline.inward_normal(contact), abs=1e-6)
+
+
+@settings(max_examples=200, deadline=None)
+@given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
+def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
+    point = np.array([[x, y]])
+    found = outline.project(point)
+    boundary = outline.point(np.arange(3000) / 3000)
+    nearest = np.min(np.linalg.norm(boundary - point, axis=1))
+    assert abs(found.distance[0]) <= nearest + 1e-9
+    assert abs(found.distance[0]) >= nearest - outline.perimeter / 3000
+    assert np.linalg.norm(found.point - point) == pytest.approx(abs(found.distance[0]), abs=1e-9)
+    assert 0.0 <= found.contact[0] < 1.0
+
+
+@settings(max_examples=200, deadline=None)
+@given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
+def test_outside_the_normal_points_from_the_nearest_point_to_the_query(outline, x, y):
+    point = np.array([[x, y]])
+    found = outline.project(point)
+    if found.distance[0] > 1e-6:
+        assert found.point + found.distance[:, None] * found.normal == pytest.approx(point, abs=1e-9)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.0785, 0.0525), (0.0525, 0.0525), (0.03, 0.06), (0.1, 0.02)])
+def test_an_ellipse_is_projected_on_from_deep_inside_and_from_its_axes(a, b):
+    outline, draw = ellipse(a, b), np.random.default_rng(0).uniform(-0.12, 0.12, (400, 2))
+    points = np.vstack([draw, draw * [1.0, 0.0], draw * [0.0, 1.0], draw * [1.0, 1e-5], np.zeros((1, 2))])
+    boundary = outline.point(np.arange(2000) / 2000)
+    nearest = np.min(np.linalg.norm(points[:, None] - boundary, axis=2), axis=1)
+    found = outline.project(points)
+    assert np.all(np.abs(found.distance) <= nearest + 1e-9)
+    assert np.linalg.norm(found.point - points, axis=1) == pytest.approx(np.abs(found.distance), abs=1e-9)
+
+
+def test_at_a_corner_the_normal_turns_from_one_edge_to_the_next():
+    outline, corner = square(0.09), np.array([-0.045, -0.045])
+    angles = np.linspace(np.pi, 1.5 * np.pi, 9)[1:-1]
+    found = outline.project(corner + 0.005 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    assert np.all(found.at_vertex)
+    assert found.point == pytest.approx(np.tile(corner, (7, 1)))
+    assert np.unwrap(np.arctan2(found.normal[:, 1], found.normal[:, 0])) % (2 * np.pi) == pytest.approx(angles)
+    assert found.distance == pytest.approx(0.005)
+
+
+@CONVEX
+@given(st.floats(0.001, 0.02), contacts)
+@settings(max_examples=30, deadline=None)
+def test_sliding_along_changes_the_distance_by_nothing(name, radius, contact):
+    outline = OUTLINES[name]
+    at = outline.point(np.array([contact])) - radius * outline.inward_normal(np.array([contact]))
+    assert outline.project(at).distance[0] == pytest.approx(radius, abs=1e-9)
+
+
+@settings(deadline=None)
+@given(some_outline, contacts)
+def test_edge_and_fraction_make_the_contact(outline, contact):
+    edge, fraction = outline.edge(np.array([contact]))
+    assert 0.0 <= fraction[0] <= 1.0
+    assert outline.contact_on_edge(int(edge[0]), float(fraction[0])) == pytest.approx(contact, abs=1e-12)
+
+
+def test_edges_of_a_polygon_share_the_perimeter_by_their_length():
+    legs = 0.15 / TRIANGLE.perimeter
+    assert np.diff(TRIANGLE.edge_starts) == pytest.approx([legs, np.sqrt(2.0) * legs, legs])
+
+
+@EVERY_OUTLINE
+def test_the_end_of_an_edge_stays_on_that_edge(outline):
+    for edge in range(len(outline.edge_starts) - 1):
+        contact = outline.contact_on_edge(edge, 1.0)
+        assert outline.edge(np.array([contact]))[0][0] == edge
+        assert contact < 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [("rect1", 4), ("ellip1", 0), ("ellip2", 2), ("ellip3", 2), ("hex", 6), ("triangle", 1), ("ell", 1)],
+)
+def test_rotational_symmetry(name, order):
+    assert OUTLINES[name].rotational_symmetry == order
+
+
+def test_a_rectangle_has_half_turn_symmetry_and_an_off_centre_square_none():
+    rectangle = np.array([[-0.06, 0.03], [-0.06, -0.03], [0.06, -0.03], [0.06, 0.03]])
+    assert Outline(rectangle).rotational_symmetry == 2
+    assert Outline(square(0.09).vertices + 0.01).rotational_symmetry == 1
+
+
+@pytest.mark.parametrize("name", ["rect1", "ellip3", "hex"])
+def test_a_symmetric_outline_repeats_after_its_share_of_the_perimeter(name):
+    outline = OUTLINES[name]
+    turn = np.array(2.0 * np.pi / outline.rotational_symmetry)
+    later = (GRID + 1.0 / outline.rotational_symmetry) % 1.0
+    assert outline.point(later) == pytest.approx(rotate(outline.point(GRID), turn), abs=1e-9)
+    assert outline.inward_normal(later) == pytest.approx(rotate(outline.inward_normal(GRID), turn), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_shapes_of_the_set_lie_about_their_centroid(name):
+    assert shape_outline(name).centroid == pytest.approx([0.0, 0.0], abs=1e-15)
+
+
+def test_the_centroid_moves_with_the_outline():
+    assert TRIANGLE.centroid == pytest.approx([0.0, 0.0], abs=1e-15)
+    assert Outline(TRIANGLE.vertices + [0.3, -0.2]).centroid == pytest.approx([0.3, -0.2])
+    parts = np.array([[0.05, 0.02], [0.02, 0.07]]), np.array([0.1 * 0.04, 0.04 * 0.06])
+    assert ELL.centroid == pytest.approx(np.average(parts[0], axis=0, weights=parts[1]))
+
+
+def test_the_first_edge_of_the_square_faces_the_negative_x_axis():
+    outline = shape_outline("rect1")
+    assert outline.inward_normal(np.array([0.125]))[0] == pytest.approx([1.0, 0.0])
+    assert outline.point(np.array([0.125]))[0] == pytest.approx([-0.045, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("vertices", "message"),
+    [
+        ([[0.0, 0.0], [1.0, 0.0]], "at least three"),
+        ([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]], "clockwise"),
+        ([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], "enclose nothing"),
+        ([[0.0, 0.0], [1.0, np.nan], [0.0, 1.0]], "not finite"),
+    ],
+)
+def test_an_outline_that_is_none_is_refused(vertices, message):
+    with pytest.raises(RigError, match=message):
+        Outline(np.array(vertices))
+
+
+def test_an_unknown_shape_is_refused_by_name():
+    with pytest.raises(RigError, match="heptagon"):
+        shape_outline("heptagon")
