@@ -23,12 +23,12 @@ setup(
         # pip puts the executables into bin/ only; `ros2 run` looks here
         (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
     ],
-    install_requires=["numpy>=1.26", "scipy>=1.11", "mcap>=1.2", "mcap-ros2-support>=0.5", "PyYAML>=6"],
+    install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4"],
     extras_require={
         "report": ["matplotlib>=3.8"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
-        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6", "ruff>=0.6", "mypy>=1.11", "scikit-learn>=1.5"],
+        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6", "ruff>=0.6", "mypy>=1.11", "scikit-learn>=1.4", "mcap-ros2-support>=0.5"],
     },
     entry_points={
         "console_scripts": [

@@ -10,6 +10,7 @@ import pickle
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 
 import rclpy
@@ -40,10 +41,19 @@ def main(output: str, depth: str, *topics: str) -> None:
     spinner = threading.Thread(target=executor.spin)
     spinner.start()
     done.wait()
+    while _still_hearing(heard):
+        pass
     executor.shutdown()
     spinner.join()
     Path(output).write_bytes(pickle.dumps(heard))
     rclpy.try_shutdown()
+
+
+def _still_hearing(heard: dict[str, list[bytes]]) -> bool:
+    """Has anything come within half a second? What is in DDS by now is taken at the pace of Python."""
+    before = sum(map(len, heard.values()))
+    time.sleep(0.5)
+    return sum(map(len, heard.values())) > before
 
 
 def _keep(heard: list[bytes], data: bytes) -> None:

@@ -87,10 +87,15 @@ def test_rows_are_sorted_and_repeated_stamps_dropped_and_both_are_told() -> None
     )
 
 
-def test_of_a_stair_only_the_first_row_of_each_step_stays_and_rest_stays_whole() -> None:
-    x = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 4.0, 4.0])
-    kept = without_held(Samples(np.arange(13), x[:, None]), "tip", Notes())
-    assert kept.stamp.tolist() == [0, 1, 2, 3, 4, 6, 8, 9, 10, 11, 12]
+def test_of_a_stair_only_the_first_row_of_each_step_stays_and_rest_keeps_the_pace_of_the_steps() -> None:
+    x = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0])
+    kept = without_held(Samples(np.arange(14), x[:, None]), "tip", Notes())
+    assert kept.stamp.tolist() == [0, 2, 4, 6, 8, 11, 12]
+
+
+def test_a_stream_without_stairs_keeps_its_rest() -> None:
+    x = np.concatenate([np.zeros(9), np.arange(1.0, 20.0), np.full(9, 19.0)])
+    assert len(without_held(Samples(np.arange(37), x[:, None]), "tip", Notes()).stamp) == 37
 
 
 @given(st.floats(1.0e9, 2.0e9))

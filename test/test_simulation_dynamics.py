@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.simulation.dynamics import DAMPING, GRAVITY, STIFFNESS, Motion, Physics, run
+from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run
+from push_predictor.simulation.physics import GRAVITY, Physics
 from push_predictor.simulation.pushes import PusherPath, PushPlan, pusher_path, random_pushes
+from push_predictor.simulation.scatter import no_scatter
 from push_predictor.simulation.slider import Slider, polar_moment, slider_named, support_points
 from push_predictor.simulation.surface import uniform_field
 from push_predictor.types import Array
@@ -32,6 +34,8 @@ def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, frictio
         shares=np.full((n, len(points)), 1.0 / len(points)),
         contact_friction=np.full(n, contact_friction),
         surface=uniform_field(friction),
+        pressure=no_scatter(n, len(points)),
+        rubbing=no_scatter(n, 1),
     )
 
 

@@ -8,7 +8,8 @@ import pytest
 from push_predictor.recordings.table import PushTable
 from push_predictor.simulation.pushes import grid_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes
-from push_predictor.simulation.slider import built_shares, pressure_shares, slider_named, support_points
+from push_predictor.simulation.scatter import KNOT, LASTING, mixed
+from push_predictor.simulation.slider import built_shares, pressure_patterns, slider_named, support_points
 from push_predictor.simulation.surface import CELL, SURFACES, friction_field, uniform_field
 from push_predictor.types import Array
 
@@ -69,11 +70,32 @@ def test_between_grid_points_friction_is_linear_and_beyond_the_table_it_is_the_r
     assert uniform_field(0.3).at(np.array([9.0]), np.array([-9.0])) == pytest.approx(0.3)
 
 
-def test_loads_are_shares_of_the_weight_and_nearly_even_on_average() -> None:
+def test_the_slider_is_made_nearly_even() -> None:
     points = support_points(slider_named("rect1").outline)
-    shares = pressure_shares(points, built_shares(points, 0), 0.4, 4000, [1, 2])
+    shares = np.array([built_shares(points, seed) for seed in range(50)])
     assert np.allclose(np.sum(shares, axis=1), 1.0)
     assert np.all(shares > 0.0)
     centre = shares @ points
-    assert np.linalg.norm(np.mean(centre, axis=0)) < 0.005
-    assert np.all(np.std(centre, axis=0) > 0.003)
+    assert 0.0005 < np.sqrt(np.mean(centre**2)) < 0.005
+
+
+def test_pressure_varies_by_as_much_as_asked_at_every_way_of_the_tip() -> None:
+    points, rng = support_points(slider_named("rect1").outline), np.random.default_rng(1)
+    patterns = pressure_patterns(points, 2000 * 6, rng).reshape(2000, 6, -1)
+    scatter = mixed(patterns)
+    for way in (0.0, 0.5 * KNOT, 2.3 * KNOT, 9.0 * KNOT):
+        assert np.sqrt(np.mean(scatter.at(np.full(2000, way)) ** 2)) == pytest.approx(1.0, rel=0.03)
+    near, far = (
+        np.mean(scatter.at(np.zeros(2000)) * scatter.at(np.full(2000, way))) for way in (0.3 * KNOT, 2.0 * KNOT)
+    )
+    assert near > 0.8
+    assert far == pytest.approx(LASTING, abs=0.05)
+
+
+def test_along_a_push_the_scatter_is_partly_lasting_partly_new() -> None:
+    plan = grid_pushes([0.125], [0.0], 200, travel=0.03)
+    table = push_outcomes(SimulationSpec("rect1", "abs", plan, seed=2, place_spread=0.0, turn_spread=0.0))
+    push = table.push_id.astype(int)
+    turn = np.array([table.outcomes[push == k][:4, 2] for k in np.unique(push)])
+    correlation = np.corrcoef(turn.T)[0, 1:]
+    assert np.all(np.abs(correlation) < 0.8)

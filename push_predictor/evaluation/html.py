@@ -18,11 +18,10 @@ h2 { font-size: 1.25rem; margin: 2.4rem 0 .6rem; border-bottom: 1px solid #d8d8d
 p, li { max-width: 46rem; }
 .lead { font-size: 1.05rem; }
 .warning { border-left: 4px solid #d55e00; padding: .3rem .8rem; background: #fdf1ea; }
-.table { overflow-x: auto; margin: .8rem 0 1.4rem; }
+.table { overflow-x: auto; margin-top: .3rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .95rem; }
-caption { text-align: left; font-size: .9rem; color: #333; padding-bottom: .35rem; max-width: 46rem; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
-td { white-space: nowrap; }
+td, tbody th { white-space: nowrap; }
 thead th { border-bottom: 2px solid #888; vertical-align: bottom; font-weight: 600; }
 th:first-child { text-align: left; padding-left: 0; }
 .interval { color: #555; font-size: .85em; display: block; }
@@ -35,7 +34,6 @@ dd { margin: 0; }
 @media (max-width: 36rem) {
   dl { display: block; } dd { margin: 0 0 .4rem; }
   .picture { overflow-x: auto; } .picture img { max-width: none; width: 44rem; }
-  caption { max-width: calc(100vw - 2rem); }
 }
 """
 
@@ -77,8 +75,8 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> s
     top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
     body = "\n".join(f'<tr><th scope="row">{escape(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>' for row in rows)
     return (
-        f'<div class="table"><table>\n<caption>{escape(caption)}</caption>\n'
-        f"<thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>"
+        f'<figure><figcaption>{escape(caption)}</figcaption>\n<div class="table"><table>\n'
+        f"<thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div></figure>"
     )
 
 
@@ -91,16 +89,9 @@ def figure(picture: Picture) -> str:
     )
 
 
-def number(value: float | None) -> str:
-    """Four digits, with a minus sign; a dash for what is not determined."""
-    return NOTHING if value is None else f"{value:.4g}".replace("-", "−")
-
-
-def with_interval(value: float | None, interval: Mapping[str, float | None] | None) -> str:
-    """A number and, on a line of its own, its interval where there is one."""
-    if interval is None:
-        return number(value)
-    return f"{number(value)}\n[{number(interval['low'])}, {number(interval['high'])}]"
+def number(value: float | None, digits: int = 4) -> str:
+    """So many significant digits, with a minus sign; a dash for what is not determined."""
+    return NOTHING if value is None else f"{value:.{digits}g}".replace("-", "−")
 
 
 def _cell(text: str) -> str:

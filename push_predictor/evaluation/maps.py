@@ -100,9 +100,13 @@ def fine_cells(outline: Outline, table: PushTable) -> Cells:
 
 
 def coarse_cells(outline: Outline, table: PushTable) -> Cells:
-    """Cells for recorded maps of these rows, over the same ranges: as many as leave about nine windows to each."""
-    count = int(np.clip(round(np.sqrt(len(table) / WINDOWS_PER_CELL)), 1, MOST_CELLS))
-    return _cells(outline, table, count, count)
+    """Cells for recorded maps of these rows, over the same ranges: as many as leave about nine windows to each.
+
+    Contacts on a circle are not told apart.
+    """
+    wanted = len(table) / WINDOWS_PER_CELL
+    along = 1 if outline.rotational_symmetry == 0 else _whole(np.sqrt(wanted))
+    return _cells(outline, table, along, _whole(wanted / along))
 
 
 def push_map(model: PushModel, velocity: float, duration: float, cells: Cells) -> PushMap:
@@ -152,6 +156,10 @@ def _commonest(values: Array) -> BoolArray:
     counts = np.searchsorted(ordered, high, side="right") - np.searchsorted(ordered, low, side="left")
     chosen = np.argmax(counts)
     return np.asarray((values >= low[chosen]) & (values <= high[chosen]))
+
+
+def _whole(count: float) -> int:
+    return int(np.clip(round(count), 1, MOST_CELLS))
 
 
 def _cells(outline: Outline, table: PushTable, along_contact: int, along_angle: int) -> Cells:

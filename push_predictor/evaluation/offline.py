@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
@@ -48,13 +48,18 @@ def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tupl
 
 
 def report_windows(
-    models: Sequence[PushModel], windows: Sequence[PushWindow], comparisons: Sequence[Comparison], out: Path, name: str
+    models: Sequence[PushModel],
+    windows: Sequence[PushWindow],
+    comparisons: Sequence[Comparison],
+    out: Path,
+    name: str,
+    more: Mapping[str, str] | None = None,
 ) -> Path:
-    """The same for windows that were predicted already, by a server for instance."""
+    """The same for windows that were predicted already, by a server for instance; more: further facts for the page."""
     from push_predictor.evaluation.report import write_validation_report  # matplotlib: only where pictures are made
 
     table = windows_to_table(windows)
     seen = trained_on(models[0], table)
     split = f"{len(seen)} of the pushes were trained on" if seen else "pushes that were not trained on, kept whole"
-    facts = {"recording": name, "split": split}
+    facts = {"recording": name, "split": split, **(more or {})}
     return write_validation_report(out, f"Validation on {name}", table, windows, models, comparisons, facts, ())

@@ -18,7 +18,8 @@ from push_predictor.types import Array
 # Logarithms, for inputs and outputs of unit spread.
 _LENGTHSCALE_BOUNDS = (np.log(1e-2), np.log(1e3))
 _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
-_NOISE_BOUNDS = (np.log(1e-3), np.log(1e1))
+# Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
+_NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
 
 

@@ -20,7 +20,7 @@ from push_predictor.types import Array
 _LENGTHSCALES = (np.log(1e-2), np.log(1e3))
 _SIGNAL_SD = (np.log(1e-3), np.log(1e2))
 _NOISE_SD = (np.log(1e-3), np.log(3.0))
-_NOISE_MEAN = (np.log(1e-8), np.log(1e2))
+_NOISE_MEAN = (np.log(1e-8), np.inf)  # open, see gp.py
 _REFUSED = 1e10
 _SEARCH_TOLERANCE = 2e-2  # nats
 _FINAL_TOLERANCE = 1e-9

@@ -24,8 +24,8 @@ from push_predictor.recordings.bag import RawMessage
 
 OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
-_PATIENCE = 0.25  # s a subscriber may hold the replay up before it is left behind
-_FAST = 0.1  # s: a history filled within this time is not overwritten unasked
+_PATIENCE = 1.0  # s a subscriber may hold the replay up before it is left behind
+_FAST = 0.8  # s: a history filled within this time is not overwritten unasked
 
 
 def message_class(kind: str) -> type:

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.simulation.dynamics import GRAVITY, Motion, run, steps_of
+from push_predictor.simulation.dynamics import Motion, run, steps_of
+from push_predictor.simulation.physics import GRAVITY
 from push_predictor.simulation.pushes import PusherPath, pusher_path
-from push_predictor.simulation.spec import SimulationSpec, physics_of, start_poses
+from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, physics_of, start_poses
 from push_predictor.types import Array, IntArray
 
 LOCKSTEP = 256  # pushes; their arrays stay in the cache
@@ -30,8 +31,9 @@ class Batch:
 
 def run_pushes(spec: SimulationSpec) -> Iterator[Batch]:
     """Simulate all pushes of a spec. Raises RigError for an unknown shape or surface."""
-    physics, start = physics_of(spec), start_poses(spec)
-    path = pusher_path(spec.pushes, physics.outline, physics.radius, start, spec.acceleration)
+    start = start_poses(spec)
+    path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, start, spec.acceleration)
+    physics = physics_of(spec, float(np.max(path.length)))
     end = _end_times(path, spec.table.friction)
     order = np.argsort(end / steps_of(path), kind="stable")
     for rows in np.split(order, range(LOCKSTEP, len(order), LOCKSTEP)):

@@ -2,7 +2,7 @@
 
 Planar rigid bodies on support points with Coulomb friction, each pushed by a position-controlled rod. Backward
 Euler in the velocities, so that both stiff parts (friction near rest, contact) are stable at any step:
-friction enters as a drag load / speed, iterated to its fixed point; the contact is a spring and damper along the
+friction enters as a drag grip / speed, iterated to its fixed point; the contact is a spring and damper along the
 normal and Coulomb friction across it, solved in closed form for stick, slide or no contact.
 """
 
@@ -13,12 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.geometry.outline import Outline
+from push_predictor.simulation.physics import Physics
 from push_predictor.simulation.pushes import PusherPath
-from push_predictor.simulation.surface import FrictionField
 from push_predictor.types import Array
 
-GRAVITY = 9.81  # m/s^2
 WAY_STEP = 4e-5  # m that a tip goes in a step
 LONGEST_STEP = 0.004  # s
 DRAG_ITERATIONS = 2
@@ -26,37 +24,6 @@ REST_SPEED = 1e-4  # m/s; Coulomb friction is smoothed below it
 STIFFNESS = 1e5  # N/m, of rod and slider along the normal
 DAMPING = 400.0  # N s/m; overdamped for a kilogram, the touch does not bounce
 SMALLEST_RESPONSE = 1e-9  # 1/kg; keeps a jammed slide finite
-
-
-@dataclass(frozen=True, eq=False)
-class Physics:
-    """What moves n sliders, per push wherever it may differ from push to push.
-
-    mass (n,) kg, inertia (n,) kg m^2, support (k, 2) m in the body frame, shares (n, k) of the weight,
-    contact_friction (n,), surface: friction coefficients of the table, radius: of the rod, m.
-    """
-
-    outline: Outline
-    radius: float
-    mass: Array
-    inertia: Array
-    support: Array
-    shares: Array
-    contact_friction: Array
-    surface: FrictionField
-
-    def take(self, rows: np.ndarray) -> Physics:
-        """The given pushes."""
-        return Physics(
-            self.outline,
-            self.radius,
-            self.mass[rows],
-            self.inertia[rows],
-            self.support,
-            self.shares[rows],
-            self.contact_friction[rows],
-            self.surface,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +96,8 @@ def run(
     rows = [(pose, tip, wrench)]
     for step in range(1, int(np.ceil(np.max(duration / dt))) + 1):
         ahead = path.position(step * dt)
-        speed, wrench = _advance(physics, pose, speed, tip, (ahead - tip) / dt[:, None], dt)
+        way = np.hypot(*(tip - path.start).T)
+        speed, wrench = _advance(physics, pose, speed, tip, way, (ahead - tip) / dt[:, None], dt)
         pose, tip = pose + dt[:, None] * speed, ahead
         rows.append((pose, tip, wrench))
     time = dt[:, None] * np.arange(len(rows))
@@ -137,18 +105,17 @@ def run(
 
 
 def _advance(
-    physics: Physics, pose: Array, velocity: Array, tip: Array, drive: Array, dt: Array
+    physics: Physics, pose: Array, velocity: Array, tip: Array, way: Array, drive: Array, dt: Array
 ) -> tuple[Array, Array]:
     """New velocities (n, 3) and the wrench on the tip (n, 3) after a step with the tip at velocity drive (n, 2)."""
     contact = _contact(physics, pose, tip, drive)
     arms = _arms(physics.support, pose[:, 2])
-    weight = physics.shares * (physics.mass * GRAVITY)[:, None]
-    load = weight * physics.surface.at(pose[:, :1] + arms[0], pose[:, 1:2] + arms[1])
+    grip, friction = physics.grip(pose[:, :1] + arms[0], pose[:, 1:2] + arms[1], way), physics.friction_at_rod(way)
     momentum = velocity * np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
     new = velocity
     for _ in range(DRAG_ITERATIONS):
-        drag = _drag(physics, load, arms, new, dt)
-        new, push, rub = _with_contact(drag, momentum, contact, physics.contact_friction, dt)
+        drag = _drag(physics, grip, arms, new, dt)
+        new, push, rub = _with_contact(drag, momentum, contact, friction, dt)
     across = np.stack([-contact.outward[:, 1], contact.outward[:, 0]], axis=1)
     force = (push[:, None] * contact.outward - rub[:, None] * across) / dt[:, None]
     return new, np.column_stack([force, physics.radius * rub / dt])
@@ -159,11 +126,11 @@ def _arms(support: Array, heading: Array) -> tuple[Array, Array]:
     return cos * support[:, 0] - sin * support[:, 1], sin * support[:, 0] + cos * support[:, 1]
 
 
-def _drag(physics: Physics, load: Array, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
+def _drag(physics: Physics, grip: Array, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
     x, y = arms
     vx = velocity[:, :1] - velocity[:, 2:] * y
     vy = velocity[:, 1:2] + velocity[:, 2:] * x
-    rate = load / np.sqrt(vx * vx + vy * vy + REST_SPEED**2)
+    rate = grip / np.sqrt(vx * vx + vy * vy + REST_SPEED**2)
     along_x, along_y = rate * x, rate * y
     turn = np.sum(along_x * x + along_y * y, axis=1)
     return _Drag(

@@ -59,22 +59,19 @@ def support_points(outline: Outline) -> Array:
 
 def built_shares(points: Array, seed: int) -> Array:
     """Load shares (k,), summing to one, of the slider as it was made: nearly uniform, slightly lopsided."""
-    even = np.full(len(points), 1.0 / len(points))
-    return np.asarray(pressure_shares(points, even, BUILD_TILT, 1, [seed, 2])[0])
+    load = np.exp(BUILD_TILT * pressure_patterns(points, 1, np.random.default_rng([seed, 2]))[0])
+    return np.asarray(load / np.sum(load))
 
 
-def pressure_shares(points: Array, mean: Array, variation: float, n: int, seed: list[int]) -> Array:
-    """Load shares (n, k), rows summing to one, scattered about mean (k,).
+def pressure_patterns(points: Array, n: int, rng: np.random.Generator) -> Array:
+    """Deviations (n, k) of the logarithm of the load on points (k, 2), of unit variance over points and draws.
 
-    The log load varies by `variation`: half of its variance tilts the pressure across the slider, a quarter bends
-    it (rims against middle, saddle), a quarter belongs to each point alone.
+    Half of the variance tilts the pressure across the slider, a quarter bends it (rim against middle, saddle), a
+    quarter belongs to each point alone.
     """
-    rng = np.random.default_rng(seed)
     scaled = points / np.sqrt(np.mean(points**2))
     bends = np.stack([np.sum(scaled**2, axis=1) - 2.0, scaled[:, 0] * scaled[:, 1]])
     tilt = rng.standard_normal((n, 2)) @ scaled.T / np.sqrt(2.0)
     bend = rng.standard_normal((n, 2)) @ bends / np.sqrt(2.0 * np.mean(bends**2))
     each = rng.standard_normal((n, len(points)))
-    log_load = variation * (np.sqrt(0.5) * tilt + 0.5 * bend / np.sqrt(2.0) + 0.5 * each)
-    load = mean * np.exp(log_load)
-    return np.asarray(load / np.sum(load, axis=1, keepdims=True))
+    return np.asarray(np.sqrt(0.5) * tilt + 0.5 * bend + 0.5 * each)

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from push_predictor.recordings.rig import Rig
-from push_predictor.simulation.dynamics import Physics
+from push_predictor.simulation.physics import Physics
 from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.scatter import Scatter, knots_for, mixed
 from push_predictor.simulation.sensors import Sensors
 from push_predictor.simulation.slider import (
     Slider,
     built_shares,
-    pressure_shares,
+    pressure_patterns,
     slider_named,
     support_points,
 )
@@ -80,22 +81,33 @@ def simulated_rig(spec: SimulationSpec) -> Rig:
     )
 
 
-def physics_of(spec: SimulationSpec) -> Physics:
-    """What each push of a spec meets: loads and contact friction drawn per push, the table drawn once."""
-    slider, surface, n = spec.slider, spec.table, len(spec.pushes)
+def physics_of(spec: SimulationSpec, length: float) -> Physics:
+    """What each push of a spec meets over ways up to length (m): the table drawn once, the contacts push by push."""
+    slider, n = spec.slider, len(spec.pushes)
     points = support_points(slider.outline)
-    built = built_shares(points, spec.surface_seed)
-    scatter = surface.contact_variation * spec.rng(2).standard_normal(n)
     return Physics(
         outline=slider.outline,
         radius=PUSHER_RADIUS,
         mass=np.full(n, slider.mass),
         inertia=np.full(n, slider.inertia),
         support=points,
-        shares=pressure_shares(points, built, surface.pressure_variation, n, [spec.seed, 3]),
-        contact_friction=spec.contact_friction * np.exp(scatter),
-        surface=friction_field(surface, spec.surface_seed),
+        shares=np.tile(built_shares(points, spec.surface_seed), (n, 1)),
+        contact_friction=np.full(n, spec.contact_friction),
+        surface=friction_field(spec.table, spec.surface_seed),
+        pressure=_pressure(spec, points, knots_for(length)),
+        rubbing=_rubbing(spec, knots_for(length)),
     )
+
+
+def _pressure(spec: SimulationSpec, points: Array, knots: int) -> Scatter:
+    n, variation = len(spec.pushes), spec.table.pressure_variation
+    patterns = variation * pressure_patterns(points, n * (knots + 1), spec.rng(3)).reshape(n, knots + 1, -1)
+    return mixed(patterns)
+
+
+def _rubbing(spec: SimulationSpec, knots: int) -> Scatter:
+    draws = spec.table.contact_variation * spec.rng(2).standard_normal((len(spec.pushes), knots + 1, 1))
+    return mixed(draws)
 
 
 def start_poses(spec: SimulationSpec) -> Array:

@@ -23,7 +23,7 @@ class Surface:
 
     friction: mean coefficient. variation: standard deviation of its logarithm over the table. correlation: length
     in m over which it varies. pressure_variation: standard deviation of the logarithm of a support point's load
-    from push to push (how badly slider and table fit). contact_variation: the same for the contact friction.
+    (how badly slider and table fit). contact_variation: the same for the contact friction.
     """
 
     name: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -74,7 +74,7 @@ def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
 def _paint_pit(ax: Axes, values: Array, output: int, tallest: float) -> None:
     counts, edges = _bars(values)
     low, high = binom.ppf([0.025, 0.975], len(values), 1.0 / len(counts))
-    look = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
+    look: dict[str, Any] = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
     ax.bar(edges[:-1], counts, np.diff(edges), align="edge", **look)
     ax.axhspan(low, high, color="0.2", alpha=0.18, linewidth=0.0)
     ax.axhline(len(values) / len(counts), color="0.2", linewidth=0.8, linestyle=":")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import ndtri
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 LEVEL = 0.95
 ACROSS = 2  # examples side by side
-DOTS = {"color": NEARBY, "markersize": 3, "alpha": 0.7, "mew": 0.0}
-DIAMOND = {"color": OBSERVED, "markersize": 5}
+DOTS: dict[str, Any] = {"color": NEARBY, "markersize": 3, "alpha": 0.7, "mew": 0.0}
+DIAMOND: dict[str, Any] = {"color": OBSERVED, "markersize": 5}
 
 
 def paint_examples(
@@ -92,7 +92,8 @@ def _paint_plane(ax: Axes, comparison: Comparison, example: Example) -> None:
     ax.plot(*(example.nearby[:, :2].T * UNITS[0]), "o", label="windows with nearby inputs", **DOTS)
     ax.plot(*(comparison.observed[example.row, :2] * UNITS[0]), "D", label="this window", **DIAMOND)
     count = int(inside(mean, covariance, example.nearby).sum())
-    ax.set_title(f"nearby inside: {count} of {len(example.nearby)} ({example.pushes} pushes)", fontsize=8.0)
+    pushes = f"{example.pushes} push{'' if example.pushes == 1 else 'es'}"
+    ax.set_title(f"nearby inside: {count} of {len(example.nearby)} ({pushes})", fontsize=8.0)
     ax.set_xlabel(output_label(0))
     ax.set_ylabel(output_label(1))
     ax.set_aspect("equal", adjustable="datalim")

@@ -58,9 +58,11 @@ def spread_rows(points: Array, push_id: np.ndarray, count: int) -> IntArray:
 
 
 def _scaled_inputs(outline: Outline, table: PushTable) -> Array:
-    """Contact, angle and log speed (n, 3); a unit apart is as far as counts as near."""
+    """Contact (none on a circle), angle and log speed (n, 3); a unit apart is as far as counts as near."""
     velocity, contact, angle = table.inputs.T
     along = way_along(outline, contact) / (NEAR_CONTACT * sector_length(outline))
+    if outline.rotational_symmetry == 0:
+        along = np.zeros_like(along)
     return np.column_stack([along, angle / NEAR_ANGLE, np.log(velocity) / NEAR_SPEED])
 
 

@@ -101,7 +101,8 @@ def contact_label(outline: Outline) -> str:
         return f"contact, along the edge counter-clockwise (mm; all {order} edges folded into one)"
     if order > 1:
         return f"contact, along the outline counter-clockwise (mm; {order} alike parts folded into one)"
-    return "contact, along the outline counter-clockwise from its first vertex (mm)"
+    alike = "; to the models all are alike" if outline.rotational_symmetry == 0 else ""
+    return f"contact, along the outline counter-clockwise from its first vertex (mm{alike})"
 
 
 def inner_corners(outline: Outline) -> Array:

@@ -10,6 +10,7 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.report import Notes
 from push_predictor.types import Array, BoolArray, IntArray
 
+LONGEST_STEP = 4  # rows
 LAST_STAMP = 2**31 * 1_000_000_000  # ns; a ROS stamp has seconds of 31 bits
 
 
@@ -60,19 +61,22 @@ def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
 
 
 def without_held(samples: Samples, where: str, notes: Notes) -> Samples:
-    """Without rows that only hold a moving tip's last position; rows of a resting tip are kept.
+    """Without rows that only hold the last position of a robot that answers faster than it updates.
 
-    A robot controller that answers faster than it updates gives stairs, of which only the first row of each step is
-    a measurement. A tip rests where three rows or more are equal.
+    Of each step of such stairs the first row is a measurement. Where more than LONGEST_STEP rows are equal the tip
+    rests, and rows at the pace of the moving tip's updates are kept.
     """
-    same = np.all(samples.values[1:] == samples.values[:-1], axis=1)
-    as_before = np.concatenate([[False], same])
-    as_after = np.concatenate([same, [True]])
-    rested_before = np.concatenate([[True, True], same[:-1]])
-    held = as_before & ~as_after & ~rested_before
+    fresh = np.concatenate([[True], np.any(samples.values[1:] != samples.values[:-1], axis=1)])
+    starts = np.flatnonzero(fresh)
+    length = np.diff(np.append(starts, len(fresh)))
+    moving = length[length <= LONGEST_STEP]
+    pace = int(np.median(moving)) if len(moving) else 1
+    step = np.cumsum(fresh) - 1
+    place = np.arange(len(fresh)) - starts[step]
+    held = np.where(length[step] <= LONGEST_STEP, place > 0, place % pace > 0)
     if count := int(np.sum(held)):
         notes.repaired.append(
-            f"{where}: {count} of {len(held)} rows only hold the moving tip's position of the row before, left out"
+            f"{where}: {count} of {len(held)} rows only hold the tip's position of the row before, left out"
         )
     return samples.take(~held)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_held
 from push_predictor.recordings.importers.mcube_rig import CLOCK, FORCE, HEIGHT, TIP_LATE, Block, block_of
 from push_predictor.recordings.importers.report import ImportReport, Notes
@@ -26,6 +26,7 @@ AT_REST = 5e-4  # m; the tip has not left its first position
 LEAST_TARE = 5
 STOPS_EARLY = 1_000_000_000  # ns
 NEAR_HALF_TURN = 0.05  # |qw| below which the lost sign of qw may change
+IN_TOUCH = 0.002  # m
 TREND = 8  # samples that tell how the heading goes on
 
 
@@ -43,10 +44,18 @@ def read_mcube(obj: Path, rig: Rig | None, notes: Notes) -> Recording:
     stem = obj.name.removesuffix("_obj.txt")
     files = {kind: obj.with_name(f"{stem}_{kind}.txt") for kind in WIDTHS}
     raw = {kind: in_order(read_numbers(path, WIDTHS[kind], notes), str(path), notes) for kind, path in files.items()}
-    body = Samples(raw["obj"].stamp, np.column_stack([raw["obj"].values[:, :2], headings(raw["obj"].values[:, 3:])]))
-    name = safe_name(f"{obj.resolve().parent.name}_{stem}")
-    block = block_of(obj, int(body.stamp[0]))
-    return assemble(name, str(obj.with_name(stem)), block, rig, body, raw["tcp"], raw["ft"], notes)
+    name, where = safe_name(f"{obj.resolve().parent.name}_{stem}"), str(obj.with_name(stem))
+    block, heading = block_of(obj, int(raw["obj"].stamp[0])), headings(raw["obj"].values[:, 3:])
+    found = []
+    for sign, told in ((1.0, notes), (-1.0, Notes())):
+        body = Samples(raw["obj"].stamp, np.column_stack([raw["obj"].values[:, :2], sign * heading]))
+        found.append(assemble(name, where, block, rig, body, raw["tcp"], raw["ft"], told))
+    touches = [samples_in_touch(recording) for recording in found]
+    notes.assume(
+        f"{where}: qw is not in the file, taken {'positive' if touches[0] >= touches[1] else 'negative'} at the first "
+        f"sample: so {max(touches)} tip samples lie on the outline, otherwise {min(touches)}"
+    )
+    return found[int(touches[1] > touches[0])]
 
 
 def assemble(
@@ -72,6 +81,16 @@ def assemble(
         pusher=_pusher(tip, block),
         wrench=_wrench(force),
     )
+
+
+def samples_in_touch(recording: Recording) -> int:
+    """How many samples of the tip lie on the slider's outline."""
+    if recording.rig is None:
+        return 0
+    slider, tip = recording.slider, recording.pusher
+    pose = np.column_stack([np.interp(tip.stamp, slider.stamp, z) for z in (slider.x, slider.y, slider.heading)])
+    touch = recording.rig.outline.project(to_body(np.column_stack([tip.x, tip.y]), pose))
+    return int(np.sum(np.abs(touch.distance - recording.rig.pusher_radius) < IN_TOUCH))
 
 
 def read_numbers(path: Path, width: int, notes: Notes) -> Samples:

@@ -1,0 +1,131 @@
+"""The main job end to end: learn, serve, replay, validate online, report. `make demo` runs this.
+
+Models are trained on one recording. Another one is then replayed ten times faster than it was recorded, by a node of
+its own, as the topics that a motion tracker and a force sensor would publish. A second node predicts, a third finds the
+pushes in the topics, asks for predictions and compares them with what happened.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from examples.live_table import LiveTable
+from examples.processes import node
+from push_predictor.evaluation.offline import report_windows, validate_recording
+from push_predictor.evaluation.validation import Comparison, metrics_json
+from push_predictor.models.model_file import load_model
+from push_predictor.models.push_model import PushModel
+
+ROOT = Path(__file__).resolve().parents[1]
+TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
+OUT = ROOT / "out" / "demo"
+KINDS = ("vhgp", "gp", "analytical")  # the first is the main model
+RATE = 10.0
+AGREEMENT = 1e-9  # m, rad: online and offline predictions may differ by rounding only
+PATIENCE = 120.0  # s for the replay and the last answers
+
+
+def main() -> int:
+    """Run the demo; the exit status is 0 if online and offline validation agree."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    OUT.mkdir(parents=True, exist_ok=True)
+    begun = time.monotonic()
+    print("1. learn from", TRAINING.relative_to(ROOT))
+    paths = [_trained(kind) for kind in KINDS]
+    print(f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (domain {os.environ['ROS_DOMAIN_ID']})")
+    _replay_and_validate(paths)
+    print("3. online against offline, window by window")
+    models = [load_model(path) for path in paths]
+    largest = max(_largest_difference(model, k) for k, model in enumerate(models))
+    agree = largest <= AGREEMENT
+    print(f"   largest difference of a prediction: {largest:.1e} (m, rad); {'agree' if agree else 'DISAGREE'}\n")
+    page = _report(models, f"predictions differ by at most {largest:.1e} (m, rad)")
+    print(f"\ndone in {time.monotonic() - begun:.0f} s; the report with pictures:\n{page}")
+    return 0 if agree else 1
+
+
+def _trained(kind: str) -> Path:
+    """The model file, trained now unless an earlier run left it and the recording is older."""
+    path = OUT / f"{kind}.pushmodel"
+    if path.exists() and path.stat().st_mtime > max(part.stat().st_mtime for part in TRAINING.iterdir()):
+        print(f"   {kind}: found {path.relative_to(ROOT)}")
+        return path
+    command = ["train", str(TRAINING), "--model", kind, "--out", str(path)]
+    subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
+    return path
+
+
+def _replay_and_validate(models: Sequence[Path]) -> None:
+    """Three nodes, each a process; ends when the validator has written its result."""
+    result = OUT / "online" / "validation.json"
+    result.unlink(missing_ok=True)
+    main_model, *others = map(str, models)
+    with ExitStack() as running:
+        start = running.enter_context
+        start(node("predict_server", {"models": [main_model, *others]}))
+        validator = {"model": main_model, "compare": others, "output": str(result.parent), "report": False}
+        start(node("push_validator", validator))
+        table = start(LiveTable())
+        replay = {"recording": str(HELD_OUT), "play.rate": RATE, "wait_for_subscribers": 30.0}
+        start(node("push_replay", replay))
+        deadline = time.monotonic() + PATIENCE
+        while not result.exists():
+            if time.monotonic() > deadline:
+                raise SystemExit(f"{result} was not written within {PATIENCE:.0f} s; see {OUT}/*.log")
+            table.show()
+            time.sleep(0.1)
+
+
+def _largest_difference(model: PushModel, number: int) -> float:
+    """Between the predictions that came through the services and those made from the file; infinite if the windows
+    are not the same."""
+    suffix = "" if number == 0 else f"_{model.name}"
+    online = json.loads((OUT / "online" / f"windows{suffix}.json").read_text())["windows"]
+    windows, offline = validate_recording(model, HELD_OUT)
+    if [(w["push_id"], w["window"]) for w in online] != [(w.push_id, w.index) for w in windows]:
+        return float("inf")
+    return float(np.max(np.abs(np.array([w["predicted"] for w in online]) - offline.mean)))
+
+
+def _report(models: Sequence[PushModel], agreement: str) -> Path:
+    results = [validate_recording(model, HELD_OUT) for model in models]
+    comparisons = [comparison for _, comparison in results]
+    _print_summary(comparisons)
+    facts = {"online against offline": agreement, "replayed at rate": f"{RATE:g}"}
+    return report_windows(models, results[0][0], comparisons, OUT / "report", HELD_OUT.name, facts)
+
+
+def _print_summary(comparisons: Sequence[Comparison]) -> None:
+    """What the paper's tables hold: the three models, one line each."""
+    scores: list[dict[str, Any]] = [metrics_json(comparison) for comparison in comparisons]
+    first = scores[0]
+    print(f"{first['n_test']} windows of {first['n_pushes']} pushes of a recording that no model was trained on;")
+    print("NLPD in nats (SI units), 95 % intervals from resampling whole pushes")
+    print(f"{'model':12s}{'NMSE':>7s}{'':17s}{'NLPD':>8s}{'':19s}{'95 % coverage: dx':>17s}{'dy':>7s}{'dtheta':>8s}")
+    for score in scores:
+        spans = {key: score["interval"][key] for key in ("nmse", "nlpd")}
+        shares = score["coverage"]["0.95"]
+        print(
+            f"{score['model']:12s}{score['nmse']['total']:7.3f} {_span(spans['nmse'], 2):16s}"
+            f"{score['nlpd']['total']:8.2f} {_span(spans['nlpd'], 2):18s}"
+            f"{shares['dx']:17.2f}{shares['dy']:7.2f}{shares['dtheta']:8.2f}"
+        )
+
+
+def _span(interval: dict[str, float], digits: int) -> str:
+    return f"({interval['low']:.{digits}f} to {interval['high']:.{digits}f})"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

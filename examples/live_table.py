@@ -1,0 +1,88 @@
+"""What /diagnostics says while a replay is validated, as a table that is drawn anew, or lines where there is no screen."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from types import TracebackType
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+LINE_PERIOD = 2.0  # s between two lines where there is no screen
+COLUMNS = ("windows", "pushes", "nmse", "nlpd", "coverage 0.95 dx", "coverage 0.95 dy", "coverage 0.95 dtheta")
+
+
+class LiveTable:
+    """A context manager that listens to /diagnostics; show() draws what it heard."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, dict[str, str]] = {}
+        self._last_line = time.monotonic()
+        self._live = Live(console=Console(), refresh_per_second=4) if sys.stdout.isatty() else None
+
+    def __enter__(self) -> LiveTable:
+        rclpy.init()
+        self._node = Node("demo_table")
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 10)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.show()
+        if self._live is not None:
+            self._live.stop()
+        self._executor.shutdown()
+        self._thread.join()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def show(self) -> None:
+        """Draw the table, or print a line if the last one is old enough."""
+        if self._live is not None:
+            self._live.update(self._table())
+        elif time.monotonic() - self._last_line > LINE_PERIOD and self._models():
+            self._last_line = time.monotonic()
+            print("   " + " | ".join(f"{name}: {self._line(name)}" for name in self._models()), flush=True)
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self._values[status.name] = {entry.key: entry.value for entry in status.values}
+
+    def _validator(self) -> dict[str, str]:
+        return next((values for name, values in self._values.items() if "push_validator" in name), {})
+
+    def _models(self) -> list[str]:
+        return [key.removesuffix(" windows") for key in self._validator() if key.endswith(" windows")]
+
+    def _line(self, model: str) -> str:
+        values = self._validator()
+        return ", ".join(f"{key} {values.get(f'{model} {key}', '-')}" for key in ("windows", "nmse", "nlpd"))
+
+    def _table(self) -> Table:
+        replay = next((values for name, values in self._values.items() if "push_replay" in name), {})
+        table = Table(title=f"online validation; replay late p99 {replay.get('late p99 us', '-')} us")
+        for column in ("model", *COLUMNS):
+            table.add_column(column, justify="right")
+        for name in self._models():
+            table.add_row(name, *(self._validator().get(f"{name} {column}", "-") for column in COLUMNS))
+        return table

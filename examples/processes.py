@@ -1,0 +1,45 @@
+"""Nodes as processes of their own, as a launch file would start them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+LOGS = Path(__file__).resolve().parents[1] / "out" / "demo"
+GRACE = 15.0  # s to end after SIGINT
+
+
+@contextmanager
+def node(executable: str, parameters: Mapping[str, Any]) -> Iterator[None]:
+    """Run one of this package's nodes; leaving the context interrupts it as Ctrl-C would.
+
+    What it prints goes to out/demo/EXECUTABLE.log. Raises SystemExit if it did not end well.
+    """
+    assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_text(value)}")]
+    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *assigned]
+    log = LOGS / f"{executable}.log"
+    with log.open("w") as stream:
+        process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            status = process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            status = process.wait()
+    if status != 0:
+        raise SystemExit(f"{executable} ended with status {status}; see {log}")
+
+
+def _text(value: Any) -> str:
+    """A parameter as YAML on one line."""
+    return str(yaml.safe_dump(value, default_flow_style=True, width=10_000).removesuffix("\n...\n").strip())
