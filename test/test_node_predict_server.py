@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 import ros_harness as harness
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,6 +19,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
 from service_msgs.msg import ServiceEventInfo
 
 from msg_adapters.predictions import (
@@ -30,7 +32,9 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.train import train_model
+from push_predictor.nodes import predict_server
 from push_predictor.nodes.predict_server import PARAMETERS
+from push_predictor.nodes.runtime import Stop
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
@@ -263,6 +267,28 @@ def test_covariates_that_no_model_needs_change_nothing(server):
     response = server.push(covariates={"temperature": np.nan})
     assert not response.success
     assert response.message.startswith("covariate temperature: nan")
+
+
+def test_what_nobody_foresaw_is_answered_and_logged_and_the_node_lives(folder, monkeypatch, capfd):
+    def broken(shelf, request, response):
+        response.mean[0] = 1.0
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(predict_server, "answer_push", broken)
+    arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']"]
+    rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = predict_server.started_server(Stop())
+        response = node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response())
+        assert not response.success
+        assert not np.any(response.mean)
+        assert "internal error" in response.message
+        assert "a bug" in response.message
+        assert 'in broken\n    raise ZeroDivisionError("a bug")' in capfd.readouterr().err
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
 
 
 def test_thirty_requests_in_flight_are_all_answered(server):

@@ -326,14 +326,17 @@ def test_an_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
     assert report["published"] == str(len(push_messages(0.2)))
 
 
-def test_qos_follows_the_file_of_overrides(second: Path, tmp_path: Path) -> None:
+def test_qos_follows_the_file_of_overrides_and_the_parameters(second: Path, tmp_path: Path) -> None:
     (tmp_path / "qos.yaml").write_text("/slider/pose: {reliability: best_effort, depth: 7}\n")
     options = {"play__qos_profile_overrides_path": tmp_path / "qos.yaml", "play__start_paused": True}
-    with replay(second, "-p", "qos_overrides./pusher/pose.publisher.depth:=33", **options) as (_, ears):
+    options["wait_for_subscribers"] = 0.0  # a reliable subscriber never meets a best-effort publisher
+    with replay(second, "-p", "qos_overrides./pusher/pose.publisher.reliability:=best_effort", **options) as (_, ears):
         ears.wait_for("paused")
         (slider,) = ears.node.get_publishers_info_by_topic("/slider/pose")
+        (pusher,) = ears.node.get_publishers_info_by_topic("/pusher/pose")
         (wrench,) = ears.node.get_publishers_info_by_topic("/pusher/wrench")
     assert slider.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert pusher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     assert wrench.qos_profile.reliability == ReliabilityPolicy.RELIABLE
 
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.nodes.replay_clock import SECOND, PlayerClock
-from push_predictor.nodes.replay_player import Outlet, PlayRange, ReplayPlayer
+from push_predictor.nodes.replay_player import Outlet, ReplayPlayer
+from push_predictor.nodes.replay_range import PlayRange
 from push_predictor.nodes.replay_source import ReadAhead
 from push_predictor.recordings.bag import RawMessage
 

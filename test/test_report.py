@@ -170,12 +170,13 @@ def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, qua
     assert along[1] == pytest.approx(along[0], abs=1e-12)
 
 
-def test_the_end_of_an_edge_stays_its_end() -> None:
-    outline = shape_outline("rect1")
-    ends = outline.contact_on_edge(np.arange(4), np.ones(4))
-    assert way_along(outline, ends) == pytest.approx(np.full(4, 0.09))
-    starts = outline.contact_on_edge(np.arange(4), np.zeros(4))
-    assert way_along(outline, starts) == pytest.approx(np.zeros(4))
+@pytest.mark.parametrize(("shape", "edges", "length"), [("rect1", 4, 0.09), ("hex", 6, 0.0605)])
+def test_the_end_of_an_edge_stays_its_end(shape: str, edges: int, length: float) -> None:
+    outline = shape_outline(shape)
+    ends = outline.contact_on_edge(np.arange(edges), np.ones(edges))
+    assert way_along(outline, ends) == pytest.approx(np.full(edges, length))
+    starts = outline.contact_on_edge(np.arange(edges), np.zeros(edges))
+    assert way_along(outline, starts) == pytest.approx(np.zeros(edges), abs=1e-12)
 
 
 def test_an_ellipse_folds_in_two_and_a_circle_not_at_all() -> None:

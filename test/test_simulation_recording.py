@@ -152,6 +152,8 @@ def test_a_wrong_plan_or_rig_is_refused_by_name() -> None:
         grid_pushes([0.1], [1.6], 2)
     with pytest.raises(RequestError, match=r"speed: -0\.02"):
         random_pushes(3, [-0.02])
+    with pytest.raises(RequestError, match="pushes: 0"):
+        random_pushes(0, [0.02])
     with pytest.raises(RigError, match="surface: 'ice'"):
         simulate(SimulationSpec("rect1", "ice", random_pushes(1, [0.02])))
     with pytest.raises(RigError, match="shape: 'star'"):

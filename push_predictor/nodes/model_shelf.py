@@ -56,6 +56,8 @@ class ModelShelf:
         """
         path = path.expanduser().resolve()
         model = load_model(path)
+        # The first prediction fills the model's caches; no request should wait for that.
+        model.predict(model.training.inputs[:1], model.training.duration[:1])
         name = name or model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")

@@ -17,7 +17,7 @@ from rclpy.qos import QoSProfile, qos_profile_system_default
 from rclpy.service import Service
 from rclpy.service_introspection import ServiceIntrospectionState
 
-from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
+from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
@@ -25,6 +25,7 @@ from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.request_log import RequestLog
 from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.server_status import NO_MODEL, server_status
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 SERVICE_QOS = QoSProfile(depth=100)  # ten, the default, loses requests of a client with more in flight
@@ -51,7 +52,6 @@ PARAMETERS = (
     ),
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )
-NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
 Answer: TypeAlias = Callable[[ModelShelf, Any, Any], None]  # fills the response, or raises
 
 
@@ -88,6 +88,14 @@ class PredictServer(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load the models and offer the services. A bad model file is reported, the others are loaded."""
+        try:
+            self._configure()
+        except Exception:  # rclpy would drop it without a word
+            self.get_logger().error(traceback.format_exc())
+            return TransitionCallbackReturn.ERROR
+        return super().on_configure(state)
+
+    def _configure(self) -> None:
         self._problems = self._shelf.load_all(self.value("models"))
         for problem in self._problems:
             self.get_logger().error(problem)
@@ -100,7 +108,6 @@ class PredictServer(LifecycleNode):
         ]
         self._introspect(self.value("introspection"))
         self._state = "inactive"
-        return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer predictions from now on. Fails while no model is loaded: the node stays inactive."""
@@ -204,28 +211,9 @@ class PredictServer(LifecycleNode):
             service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
 
     def _publish_diagnostics(self) -> None:
-        level, message = self._health()
-        values = {
-            "state": self._state,
-            "models": self._shelf.names,
-            "default_model": self._shelf.default,
-            "problems": "; ".join(self._problems) or None,
-            **self._log.values(),
-        }
-        name = f"{self.get_fully_qualified_name()}: predictions"
-        stamp = self.get_clock().now().nanoseconds
-        self._diagnostics.publish(diagnostic_array(stamp, diagnostic_status(name, level, message, values)))
-
-    def _health(self) -> tuple[Level, str]:
-        if not self._shelf.names:
-            return Level.ERROR, NO_MODEL
-        if self._state != "active":
-            return Level.WARN, f"the node is {self._state}"
-        if self._shelf.default not in self._shelf.names:
-            return Level.WARN, f"default_model {self._shelf.default!r} is not loaded"
-        if self._problems:
-            return Level.WARN, f"{len(self._problems)} of the models could not be loaded"
-        return Level.OK, f"serving {len(self._shelf.names)} models"
+        name = self.get_fully_qualified_name()
+        status = server_status(name, self._state, self._shelf, self._problems, self._log)
+        self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
 
 
 def main(args: Sequence[str] | None = None) -> int:

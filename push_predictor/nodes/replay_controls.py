@@ -8,7 +8,8 @@ from builtin_interfaces.msg import Duration, Time
 from rclpy.node import Node
 
 from push_predictor.nodes.replay_clock import SECOND
-from push_predictor.nodes.replay_player import PlayRange, ReplayPlayer
+from push_predictor.nodes.replay_player import ReplayPlayer
+from push_predictor.nodes.replay_range import PlayRange
 from push_predictor_interfaces.srv import (
     Burst,
     GetRate,

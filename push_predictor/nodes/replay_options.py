@@ -13,7 +13,7 @@ from rclpy.node import Node
 from push_predictor.errors import RequestError
 from push_predictor.nodes.parameters import Param, declare, given_value, values_of
 from push_predictor.nodes.replay_clock import SECOND
-from push_predictor.nodes.replay_player import PlayRange
+from push_predictor.nodes.replay_range import PlayRange
 
 _YEARS = 1.0e10  # s, beyond any stamp
 

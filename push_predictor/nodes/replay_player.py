@@ -10,32 +10,11 @@ from dataclasses import dataclass
 
 from push_predictor.nodes.lateness import Lateness
 from push_predictor.nodes.replay_clock import PlayerClock, Wall
+from push_predictor.nodes.replay_range import PlayRange
 from push_predictor.nodes.replay_source import ReadAhead, Source
 from push_predictor.recordings.bag import RawMessage
 
 _READING = 300_000  # ns: with less time than this before the next deadline nothing is read ahead
-
-
-@dataclass(frozen=True)
-class PlayRange:
-    """What to play, ns: offset from the first message; duration from there and until (a log time), None for no limit.
-
-    Of two limits the later one counts, as in rosbag2.
-    """
-
-    offset: int = 0
-    duration: int | None = None
-    until: int | None = None
-
-    def first(self, start: int) -> int:
-        """Log time to begin at, of a source that starts at `start`."""
-        return start + self.offset
-
-    def last(self, start: int) -> int | None:
-        """Log time to end at, inclusive."""
-        ends = [self.until] if self.until is not None else []
-        ends += [self.first(start) + self.duration] if self.duration is not None else []
-        return max(ends, default=None)
 
 
 @dataclass(frozen=True)

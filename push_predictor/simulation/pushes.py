@@ -33,9 +33,11 @@ class PushPlan:
     travel: Array
 
     def __post_init__(self) -> None:
+        if len(self.contact) == 0:
+            raise RequestError("pushes", 0, "a plan of at least one push")
         _demand("contact", self.contact, (self.contact >= 0.0) & (self.contact < 1.0), "a number in [0, 1)")
         _demand("angle", self.angle, np.abs(self.angle) < np.pi / 2.0, "an angle within (-pi/2, pi/2) rad")
-        _demand("speed", self.speed, (self.speed > 0.0) & np.isfinite(self.speed), "a speed above 0 m/s")
+        _demand("speed", self.speed, (self.speed > 0.0) & (self.speed <= 1.0), "a speed in (0, 1] m/s")
         _demand("travel", self.travel, (self.travel > 0.0) & (self.travel <= 0.2), "a travel in (0, 0.2] m")
 
     def __len__(self) -> int:

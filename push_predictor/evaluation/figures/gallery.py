@@ -174,7 +174,7 @@ CALIBRATION_CAPTION = (
 )
 RESIDUAL_CAPTION = (
     "Above: predicted against observed, with the predicted 95 % interval of every window (grey) about the diagonal. "
-    "Below: residuals in units of the predicted sd in the order of time, windows in grey, means of pushes in colour; "
-    "the band holds 95 % if all is well. Trend: change of the residual from the first to the last window, with its "
-    "95 % interval by resampling pushes; an interval without zero is a drift."
+    "Below: residuals in units of the predicted sd in the order of time, windows in grey (those beyond the frame at "
+    "its edge), means of pushes in colour; the band holds 95 % if all is well. Trend: change of the residual from the "
+    "first to the last window, with its 95 % interval by resampling pushes; an interval without zero is a drift."
 )

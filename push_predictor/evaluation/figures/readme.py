@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIZE = (11.0, 3.4)
-SHOWN_OUTPUT = 1  # dy: its scatter depends on the push most visibly
+SHOWN_OUTPUT = 2  # dtheta: its scatter depends on the push most visibly
 EXAMPLES = 5
 TOLD_APART = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a6d00")
 
 
 def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
-    """Predicted sd of dy, recorded sd, and 95 % ellipses over outcomes, of the commonest speed; returns out_png.
+    """Predicted sd of dtheta, recorded, and 95 % ellipses over outcomes, at the commonest speed; returns out_png.
 
     Raises PushPredictorError if matplotlib is not installed, TableError for a table without rows.
     """
@@ -65,7 +65,7 @@ def _paint_outcomes(ax: Axes, comparison: Comparison, shown: Sequence[Example]) 
         paint_ellipse(ax, mean, covariance, colour=colour)
         ax.plot(*(outcomes[:, :2].T * UNITS[0]), "o", color=colour, markersize=3.2, mew=0.4, mec="white")
         hits, total = hits + int(inside(mean, covariance, outcomes).sum()), total + len(outcomes)
-    ax.set_title(f"predicted 95 % ellipses: {hits} of {total} outcomes inside")
+    ax.set_title(f"95 % ellipses: {hits} of {total} outcomes inside")
     ax.set_xlabel(output_label(0))
     ax.set_ylabel(output_label(1))
     ax.margins(0.08)
