@@ -14,16 +14,16 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.sensors import Sensors
 from push_predictor.simulation.spec import SimulationSpec
 
-SPEEDS = (0.01, 0.02, 0.05)  # m/s
-TRAVEL = 0.029  # m
+SPEEDS = (0.01, 0.02, 0.02, 0.02, 0.05)  # m/s; most pushes at one speed, so that maps over contact and angle fill up
+TRAVEL = 0.02  # m
 WRENCH_RATE = 50.0  # Hz; half of the poses', to keep the recordings small
 
 
 def standard_bags() -> dict[str, SimulationSpec]:
     """The specs by name. square_abs_* share slider and table; every recording has pushes of its own."""
     specs = (
-        _spec("square_abs_train", "rect1", "abs", _random(136, 1), 1),
-        _spec("square_abs_test", "rect1", "abs", _random(48, 2), 2),
+        _spec("square_abs_train", "rect1", "abs", _random(220, 1), 1),
+        _spec("square_abs_test", "rect1", "abs", _random(75, 2), 2),
         _spec("square_abs_repeats", "rect1", "abs", _repeats(), 3),
         _spec("ellipse_plywood", "ellip2", "plywood", _random(15, 4), 4),
         _spec("circle_pu", "ellip1", "pu", _random(10, 5), 5),
