@@ -10,6 +10,9 @@ INTERFACES := $(shell find push_predictor_interfaces -type f -not -path '*/build
 # One process or robot must not hear another's demo or tests (ROS_DOMAIN_ID is theirs to choose).
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Matrices of a thousand rows gain nothing from a second thread, and two processes lose much by it.
+export OPENBLAS_NUM_THREADS ?= 1
+export PYTHONUNBUFFERED := 1
 unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo test lint bags clean
@@ -38,9 +41,9 @@ $(VENV)/.python:
 
 # Building the message package takes most of the time: only when it changes.
 $(VENV)/.interfaces: $(VENV)/.python $(INTERFACES)
-	$(BIN)/pip install -q 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces
+	$(BIN)/pip install -qq 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.interfaces $(SOURCES)
-	$(BIN)/pip install -q '.[report,live,import,test]'
+	$(BIN)/pip install -qq '.[report,live,import,test]'
 	touch $@

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import re
+from array import array
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from sys import intern
 
 import numpy as np
 
+from push_predictor.evaluation.running_score import RunningScore
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
-from push_predictor.evaluation.window_log import write_window_log
+from push_predictor.evaluation.window_log import Refusal, write_window_log
+from push_predictor.evaluation.window_rows import WindowRows
 from push_predictor.models.push_model import Prediction, PushModel
 from push_predictor.recordings.windows import PushWindow, windows_to_table
+from push_predictor.types import Array, IntArray
 
 MAIN_RESULT = "validation.json"
 
@@ -19,52 +25,97 @@ MAIN_RESULT = "validation.json"
 class LiveValidation:
     """Windows in the order they were found, and the predictions of each model as they come in.
 
-    models: the first is the main one.
+    models: by the name they are asked for; the first is the main one, and a model's number is its place.
     """
 
-    def __init__(self, models: Sequence[PushModel]) -> None:
-        self.models = tuple(models)
-        self.windows: list[PushWindow] = []
-        self._predictions: list[dict[int, Prediction]] = [{} for _ in models]
+    def __init__(self, models: Mapping[str, PushModel]) -> None:
+        self.names, self.models = tuple(models), tuple(models.values())
+        self.windows = WindowRows()
+        self.scores = tuple(RunningScore(model.training_mean) for model in self.models)
+        self._answers = tuple(_Answers() for _ in self.models)
+        self._refused: tuple[dict[int, str], ...] = tuple({} for _ in self.models)
 
     def add(self, window: PushWindow) -> int:
         """Take a window; returns its number."""
         self.windows.append(window)
         return len(self.windows) - 1
 
-    def record(self, model: int, window: int, prediction: Prediction) -> None:
-        """Take what a model predicted for a window (n = 1)."""
-        self._predictions[model][window] = prediction
+    def record(self, model: int, number: int, prediction: Prediction) -> None:
+        """Take what a model predicted for a window (n = 1), once."""
+        window, mean, covariance = self.windows[number], prediction.mean[0], prediction.covariance[0]
+        self._answers[model].add(number, mean, covariance)
+        self.scores[model].add(window.push_id, mean, covariance, window.displacement)
 
-    def predicted(self, model: int = 0) -> list[PushWindow]:
+    def refuse(self, model: int, number: int, reason: str) -> None:
+        """Take note that a model has no prediction for a window, and why."""
+        self._refused[model][number] = intern(reason)
+
+    def predicted(self, model: int = 0) -> WindowRows:
         """The windows that a model has answered, in order."""
-        return [self.windows[k] for k in sorted(self._predictions[model])]
+        return self.windows.take(self._answers[model].sorted()[0])
+
+    def refused(self, model: int = 0) -> list[Refusal]:
+        """The windows that it has refused, in order."""
+        pairs = sorted(self._refused[model].items())
+        return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
+
+    def unanswered(self, model: int = 0) -> int:
+        """How many windows it has neither answered nor refused."""
+        return len(self.windows) - len(self._answers[model]) - len(self._refused[model])
 
     def comparison(self, model: int = 0) -> Comparison:
         """What a model predicted beside what was observed, for the windows it has answered."""
-        answers = [self._predictions[model][k] for k in sorted(self._predictions[model])]
-        table = windows_to_table(self.predicted(model))
-        return comparison_of(self.models[model], table, _stacked(answers))
+        numbers, mean, covariance = self._answers[model].sorted()
+        table = windows_to_table(self.windows.take(numbers))
+        return comparison_of(self.models[model], table, mean, covariance)
+
+    def residuals(self) -> Iterator[tuple[str, PushWindow, Array, Array]]:
+        """Name of the model, window, mean (3,) and covariance (3, 3) of every answer, in the order of the windows."""
+        answers = [zip(*stored.sorted(), strict=True) for stored in self._answers]
+        rows = [(number, k, mean, covariance) for k, each in enumerate(answers) for number, mean, covariance in each]
+        for number, k, mean, covariance in sorted(rows, key=lambda row: row[:2]):
+            yield self.names[k], self.windows[number], mean, covariance
 
     def write(self, folder: Path) -> list[Path]:
-        """Write validation.json of the main model, validation_NAME.json of the others, and their windows one by one."""
+        """Write validation.json of the main model, validation_NAME.json of the others, and their windows one by one.
+
+        Raises OSError.
+        """
         folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for k, model in enumerate(self.models):
-            comparison, suffix = self.comparison(k), "" if k == 0 else f"_{model.name}"
-            path = folder / MAIN_RESULT.replace(".json", f"{suffix}.json")
-            temporary = path.with_name(f".{path.name}.part")
-            temporary.write_text(json.dumps(metrics_json(comparison), indent=2, allow_nan=False) + "\n")
-            temporary.replace(path)
-            write_window_log(folder / f"windows{suffix}.json", self.predicted(k), comparison)
-            written.append(path)
-        return written
+        return [self._write(folder, k) for k in range(len(self.models))]
+
+    def _write(self, folder: Path, model: int) -> Path:
+        suffix = f"_{_file_name(self.names[model])}" if model else ""
+        comparison, path = self.comparison(model), folder / MAIN_RESULT.replace(".json", f"{suffix}.json")
+        windows, refused = self.predicted(model), self.refused(model)
+        write_window_log(folder / f"windows{suffix}.json", windows, comparison, refused, self.unanswered(model))
+        temporary = path.with_name(f".{path.name}.part")
+        temporary.write_text(json.dumps(metrics_json(comparison), indent=2, allow_nan=False) + "\n")
+        temporary.replace(path)
+        return path
 
 
-def _stacked(answers: Sequence[Prediction]) -> Prediction:
-    return Prediction(
-        np.array([answer.mean[0] for answer in answers]).reshape(-1, 3),
-        np.array([answer.covariance[0] for answer in answers]).reshape(-1, 3, 3),
-        np.array([answer.process_covariance[0] for answer in answers]).reshape(-1, 3, 3),
-        np.array([answer.in_domain[0] for answer in answers], dtype=np.bool_),
-    )
+class _Answers:
+    """Means and covariances by number of window, packed."""
+
+    def __init__(self) -> None:
+        self._numbers = array("q")
+        self._values = array("d")
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def add(self, number: int, mean: Array, covariance: Array) -> None:
+        self._numbers.append(number)
+        self._values.extend([*mean.tolist(), *covariance.ravel().tolist()])
+
+    def sorted(self) -> tuple[IntArray, Array, Array]:
+        """Numbers (n,), means (n, 3), covariances (n, 3, 3), by number."""
+        numbers = np.array(self._numbers, dtype=np.int64)
+        values = np.array(self._values, dtype=np.float64).reshape(-1, 12)[np.argsort(numbers)]
+        return np.sort(numbers), values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
+
+
+def _file_name(name: str) -> str:
+    """A model's name as part of a file's: a server may call its models anything."""
+    return re.sub(r"[^\w.-]", "_", name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array
 
@@ -38,17 +38,18 @@ class Comparison:
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
     """Predict every row of a table."""
-    return comparison_of(model, table, model.predict(table.inputs, table.duration))
+    prediction = model.predict(table.inputs, table.duration)
+    return comparison_of(model, table, prediction.mean, prediction.covariance)
 
 
-def comparison_of(model: PushModel, table: PushTable, prediction: Prediction) -> Comparison:
-    """Set predictions that were already made, by a service for instance, beside the outcomes of a table."""
+def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
+    """Set predictions (n, 3), (n, 3, 3) that were already made, by a service perhaps, beside the outcomes of a table."""
     return Comparison(
         model.name,
         len(model.training),
         table.push_id,
-        prediction.mean,
-        prediction.covariance,
+        mean,
+        covariance,
         table.outcomes,
         model.exact_log_density(table),
         model.training_mean,
@@ -84,13 +85,21 @@ def trained_on(model: PushModel, table: PushTable) -> list[str]:
 
 
 def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:
-    if len(set(c.push_id.tolist())) < 2:
+    pushes, push = np.unique(c.push_id, return_inverse=True)
+    if len(pushes) < 2:
         return {"level": 0.95, "by": "push", "nmse": None, "nlpd": None}
-    weights = push_bootstrap(c.push_id)
+    weights = push_bootstrap(pushes)  # by push, not by row: 1000 draws of a day's windows would not fit in memory
     error, spread = (c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2
-    nmse_draws = np.sum((weights @ error) / (weights @ spread), axis=1)
-    nlpd_draws = (weights @ nlpd.sum(axis=1)) / weights.sum(axis=1)
+    nmse_draws = np.sum((weights @ _by_push(push, error)) / (weights @ _by_push(push, spread)), axis=1)
+    nlpd_draws = (weights @ _by_push(push, nlpd.sum(axis=1))) / (weights @ np.bincount(push))
     return {"level": 0.95, "by": "push", "nmse": _interval(nmse_draws), "nlpd": _interval(nlpd_draws)}
+
+
+def _by_push(push: np.ndarray, rows: Array) -> Array:
+    """Sums (p, ...) of rows (n, ...) over the rows of each push (n,)."""
+    sums = np.zeros((int(push.max()) + 1, *rows.shape[1:]))
+    np.add.at(sums, push, rows)
+    return sums
 
 
 def _interval(draws: Array) -> dict[str, float | None]:

@@ -1,9 +1,10 @@
-"""The windows of a validation one by one, as JSON: what was predicted, what was observed."""
+"""The windows of a validation one by one, as JSON: what was predicted, what was observed, what was left out and why."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from push_predictor.evaluation.metrics import standardised
@@ -11,18 +12,42 @@ from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.windows import PushWindow
 
 
-def write_window_log(path: Path, windows: Sequence[PushWindow], comparison: Comparison) -> None:
-    """Write the log; an older file is replaced when the new one is complete."""
+@dataclass(frozen=True)
+class Refusal:
+    """A window that the server would not predict, and what it said."""
+
+    push_id: str
+    window: int
+    reason: str
+
+
+def write_window_log(
+    path: Path,
+    windows: Sequence[PushWindow],
+    comparison: Comparison,
+    refused: Sequence[Refusal] = (),
+    unanswered: int = 0,
+) -> None:
+    """Write {"model", "windows", "refused", "unanswered"}; an older file is replaced when the new one is complete.
+
+    windows: those of the comparison, one a row. refused: windows beside these. unanswered: how many more there were.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(json.dumps({"model": comparison.model, "windows": window_log(windows, comparison)}) + "\n")
+    with temporary.open("w") as stream:  # entry by entry: a day's windows as one text would take a gigabyte
+        stream.write(f'{{"model": {json.dumps(comparison.model)}, "windows": [')
+        for k, entry in enumerate(window_log(windows, comparison)):
+            stream.write(("," if k else "") + "\n" + json.dumps(entry, allow_nan=False))
+        rest = json.dumps([asdict(refusal) for refusal in refused])
+        stream.write(f'],\n"refused": {rest}, "unanswered": {unanswered}}}\n')
     temporary.replace(path)
 
 
-def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> list[dict[str, object]]:
+def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> Iterator[dict[str, object]]:
     """One entry a window, in the fields and units of PushResidual; stamps in ns."""
     z = standardised(comparison.mean, comparison.covariance, comparison.observed)
-    return [
-        {
+    for k, window in enumerate(windows):
+        yield {
             "push_id": window.push_id,
             "window": window.index,
             "start": window.start,
@@ -36,5 +61,3 @@ def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> list[di
             "observed": comparison.observed[k].tolist(),
             "standardised": z[k].tolist(),
         }
-        for k, window in enumerate(windows)
-    ]

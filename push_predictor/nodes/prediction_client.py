@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
-from typing import Any
+from typing import Any, TypeAlias
 
 from push_predictor_interfaces.srv import PredictPush
 from rclpy.node import Node
@@ -14,72 +14,101 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 IN_FLIGHT = 8  # a service queue of the default depth holds ten
-Answer = Callable[[PredictPush.Response], None]
+PAUSE = 1.0  # s before a server that cannot answer for a model is asked about it again
+NOT_NOW = ("model:", "default_model:", "the node is ")  # refusals that speak of the server, not of the push
+Answer: TypeAlias = Callable[[PredictPush.Response], None]
 
 
-@dataclass
-class _Sent:
-    future: Future
-    deadline: float
+@dataclass(eq=False)
+class _Asked:
+    """A request and its on_answer; futures: one for each time that it was sent."""
+
     request: PredictPush.Request
     on_answer: Answer
+    deadline: float = 0.0
+    futures: list[Future] = field(default_factory=list)
 
 
 class PredictionClient:
-    """A queue of requests to predict_push. A request that meets its deadline unanswered is sent again."""
+    """A queue of requests to predict_push, one a model.
+
+    A request that meets its deadline unanswered is sent again; the first answer counts. One that is refused because of
+    the server's state (a model not loaded yet, a node not active) waits and is sent again.
+    """
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=100))
         self._timeout = timeout
-        self._waiting: deque[tuple[PredictPush.Request, Answer]] = deque()
-        self._sent: list[_Sent] = []
+        self._waiting: dict[str, deque[_Asked]] = {}
+        self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
+        self._sent: list[_Asked] = []
         self.timeouts = 0
 
     @property
     def open(self) -> int:
         """Requests without an answer yet."""
-        return len(self._waiting) + len(self._sent)
+        return len(self._sent) + sum(map(len, self._waiting.values()))
 
     @property
     def server_is_there(self) -> bool:
         """Whether somebody offers the service."""
         return bool(self._client.service_is_ready())
 
+    @property
+    def problems(self) -> list[str]:
+        """Why the server does not answer for some models, in its words."""
+        return [f"predict_push: {reason}" for _, reason in self._blocked.values()]
+
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
         """Queue a request; on_answer gets the response, in the executor's thread."""
-        self._waiting.append((request, on_answer))
+        self._waiting.setdefault(request.model, deque()).append(_Asked(request, on_answer))
 
     def work(self) -> None:
-        """Send what may be sent, take back what was not answered in time. Call it often, from the executor's thread."""
-        self._take_back(monotonic())
-        while self._waiting and len(self._sent) < IN_FLIGHT and self.server_is_there:
-            self._send(*self._waiting.popleft())
+        """Send what may be sent, again what was not answered in time. Call it often, from the executor's thread."""
+        if not self.open or not self.server_is_there:
+            return
+        now = monotonic()
+        for asked in self._sent:
+            if asked.deadline < now:
+                self.timeouts += 1
+                self._send(asked, now)
+        while len(self._sent) < IN_FLIGHT and (queue := self._next_queue(now)) is not None:
+            self._sent.append(asked := queue.popleft())
+            self._send(asked, now)
 
-    def forget(self) -> int:
-        """Give up all open requests; returns how many."""
-        lost = self.open
-        for sent in self._sent:
-            self._client.remove_pending_request(sent.future)
+    def forget(self) -> None:
+        """Give up all open requests."""
+        for asked in self._sent:
+            self._abandon(asked)
         self._sent.clear()
         self._waiting.clear()
-        return lost
+        self._blocked.clear()
 
-    def _send(self, request: PredictPush.Request, on_answer: Answer) -> None:
-        sent = _Sent(self._client.call_async(request), monotonic() + self._timeout, request, on_answer)
-        self._sent.append(sent)
-        sent.future.add_done_callback(lambda future: self._answered(sent, future))
+    def _next_queue(self, now: float) -> deque[_Asked] | None:
+        """Of the models that may be asked about, the one with the most to ask."""
+        free = [q for model, q in self._waiting.items() if q and self._blocked.get(model, (0.0, ""))[0] <= now]
+        return max(free, key=len, default=None)
 
-    def _answered(self, sent: _Sent, future: Any) -> None:
-        if sent not in self._sent:  # given up, or taken back just before
+    def _send(self, asked: _Asked, now: float) -> None:
+        asked.deadline = now + self._timeout
+        future = self._client.call_async(asked.request)
+        asked.futures.append(future)
+        future.add_done_callback(lambda done: self._answered(asked, done))
+
+    def _answered(self, asked: _Asked, future: Any) -> None:
+        if asked not in self._sent:  # answered before, or given up
             return
-        self._sent.remove(sent)
-        if (response := future.result()) is not None:
-            sent.on_answer(response)
+        self._sent.remove(asked)
+        self._abandon(asked)
+        response, model = future.result(), asked.request.model
+        if not response.success and response.message.startswith(NOT_NOW):
+            self._blocked[model] = (monotonic() + PAUSE, response.message)
+            self._waiting[model].appendleft(_Asked(asked.request, asked.on_answer))
+        else:
+            self._blocked.pop(model, None)
+            asked.on_answer(response)
         self.work()
 
-    def _take_back(self, now: float) -> None:
-        for sent in [sent for sent in self._sent if sent.deadline < now]:
-            self.timeouts += 1
-            self._sent.remove(sent)
-            self._client.remove_pending_request(sent.future)
-            self._waiting.appendleft((sent.request, sent.on_answer))
+    def _abandon(self, asked: _Asked) -> None:
+        for future in asked.futures:
+            self._client.remove_pending_request(future)

@@ -30,6 +30,8 @@ class PushTracker:
         self._idle = 0.0
         self._pushes = 0
         self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
+        self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # near the slider, before the first push
+        self._touching = False
         self._first_touch: int | None = None
 
     @property
@@ -41,7 +43,7 @@ class PushTracker:
         """Take one sample; returns the windows that end by it."""
         self._note_interruptions(sample)
         self._note_free_force(sample)
-        touching = not sample.blind and self._touches(sample)
+        self._touching = touching = not sample.blind and self._touches(sample)
         if touching and self._first_touch is None:
             self._first_touch = sample.stamp
         if touching and sample.speed >= self.options.least_speed:
@@ -61,22 +63,33 @@ class PushTracker:
             self._end_push()
 
     def _note_free_force(self, sample: Judged) -> None:
-        free = sample.height > self.options.lift or sample.gap > FREE_GAP
-        if free and sample.force is not None and not sample.blind:
+        if sample.force is None or sample.blind:
+            return
+        if sample.height > self.options.lift or sample.gap > FREE_GAP:
             self._free_force.append(sample.force)
+        elif sample.speed < self.options.least_speed and self.push is None:
+            self._resting_force.append(sample.force)
 
     def _touches(self, sample: Judged) -> bool:
         if sample.height > self.options.lift:
             return False
-        if sample.force is None or not self._free_force:
-            return sample.gap <= self.options.touch_gap_alone
-        zero, noise = self._zero()
-        force = float(np.hypot(*(sample.force - zero)))
-        return sample.gap <= self.options.touch_gap and force > max(self.options.least_force, NOISE_FACTOR * noise)
+        pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
+        if sample.force is not None and self._free_force:
+            return pressed
+        # What a resting tip reads may be a preload: it can keep a contact but not tell where one begins or ends.
+        return sample.gap <= self.options.touch_gap_alone or (self._touching and pressed)
 
-    def _zero(self) -> tuple[Array, float]:
-        """The sensor's reading and its noise (N) without contact."""
-        readings = np.array(self._free_force)
+    def _presses(self, force: Array | None) -> bool:
+        zero, noise = self._zero()
+        if force is None or zero is None:
+            return False
+        return float(np.hypot(*(force - zero))) > max(self.options.least_force, NOISE_FACTOR * noise)
+
+    def _zero(self) -> tuple[Array | None, float]:
+        """The sensor's reading and its noise (N) in free motion, before any near the slider at rest, else None."""
+        if not (seen := self._free_force or self._resting_force):
+            return None, 0.0
+        readings = np.array(seen)
         return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
 
     def _pushing(self, sample: Judged) -> list[tuple[int, int]]:
@@ -107,8 +120,7 @@ class PushTracker:
         first = self._first_touch if self._first_touch is not None else sample.stamp
         if self.push is not None and first == self.push.first_touch:
             first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again
-        tare = self._zero()[0] if self._free_force else None
-        self.push = PushContext(_push_id(first), self._pushes, first, tare, None, 0)
+        self.push = PushContext(_push_id(first), self._pushes, first, self._zero()[0], None, 0)
         self._pushes += 1
         self._start = None
 

@@ -23,7 +23,7 @@ def standard_bags() -> dict[str, SimulationSpec]:
     """The specs by name. square_abs_* share slider and table; every recording has pushes of its own."""
     specs = (
         _spec("square_abs_train", "rect1", "abs", _random(220, 1), 1),
-        _spec("square_abs_test", "rect1", "abs", _random(75, 2), 2),
+        _spec("square_abs_test", "rect1", "abs", _random(120, 2), 2),
         _spec("square_abs_repeats", "rect1", "abs", _repeats(), 3),
         _spec("ellipse_plywood", "ellip2", "plywood", _random(15, 4), 4),
         _spec("circle_pu", "ellip1", "pu", _random(10, 5), 5),

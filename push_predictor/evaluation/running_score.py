@@ -1,0 +1,46 @@
+"""NMSE, NLPD and coverage while windows come in, at the same cost for each: what a diagnostic can show every second."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.types import Array
+
+
+class RunningScore:
+    """Sums over the windows of one model. training_mean (3,): the reference of the NMSE."""
+
+    def __init__(self, training_mean: Array) -> None:
+        self.windows = 0
+        self._training_mean = training_mean
+        self._pushes: set[str] = set()
+        self._error, self._spread, self._nlpd = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._covered = np.zeros((len(COVERAGE_LEVELS), 3))
+
+    @property
+    def pushes(self) -> int:
+        """Of how many pushes the windows are."""
+        return len(self._pushes)
+
+    def add(self, push_id: str, mean: Array, covariance: Array, observed: Array) -> None:
+        """Count a window: mean (3,), covariance (3, 3), observed (3,)."""
+        predicted, variance, outcome = mean[None], np.diagonal(covariance)[None], observed[None]
+        self.windows += 1
+        self._pushes.add(push_id)
+        self._error += (observed - mean) ** 2
+        self._spread += (observed - self._training_mean) ** 2
+        self._nlpd += gaussian_nlpd(predicted, variance, outcome)[0]
+        self._covered += [coverage(predicted, variance, outcome, level) for level in COVERAGE_LEVELS]
+
+    def values(self) -> dict[str, int | float | None]:
+        """The totals of `metrics_json` and the coverage of each output, by name; None where no window tells."""
+        found: dict[str, int | float | None] = {"windows": self.windows, "pushes": self.pushes}
+        known = self.windows > 0 and bool(np.all(self._spread > 0.0))
+        found["nmse"] = float(np.sum(self._error / self._spread)) if known else None
+        found["nlpd"] = float(np.sum(self._nlpd) / self.windows) if self.windows else None
+        for level, covered in zip(COVERAGE_LEVELS, self._covered, strict=True):
+            shares = (float(c) / self.windows if self.windows else None for c in covered)
+            found |= {f"coverage {level} {name}": share for name, share in zip(OUTPUTS, shares, strict=True)}
+        return found

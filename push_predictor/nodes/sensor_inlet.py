@@ -1,0 +1,94 @@
+"""What the tracker, the robot and the force sensor publish, taken in portions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from msg_adapters.streams import SLIDER, TIP, WRENCH, Inbox, slider_stream, tip_stream, wrench_stream
+from push_predictor.nodes.polled import PolledGroup, take_all
+from push_predictor.recordings.streams import PoseStream, WrenchStream
+
+DEPTH = 1000
+TOPICS = (
+    ("slider", PoseStamped, "slider/pose", SLIDER),
+    ("pusher", PoseStamped, "pusher/pose", TIP),
+    ("wrench", WrenchStamped, "pusher/wrench", WRENCH),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A portion of each stream."""
+
+    slider: PoseStream
+    pusher: PoseStream
+    wrench: WrenchStream
+
+    def __len__(self) -> int:
+        return len(self.slider) + len(self.pusher) + len(self.wrench)
+
+
+class SensorInlet:
+    """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides say otherwise.
+
+    frame_id: what the headers must name, empty for any.
+    """
+
+    def __init__(self, node: Node, frame_id: str) -> None:
+        self._node = node
+        self._inboxes = {name: Inbox(kind, frame_id) for name, _, _, kind in TOPICS}
+        group, overriding = PolledGroup(), QoSOverridingOptions.with_default_policies()
+        self._subscriptions = {
+            name: node.create_subscription(
+                message,
+                topic,
+                self._inboxes[name].put,
+                QoSProfile(depth=DEPTH),
+                callback_group=group,
+                qos_overriding_options=overriding,
+                raw=True,
+            )
+            for name, message, topic, _ in TOPICS
+        }
+
+    def __len__(self) -> int:
+        return sum(map(len, self._inboxes.values()))
+
+    def drain(self) -> None:
+        """Bring in what has arrived."""
+        for subscription in self._subscriptions.values():
+            take_all(subscription)
+
+    def take(self) -> Samples:
+        """The usable samples since the last call."""
+        slider, tip, wrench = (self._inboxes[name].take() for name, *_ in TOPICS)
+        return Samples(slider_stream(*slider), tip_stream(*tip), wrench_stream(*wrench))
+
+    def figures(self) -> dict[str, int]:
+        """Counts by topic; rejected also by kind, for the kinds that occurred."""
+        found: dict[str, int] = {}
+        for name, inbox in self._inboxes.items():
+            found |= {f"{name} samples": inbox.received, f"{name} rejected": inbox.rejected.total()}
+            found |= {f"{name} rejected {kind}": count for kind, count in inbox.rejected.items()}
+            if inbox.dropped:
+                found[f"{name} dropped"] = inbox.dropped
+        return found
+
+    def problems(self) -> list[str]:
+        """What keeps pushes from being found, in words."""
+        found = []
+        for name, inbox in self._inboxes.items():
+            topic = self._subscriptions[name].topic_name
+            if not inbox.received and name != "wrench":
+                found.append(f"no sample on {topic}, which {self._node.count_publishers(topic)} nodes publish")
+            if inbox.rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in inbox.rejected.items())
+                found.append(f"{topic}: {inbox.rejected.total()} of {inbox.received} samples rejected ({kinds})")
+            if inbox.dropped:
+                found.append(f"{topic}: {inbox.dropped} samples dropped while model or rig were unknown")
+        return found

@@ -1,0 +1,91 @@
+"""One score: the windows found from first sample to end, what was asked about them, what was answered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.srv import PredictPush
+
+from msg_adapters import MessageError
+from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
+from push_predictor.evaluation.live_validation import LiveValidation
+from push_predictor.evaluation.offline import window_options
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.nodes.prediction_client import PredictionClient
+from push_predictor.nodes.residual_recorder import residual_message
+from push_predictor.nodes.sensor_inlet import Samples
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.window_finder import WindowFinder
+from push_predictor.recordings.windows import PushWindow
+
+
+class ValidationRun:
+    """Feed it samples; it asks the client about every window and keeps the score.
+
+    models: by the name to ask for, the main one first. show: called for every prediction, with the number of the model.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        models: Mapping[str, PushModel],
+        client: PredictionClient,
+        show: Callable[[int, PushWindow, Prediction, PushResidual], None],
+    ) -> None:
+        self.rig = rig
+        self.validation = LiveValidation(models)
+        self.refused = 0
+        self.last_refusal = ""
+        self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
+        self._client = client
+        self._show = show
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What the window finder met in the streams."""
+        return self._finder.counts
+
+    def feed(self, samples: Samples) -> None:
+        """Take a portion of the streams."""
+        self._finder.add_wrench(samples.wrench)
+        self._finder.add_pusher(samples.pusher)
+        self._finder.add_slider(samples.slider)
+        self._ask_about(self._finder.take_ready())
+
+    def finish(self) -> None:
+        """No more samples will come."""
+        self._ask_about(self._finder.finish())
+
+    def _ask_about(self, windows: Sequence[PushWindow]) -> None:
+        for window in windows:
+            number = self.validation.add(window)
+            push = np.array([window.velocity, window.contact, window.angle])
+            for model, name in enumerate(self.validation.names):
+                request = query_to_request(name, push, window.duration)
+                self._client.ask(request, self._taking(model, number))
+
+    def _taking(self, model: int, number: int) -> Callable[[PredictPush.Response], None]:
+        return lambda response: self._take(model, number, response)
+
+    def _take(self, model: int, number: int, response: PredictPush.Response) -> None:
+        window, name = self.validation.windows[number], self.validation.names[model]
+        try:
+            prediction = _usable(prediction_from_response(response))
+            residual = residual_message(name, window, prediction.mean[0], prediction.covariance[0])
+        except (RefusedError, MessageError) as error:
+            self.refused += 1
+            self.last_refusal = f"{name}: {error}"
+            self.validation.refuse(model, number, str(error))
+            return
+        self.validation.record(model, number, prediction)
+        self._show(model, window, prediction, residual)
+
+
+def _usable(prediction: Prediction) -> Prediction:
+    """Raises MessageError for a number that is not finite."""
+    for name, values in (("mean", prediction.mean), ("covariance", prediction.covariance)):
+        if not np.all(np.isfinite(values)):
+            raise MessageError(f"response {name}", values.ravel().tolist(), "finite numbers")
+    return prediction
