@@ -28,7 +28,15 @@ setup(
         "report": ["matplotlib>=3.8"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
-        "test": ["pytest>=8", "pytest-xdist>=3.5", "hypothesis>=6", "ruff>=0.6", "mypy>=1.11", "scikit-learn>=1.4", "mcap-ros2-support>=0.5"],
+        "test": [
+            "pytest>=8",
+            "pytest-xdist>=3.5",
+            "hypothesis>=6",
+            "ruff>=0.6",
+            "mypy>=1.11",
+            "scikit-learn>=1.4",
+            "mcap-ros2-support>=0.5",
+        ],
     },
     entry_points={
         "console_scripts": [

@@ -33,6 +33,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.served import ServedModel, serve
 from push_predictor.models.train import train_model
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.recordings.rig import Rig
@@ -99,21 +100,25 @@ def _measure(path: Path, calls: int) -> None:
         rclpy.try_shutdown()
     print(f"{model.name}: {model.kind}, {len(model.training)} windows; {calls} calls of each service, one at a time")
     print(f"load average {load_before:.1f} before, {os.getloadavg()[0]:.1f} after, {os.cpu_count()} cores")
-    _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in times.items()}, callback, model)
+    _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in times.items()}, callback)
+    start = perf_counter()
+    served = serve(model)
+    print(f"served: {served.how}; made in {perf_counter() - start:.2f} s")
+    print(f"in this process, p50: served model {_model_time(served):.0f} us, the model {_model_time(model):.0f} us")
 
 
-def _report(times: dict[str, np.ndarray], callback: dict[str, str], model: PushModel) -> None:
+def _report(times: dict[str, np.ndarray], callback: dict[str, str]) -> None:
     rows = {name: np.percentile(values, [50, 95, 99]) for name, values in times.items()}
     print(f"{'us':24s}{'p50':>9s}{'p95':>9s}{'p99':>9s}")
     for name, row in rows.items():
         print(f"{name + ' round trip':24s}" + "".join(f"{value:9.0f}" for value in row))
     print(f"{'ratio':24s}" + "".join(f"{value:9.2f}" for value in rows["predict_push"] / rows["empty"]))
     print(f"callback in the server: p50 {callback['callback_p50_us']} us, p99 {callback['callback_p99_us']} us")
-    print(f"model alone, in this process: p50 {_model_time(model):.0f} us")
 
 
-def _model_time(model: PushModel) -> float:
-    inputs, duration = model.training.inputs[:200], model.training.duration[:200]
+def _model_time(model: PushModel | ServedModel) -> float:
+    training = model.model.training if isinstance(model, ServedModel) else model.training
+    inputs, duration = training.inputs[:200], training.duration[:200]
     times = []
     for k in range(len(inputs)):
         start = perf_counter()

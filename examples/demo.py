@@ -21,10 +21,12 @@ import numpy as np
 
 from examples.live_table import LiveTable
 from examples.processes import node
+from push_predictor.evaluation.figures.readme import readme_picture
 from push_predictor.evaluation.offline import report_windows, validate_recording
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.windows import windows_to_table
 
 ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
@@ -43,7 +45,9 @@ def main() -> int:
     begun = time.monotonic()
     print("1. learn from", TRAINING.relative_to(ROOT))
     paths = [_trained(kind) for kind in KINDS]
-    print(f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (domain {os.environ['ROS_DOMAIN_ID']})")
+    print(
+        f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (domain {os.environ['ROS_DOMAIN_ID']})"
+    )
     _replay_and_validate(paths)
     print("3. online against offline, window by window")
     models = [load_model(path) for path in paths]
@@ -102,8 +106,10 @@ def _report(models: Sequence[PushModel], agreement: str) -> Path:
     results = [validate_recording(model, HELD_OUT) for model in models]
     comparisons = [comparison for _, comparison in results]
     _print_summary(comparisons)
+    windows = results[0][0]
+    readme_picture(OUT / "overview.png", models[0], windows_to_table(windows))
     facts = {"online against offline": agreement, "replayed at rate": f"{RATE:g}"}
-    return report_windows(models, results[0][0], comparisons, OUT / "report", HELD_OUT.name, facts)
+    return report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts)
 
 
 def _print_summary(comparisons: Sequence[Comparison]) -> None:

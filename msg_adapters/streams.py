@@ -1,10 +1,11 @@
-"""Serialized sensor messages gathered into the library's streams, portion by portion, as reading a recording does it."""
+"""Serialized sensor messages gathered into the library's streams, by the rules that read_recording keeps."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from push_predictor.types import Array, BoolArray
 
 LIMIT = 200_000  # messages that wait, a topic: over 13 minutes at 250 Hz, 25 MB
 SMALLEST_COMPONENT = 1e-6  # a quaternion with no component above this tells no heading
-Test = Callable[[Array], BoolArray]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class SensorKind:
     """How a topic's messages are laid out, and what makes one useless: {what is wrong: which rows (n,) have it}."""
 
     layout: Layout
-    faults: Mapping[str, Test]
+    faults: Mapping[str, Callable[[Array], Any]]
 
 
 SLIDER = SensorKind(
@@ -85,12 +85,14 @@ def slider_stream(stamp: np.ndarray, rows: Array) -> PoseStream:
     """Poses (n, 7) that have an orientation, of any length."""
     scaled = rows[:, 3:] / np.abs(rows[:, 3:]).max(axis=1, keepdims=True)
     unit = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
-    return PoseStream(stamp, *rows[:, :3].T.copy(), yaw_of_quaternion(*unit.T))
+    x, y, z = rows[:, :3].T.copy()
+    return PoseStream(stamp, x, y, z, yaw_of_quaternion(*unit.T))
 
 
 def tip_stream(stamp: np.ndarray, rows: Array) -> PoseStream:
     """Poses (n, 7) of a point: the orientation is of no use."""
-    return PoseStream(stamp, *rows[:, :3].T.copy(), np.zeros(len(rows)))
+    x, y, z = rows[:, :3].T.copy()
+    return PoseStream(stamp, x, y, z, np.zeros(len(rows)))
 
 
 def wrench_stream(stamp: np.ndarray, rows: Array) -> WrenchStream:

@@ -34,7 +34,9 @@ class Push:
     speed: float = 0.02
 
 
-def translating_push(push: Push = Push(), *, contact: float = 0.125, rate: float = 100.0, tail: float = 0.8) -> Recording:
+def translating_push(
+    push: Push = Push(), *, contact: float = 0.125, rate: float = 100.0, tail: float = 0.8
+) -> Recording:
     """The slider is pushed from rest at the origin, by a tip that always drives at the push's speed towards it."""
     rig = square_rig()
     time = np.arange(0.0, push.end + tail, 1.0 / rate)

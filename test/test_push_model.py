@@ -41,7 +41,9 @@ def noisy_pushes(n: int = 120, seed: int = 0, rig: Rig | None = None, windows_pe
 
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
-    return {kind: train_model(noisy_pushes(), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS}
+    return {
+        kind: train_model(noisy_pushes(), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
+    }
 
 
 @pytest.mark.parametrize("kind", KINDS)

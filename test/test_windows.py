@@ -162,7 +162,8 @@ def test_two_contacts_are_two_pushes() -> None:
 
     def joined(a: PoseStream, b: PoseStream) -> PoseStream:
         return PoseStream(
-            np.concatenate([a.stamp, b.stamp + shift]), *(np.concatenate([getattr(a, k), getattr(b, k)]) for k in ("x", "y", "z", "heading"))
+            np.concatenate([a.stamp, b.stamp + shift]),
+            *(np.concatenate([getattr(a, k), getattr(b, k)]) for k in ("x", "y", "z", "heading")),
         )
 
     wrench = replace(
@@ -170,7 +171,9 @@ def test_two_contacts_are_two_pushes() -> None:
         stamp=np.concatenate([first.wrench.stamp, second.wrench.stamp + shift]),
         **{k: np.tile(getattr(first.wrench, k), 2) for k in ("fx", "fy", "torque")},
     )
-    both = replace(first, slider=joined(first.slider, second.slider), pusher=joined(first.pusher, second.pusher), wrench=wrench)
+    both = replace(
+        first, slider=joined(first.slider, second.slider), pusher=joined(first.pusher, second.pusher), wrench=wrench
+    )
     table = windows_to_table(windows_of(both))
     assert len(table.pushes) == 2
     assert len(table) == 2 * len(windows_of(first))

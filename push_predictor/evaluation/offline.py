@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from push_predictor.errors import RecordingError
-from push_predictor.evaluation.validation import Comparison, compare, metrics_json, trained_on
+from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
+from push_predictor.models.served import serve
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -32,11 +35,23 @@ def window_options(model: PushModel) -> WindowOptions:
     return WindowOptions(duration=float(model.training.duration[0]))
 
 
+def rig_difference(model: PushModel, rig: Rig) -> str:
+    """In words, in what the slider or pusher that a model was trained with differ from a rig; empty if in nothing."""
+    trained = model.rig
+    if not _same(trained.outline.vertices, rig.outline.vertices) or trained.outline.semi_axes != rig.outline.semi_axes:
+        return f"model {model.name!r} was trained with the outline of {trained.shape!r}, the rig is {rig.shape!r}"
+    if not _same(trained.pusher_radius, rig.pusher_radius):
+        radii = f"{trained.pusher_radius:g} m, the rig's is {rig.pusher_radius:g} m"
+        return f"model {model.name!r} was trained with a pusher radius of {radii}"
+    return ""
+
+
 def validate_recording(model: PushModel, path: Path, rig: Rig | None = None) -> tuple[list[PushWindow], Comparison]:
-    """Predict every window of a recording."""
+    """Predict every window of a recording, as a server of the model would."""
     windows, table = recorded_windows(model, path, rig)
     check_table(model, table)
-    return windows, compare(model, table)
+    prediction = serve(model).predict(table.inputs, table.duration)
+    return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 
 def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
@@ -45,6 +60,12 @@ def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tupl
     comparisons = [compare(model, table) for model in models]
     page = report_windows(models, windows, comparisons, out, path.name)
     return page, [metrics_json(comparison) for comparison in comparisons]
+
+
+def _same(first: object, second: object) -> bool:
+    """Equal to a micrometre."""
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    return a.shape == b.shape and bool(np.allclose(a, b, rtol=0.0, atol=1e-6))
 
 
 def report_windows(

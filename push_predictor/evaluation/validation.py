@@ -43,7 +43,7 @@ def compare(model: PushModel, table: PushTable) -> Comparison:
 
 
 def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
-    """Set predictions (n, 3), (n, 3, 3) that were already made, by a service perhaps, beside the outcomes of a table."""
+    """Set predictions (n, 3), (n, 3, 3) that were made already, by a service perhaps, beside a table's outcomes."""
     return Comparison(
         model.name,
         len(model.training),

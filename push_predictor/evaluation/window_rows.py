@@ -52,6 +52,7 @@ def _packed(w: PushWindow) -> bytes:
 
 def _unpacked(push_id: str, names: tuple[str, ...], data: bytes) -> PushWindow:
     index, start, end, velocity, contact, angle, duration, *poses, heading = _FIXED.unpack_from(data)
+    displacement, slider_start, slider_end = np.array(poses).reshape(3, 3)
     covariates = struct.unpack_from(f"<{len(names)}d", data, _FIXED.size)
     return PushWindow(
         push_id,
@@ -62,7 +63,9 @@ def _unpacked(push_id: str, names: tuple[str, ...], data: bytes) -> PushWindow:
         contact,
         angle,
         duration,
-        *np.array(poses).reshape(3, 3),
-        push_heading=heading,
-        covariates=dict(zip(names, covariates, strict=True)),
+        displacement,
+        slider_start,
+        slider_end,
+        heading,
+        dict(zip(names, covariates, strict=True)),
     )

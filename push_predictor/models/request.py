@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf, isfinite, pi
 
 import numpy as np
 
@@ -16,6 +17,16 @@ def check_request(
     model: PushModel, velocity: float, contact: float, angle: float, duration: float, covariates: Mapping[str, float]
 ) -> None:
     """Raise RequestError naming field, value and what is accepted, unless the model can answer this push."""
+    low, high = model.duration_range
+    if (
+        0.0 < velocity < inf
+        and 0.0 <= contact < 1.0
+        and abs(angle) < pi / 2.0
+        and 0.0 < duration < inf
+        and low <= duration <= high
+        and all(map(isfinite, covariates.values()))
+    ):
+        return  # in a microsecond; the rest is for saying what is wrong
     _check(model, np.array([[velocity, contact, angle]]), duration, {k: np.array([v]) for k, v in covariates.items()})
 
 

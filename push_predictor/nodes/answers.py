@@ -26,20 +26,20 @@ ROWS_AT_ONCE = 4096  # of a batch, so that its length does not decide how much m
 def answer_push(shelf: ModelShelf, request: Any, response: Any) -> None:
     """Answer PredictPush. Raises RequestError."""
     query = query_from_request(request)
-    model = shelf.get(query.model)
+    served = shelf.get(query.model)
     covariates = {name: float(column[0]) for name, column in query.covariates.items()}
-    check_request(model, request.velocity, request.contact, request.angle, query.duration, covariates)
-    fill_response(response, model.predict(query.inputs, np.array([query.duration])))
+    check_request(served.model, request.velocity, request.contact, request.angle, query.duration, covariates)
+    fill_response(response, served.predict(query.inputs, np.array([query.duration])))
 
 
 def answer_batch(shelf: ModelShelf, request: Any, response: Any) -> None:
     """Answer PredictPushBatch; one bad push refuses all. Raises RequestError."""
     query = query_from_batch_request(request)
-    model = shelf.get(query.model)
-    check_requests(model, query.inputs, query.duration, query.covariates)
+    served = shelf.get(query.model)
+    check_requests(served.model, query.inputs, query.duration, query.covariates)
     for start in range(0, len(query.inputs), ROWS_AT_ONCE):
         inputs = query.inputs[start : start + ROWS_AT_ONCE]
-        extend_batch_response(response, model.predict(inputs, np.full(len(inputs), query.duration)))
+        extend_batch_response(response, served.predict(inputs, np.full(len(inputs), query.duration)))
     response.success = True
 
 
@@ -55,4 +55,5 @@ def answer_load(shelf: ModelShelf, request: Any, response: Any) -> None:
     if not request.path:
         raise RequestError("path", request.path, "the path of a model file on the server's machine")
     response.name = shelf.load(Path(request.path), request.name)
-    response.success, response.message = True, f"{request.path} is loaded as {response.name!r}"
+    how = shelf.get(response.name).how
+    response.success, response.message = True, f"{request.path} is loaded as {response.name!r}; {how}"

@@ -7,14 +7,16 @@ from pathlib import Path
 
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
 from push_predictor.models.model_file import is_model_file, load_model
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.served import ServedModel, serve
 
 
 class ModelShelf:
-    """Loaded models in the order of their arrival. A model is taken up only when its file has been read whole."""
+    """Loaded models in the order of their arrival. A model is taken up only when its file has been read whole and its
+    table is made, so that it never answers in two ways.
+    """
 
     def __init__(self) -> None:
-        self._models: dict[str, PushModel] = {}
+        self._models: dict[str, ServedModel] = {}
         self._files: dict[str, Path] = {}
         self._chosen = ""
 
@@ -40,7 +42,7 @@ class ModelShelf:
         """Let an empty name stand for this model, loaded by now or not; empty goes back to the first."""
         self._chosen = name
 
-    def get(self, name: str) -> PushModel:
+    def get(self, name: str) -> ServedModel:
         """A model by name, the default one for an empty name. Raises RequestError if it is not loaded."""
         model = self._models.get(name or self.default)
         if model is None:
@@ -55,14 +57,20 @@ class ModelShelf:
         if `replace` is false.
         """
         path = path.expanduser().resolve()
-        model = load_model(path)
-        # The first prediction fills the model's caches; no request should wait for that.
-        model.predict(model.training.inputs[:1], model.training.duration[:1])
-        name = name or model.name
+        served = serve(load_model(path))
+        # The first prediction fills what is left of caches; no request should wait for that.
+        training = served.model.training
+        served.predict(training.inputs[:1], training.duration[:1])
+        name = name or served.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
-        self._models[name], self._files[name] = model, path
+        self._models[name], self._files[name] = served, path
         return name
+
+    @property
+    def answering(self) -> list[str]:
+        """For each model how it answers, a line each."""
+        return [f"{name}: {served.how}" for name, served in self._models.items()]
 
     def load_all(self, places: Iterable[str]) -> list[str]:
         """Load files and folders of files. Answers what went wrong, a line each; the other models are loaded."""
@@ -77,7 +85,7 @@ class ModelShelf:
 
     def describe(self, name: str) -> str:
         """One line of `key=value; ...` about a loaded model: kind, outline, surface, training, covariates, file."""
-        model = self._models[name]
+        model = self._models[name].model
         low, high = float(model.training.duration.min()), float(model.training.duration.max())
         values = {
             "kind": model.kind,

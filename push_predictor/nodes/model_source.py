@@ -7,13 +7,13 @@ from math import inf
 from pathlib import Path
 from time import monotonic
 
-from push_predictor_interfaces.srv import ListModels
 from rclpy.node import Node
 from rclpy.task import Future
 
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
+from push_predictor_interfaces.srv import ListModels
 
 PAUSE = 1.0  # s after an answer that does not settle all
 PATIENCE = 5.0  # s after which a question without an answer is asked again
@@ -59,7 +59,9 @@ class ModelSource:
 
     def _learn(self, response: ListModels.Response) -> None:
         files = {name: _file_of(text) for name, text in zip(response.names, response.descriptions, strict=False)}
-        self.problems = [problem for text in self._wanted if (problem := self._settle(text, files, response.default_model))]
+        self.problems = [
+            problem for text in self._wanted if (problem := self._settle(text, files, response.default_model))
+        ]
 
     def _settle(self, text: str, files: Mapping[str, str], default: str) -> str:
         """Answers what is wrong with a wanted model, in words, empty if nothing."""

@@ -37,7 +37,9 @@ class DeferredTrigger:
     """A std_srvs/Trigger that is answered when its work is done, while the executor goes on with other things."""
 
     def __init__(self, node: Node, name: str) -> None:
-        self._service = node.create_service(Trigger, name, lambda request, response: response, callback_group=PolledGroup())
+        self._service = node.create_service(
+            Trigger, name, lambda request, response: response, callback_group=PolledGroup()
+        )
         self._callers: list[Any] = []
 
     def asked(self) -> bool:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any, TypeAlias
 
-from push_predictor_interfaces.srv import PredictPush
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
+
+from push_predictor_interfaces.srv import PredictPush
 
 IN_FLIGHT = 8  # a service queue of the default depth holds ten
 PAUSE = 1.0  # s before a server that cannot answer for a model is asked about it again

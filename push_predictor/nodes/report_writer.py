@@ -1,11 +1,14 @@
-"""The HTML report of a validation, made by a process of its own: pictures take seconds, samples do not wait that long."""
+"""The HTML report of a validation, made by a process of its own: pictures take seconds, samples come meanwhile."""
 
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import sys
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+
+import numpy as np
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.live_validation import LiveValidation
@@ -35,11 +38,13 @@ class ReportWriter:
         """Write FOLDER/report.html about the models that answered for the windows of the main one."""
         self.stop()
         comparisons = [validation.comparison(k) for k in range(len(validation.models))]
-        whole = [k for k, c in enumerate(comparisons) if len(c.observed) == len(comparisons[0].observed)]
+        whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
         models, shown = [validation.models[k] for k in whole], [comparisons[k] for k in whole]
         # spawned: a fork would inherit the threads' locks of the middleware
         context = multiprocessing.get_context("spawn")
-        self._process = context.Process(target=_write, args=(models, validation.predicted(), shown, folder), daemon=True)
+        self._process = context.Process(
+            target=_write, args=(models, validation.predicted(), shown, folder), daemon=True
+        )
         self._process.start()
 
     def stop(self) -> None:
@@ -50,6 +55,7 @@ class ReportWriter:
 
 
 def _write(models: list[PushModel], windows: WindowRows, comparisons: list[Comparison], folder: Path) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     try:
         report_windows(models, windows, comparisons, folder, "online validation")
     except (PushPredictorError, OSError) as error:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from push_predictor_interfaces.msg import PushResidual
 from rclpy.serialization import serialize_message
 
 from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
@@ -14,6 +13,7 @@ from push_predictor.evaluation.live_validation import LiveValidation
 from push_predictor.recordings.bag_writer import BagWriter
 from push_predictor.recordings.windows import PushWindow
 from push_predictor.types import Array
+from push_predictor_interfaces.msg import PushResidual
 
 TOPIC = "push_residual"
 BAG = "residuals"

@@ -53,7 +53,9 @@ class Stop:
 
     def wait(self) -> None:
         """Block until somebody asks."""
-        self._event.wait()
+        # In turns: Python's main thread sleeps through a signal that the kernel hands to another thread.
+        while not self._event.wait(0.2):
+            pass
 
     @property
     def requested(self) -> bool:

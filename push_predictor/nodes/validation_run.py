@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from push_predictor_interfaces.msg import PushResidual
-from push_predictor_interfaces.srv import PredictPush
 
 from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
@@ -19,6 +17,8 @@ from push_predictor.nodes.sensor_inlet import Samples
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.window_finder import WindowFinder
 from push_predictor.recordings.windows import PushWindow
+from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.srv import PredictPush
 
 
 class ValidationRun:

@@ -1,0 +1,91 @@
+"""predict_server, push_replay and push_validator together.
+
+ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
+
+ARGUMENTS = (
+    ("namespace", "", "Namespace of all three nodes."),
+    ("params_file", "", "YAML file with parameters, such as those in config/; other arguments that are given win."),
+    ("use_sim_time", "false", "Nodes take /clock, which the replay publishes, for their time."),
+    ("log_level", "info", "debug, info, warn, error or fatal."),
+    ("autostart", "true", "Configure and activate predict_server; false leaves that to a lifecycle manager."),
+    ("recording", "", "Recording to replay: rosbag2 folder or .mcap file; empty: none, sensors are live."),
+    ("bag", "", "The same as recording."),
+    ("model", "", "Model file to serve and to judge."),
+    ("rate", "", "Recorded seconds per second; empty: 1, or what params_file says."),
+    ("output", "", "Folder for the validator's results; empty: nothing is written."),
+    ("rig", "", "push_rig YAML file, where the recording holds none."),
+)
+
+
+def generate_launch_description() -> LaunchDescription:
+    declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return LaunchDescription(
+        [
+            *declared,
+            SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", discovery),
+            OpaqueFunction(function=_nodes),
+        ]
+    )
+
+
+def _nodes(context: LaunchContext) -> list[Node]:
+    given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
+    recording = given["recording"] or given["bag"]
+    nodes = [
+        _node("predict_server", "push_predictor", given, _server(given)),
+        _node("push_validator", "push_validator", given, _validator(given)),
+    ]
+    if recording:
+        nodes.append(_node("push_replay", "push_replay", given, _replay(given, recording)))
+    return nodes
+
+
+def _server(given: dict[str, str]) -> dict[str, Any]:
+    models = {"models": [_path(given["model"])]} if given["model"] else {}
+    return {**models, **_switch(given, "autostart", default=True)}
+
+
+def _validator(given: dict[str, str]) -> dict[str, Any]:
+    return {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
+
+
+def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
+    rig = {"rig": _path(given["rig"])} if given["rig"] else {}
+    rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
+    # A replay that began before the validator listens would lose its first pushes.
+    return {**rig, **rate, "recording": _path(recording), "wait_for_subscribers": 30.0}
+
+
+def _node(executable: str, name: str, given: dict[str, str], parameters: dict[str, Any]) -> Node:
+    files = [given["params_file"]] if given["params_file"] else []
+    return Node(
+        package="push_predictor",
+        executable=executable,
+        name=name,
+        namespace=given["namespace"],
+        parameters=[*files, {**_switch(given, "use_sim_time", default=False), **parameters}],
+        arguments=["--ros-args", "--log-level", given["log_level"]],
+        output="screen",
+    )
+
+
+def _switch(given: dict[str, str], name: str, default: bool) -> dict[str, bool]:
+    """The parameter if it is not at its default, so that params_file may say otherwise."""
+    value = given[name].lower() in ("true", "1", "yes")
+    return {} if value == default else {name: value}
+
+
+def _path(text: str) -> str:
+    return os.path.abspath(os.path.expanduser(text))

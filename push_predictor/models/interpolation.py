@@ -1,0 +1,116 @@
+"""Smooth functions on a box: read at few points, kept as cubic splines that answer fast.
+
+An analytic function needs fewest readings at Chebyshev nodes, where interpolation converges exponentially. A cubic
+spline answers from 4 coefficients an axis, however many there are, but wants them dense: at a spacing h it errs by
+h^4 / 384 of the fourth derivative. So readings at nodes become values at knots, and those the coefficients of a
+spline, axis by axis, by one matrix each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from push_predictor.types import Array, IntArray
+
+_NOT_A_KNOT = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # no jump of the third derivative at the knot beside an end
+_ROWS_AT_ONCE = 1024  # of 4^D coefficients each: they stay in the cache
+_Numbers = TypeVar("_Numbers", float, Array)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One side of a box, from low to high, divided into cells of equal length (4 at least)."""
+
+    low: float
+    high: float
+    cells: int
+
+    def nodes(self, count: int) -> Array:
+        """Chebyshev nodes (count,) of this side."""
+        return np.asarray(self.low + (self.high - self.low) * 0.5 * (1.0 + chebyshev.chebpts1(count)))
+
+    def nodes_to_knots(self, count: int) -> Array:
+        """Matrix (cells + 1, count) from values at the nodes to values at the ends of the cells."""
+        at_nodes = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
+        at_knots = chebyshev.chebvander(np.linspace(-1.0, 1.0, self.cells + 1), count - 1)
+        return np.asarray(np.linalg.solve(at_nodes.T, at_knots.T).T)
+
+
+class TensorSpline:
+    """Interpolating cubic splines of K functions on boxes that share their D axes; twice differentiable in each.
+
+    values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots.
+    """
+
+    def __init__(self, axes: Sequence[Axis], values: Array) -> None:
+        for d, axis in enumerate(axes):
+            values = along(d + 1, _knots_to_coefficients(axis.cells), values)
+        shape = values.shape
+        self._low = np.array([axis.low for axis in axes])
+        self._per_unit = np.array([axis.cells / (axis.high - axis.low) for axis in axes])
+        self._last = np.array([axis.cells - 1 for axis in axes])
+        self._sides = list(zip(self._low.tolist(), self._per_unit.tolist(), self._last.tolist(), strict=True))
+        self._grid = np.ascontiguousarray(values)
+        self._rows = self._grid.reshape(-1, shape[-1])
+        strides = [int(np.prod(shape[d + 1 : -1])) for d in range(len(axes) + 1)]
+        self._box_stride, self._strides = strides[0], np.array(strides[1:])
+        self._block: IntArray = np.indices((4,) * len(axes)).reshape(len(axes), -1).T @ self._strides
+
+    def at(self, point: Sequence[float], box: int) -> Array:
+        """Values (K,) at one point, in plain numbers: an array of one row costs several times as much."""
+        index: list[Any] = [box]
+        weights = []
+        for x, (low, per_unit, last) in zip(point, self._sides, strict=True):
+            place = (x - low) * per_unit
+            cell = min(int(place), last)
+            index.append(slice(cell, cell + 4))
+            weights.append(_weights(place - cell))
+        values = self._grid[tuple(index)]
+        for weight in weights:
+            values = np.dot(weight, values.reshape(4, -1))
+        return values
+
+    def __call__(self, points: Array, box: IntArray | int) -> Array:
+        """Values (n, K) at points (n, D) within the axes, each in its box (n,), or all in one."""
+        boxes = np.broadcast_to(box, len(points))
+        starts = range(0, max(1, len(points)), _ROWS_AT_ONCE)
+        parts = (slice(start, start + _ROWS_AT_ONCE) for start in starts)
+        return np.concatenate([self._values(points[part], boxes[part]) for part in parts])
+
+    def _values(self, points: Array, box: IntArray) -> Array:
+        place = (points - self._low) * self._per_unit
+        cell = np.minimum(place.astype(np.int64), self._last)
+        weights = np.stack(_weights(place - cell), axis=-1)
+        product = weights[:, 0]
+        for d in range(1, weights.shape[1]):
+            product = (product[:, :, None] * weights[:, d, None, :]).reshape(-1, 4 ** (d + 1))
+        first = cell @ self._strides + box * self._box_stride
+        block = self._rows.take(first[:, None] + self._block, axis=0)
+        return np.asarray((product[:, None, :] @ block)[:, 0])
+
+
+def _weights(u: _Numbers) -> list[_Numbers]:
+    """The four cubic B-splines that are not zero at the place u of a cell, 0 to 1."""
+    v = 1.0 - u
+    uu, vv = u * u, v * v
+    return [vv * v / 6.0, (4.0 - 6.0 * uu + 3.0 * uu * u) / 6.0, (4.0 - 6.0 * vv + 3.0 * vv * v) / 6.0, uu * u / 6.0]
+
+
+def along(axis: int, matrix: Array, values: Array) -> Array:
+    """The values with a matrix (m, k) applied along an axis of length k."""
+    return np.moveaxis(np.tensordot(matrix, values, axes=(1, axis)), 0, axis)
+
+
+def _knots_to_coefficients(cells: int) -> Array:
+    """Matrix (cells + 3, cells + 1): the spline takes the values, and has no knot beside an end."""
+    equations = np.zeros((cells + 3, cells + 3))
+    rows = np.arange(cells + 1)
+    for k, weight in enumerate(_weights(0.0)[:3]):
+        equations[rows + 1, rows + k] = weight
+    equations[0, :5] = equations[-1, -5:] = _NOT_A_KNOT
+    return np.asarray(np.linalg.inv(equations)[:, 1:-1])

@@ -1,0 +1,112 @@
+"""Where a push lies in a box of velocity, place on the outline and angle; one box for each edge that differs.
+
+The place is a fraction of an edge of a polygon, or of the part of a smooth outline that its symmetry repeats. In these
+coordinates a model's predictions are smooth; `features.push_features` is what its kernels compare. Every function here
+takes one number as well as an array of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias, cast
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.features import EDGE_SPACING
+from push_predictor.types import Array, IntArray
+
+Numbers: TypeAlias = Array | float
+Whole: TypeAlias = IntArray | int
+
+
+class Chart(Protocol):
+    """One kind of outline."""
+
+    @property
+    def boxes(self) -> int:
+        """How many edges differ."""
+
+    @property
+    def place_columns(self) -> tuple[int, ...]:
+        """The columns of the features that the place becomes."""
+
+    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+        """Place and box of contacts in [0, 1)."""
+
+    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+        """The features of places, column by column."""
+
+    def place_range(self, places: Array) -> tuple[float, float]:
+        """The part of its axis that a domain around places (m,) can reach."""
+
+
+def push_chart(outline: Outline) -> Chart:
+    """The chart of an outline."""
+    if outline.rotational_symmetry == 0:
+        return CircleChart()
+    return SmoothChart(outline.rotational_symmetry) if outline.semi_axes is not None else PolygonChart(outline)
+
+
+class CircleChart:
+    """A circle: the contact makes no difference."""
+
+    boxes = 1
+    place_columns: tuple[int, ...] = ()
+
+    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+        """See Chart."""
+        return contact, 0
+
+    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+        """See Chart."""
+        return ()
+
+    def place_range(self, places: Array) -> tuple[float, float]:
+        """See Chart."""
+        return 0.0, 1.0
+
+
+@dataclass(frozen=True)
+class SmoothChart:
+    """A smooth outline of a given rotational symmetry: the place goes once around the part that repeats."""
+
+    order: int
+    boxes = 1
+    place_columns = (1, 2)
+
+    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+        """See Chart."""
+        return self.order * contact % 1.0, 0
+
+    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+        """See Chart."""
+        turn = 2.0 * np.pi * place
+        return np.cos(turn), np.sin(turn)
+
+    def place_range(self, places: Array) -> tuple[float, float]:
+        """See Chart: a box of cosine and sine may be in several pieces along the outline."""
+        return 0.0, 1.0
+
+
+class PolygonChart:
+    """A polygon: a box for each edge of the part that its symmetry repeats."""
+
+    place_columns = (1,)
+
+    def __init__(self, outline: Outline) -> None:
+        self.boxes = len(outline.vertices) // outline.rotational_symmetry
+        self._starts, self._per_length = outline.edge_starts, 1.0 / np.diff(outline.edge_starts)
+
+    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+        """See Chart."""
+        edge = self._starts.searchsorted(contact, side="right") - 1
+        return (contact - self._starts[edge]) * self._per_length[edge], edge % self.boxes
+
+    def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
+        """See Chart."""
+        return (cast(Numbers, EDGE_SPACING * box + place),)
+
+    def place_range(self, places: Array) -> tuple[float, float]:
+        """See Chart: where edges differ, the domain holds the whole of most of them."""
+        return (float(places.min()), float(places.max())) if self.boxes == 1 else (0.0, 1.0)

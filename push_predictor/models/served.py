@@ -1,0 +1,124 @@
+"""A push model as it is served: inside the domain of its training data it answers from a table, in microseconds.
+
+A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but is a smooth function of at most three. It
+is tabulated once, the table is compared with the model, and it is used only if it is true to it. Every other push and
+every other model is answered by the model itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.prediction_table import TooFineError
+from push_predictor.models.push_model import LearnedBody, Prediction, PushModel
+from push_predictor.models.tabulated_domain import TabulatedDomain, tabulated_domain
+from push_predictor.types import Array, BoolArray
+
+MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
+VARIANCE_TOLERANCE = 1e-2  # relative
+CHECKED = 250  # random pushes of the domain, and as many training pushes
+DENSITIES = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
+
+
+@dataclass(frozen=True)
+class TableError:
+    """The largest differences found between table and model: of a mean, in predicted standard deviations, and of an
+    outcome's or process variance, relative.
+    """
+
+    mean: float
+    variance: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a table with these errors may answer: at half the tolerances, for not every push was compared."""
+        return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.variance <= VARIANCE_TOLERANCE
+
+    def __str__(self) -> str:
+        return f"means to {self.mean:.1e} standard deviations, variances to {100.0 * self.variance:.2g} %"
+
+
+@dataclass(frozen=True, eq=False)
+class ServedModel:
+    """A model and, in words, how it is answered for. domain and error are None where there is no table.
+
+    A push gets the same answer alone as among others, to rounding. Made by `serve`.
+    """
+
+    model: PushModel
+    how: str
+    domain: TabulatedDomain | None = None
+    error: TableError | None = None
+
+    @property
+    def tabulated(self) -> bool:
+        """Whether pushes in the domain are answered from a table."""
+        return self.domain is not None
+
+    def predict(self, inputs: Array, duration: Array) -> Prediction:
+        """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same."""
+        if self.domain is None:
+            return self.model.predict(inputs, duration)
+        if len(inputs) == 1:
+            return self.domain.predict_one(inputs[0].tolist()) or self.model.predict(inputs, duration)
+        inside, prediction = self.domain.predict(inputs)
+        if prediction is not None:
+            return prediction
+        exact = self.model.predict(inputs[~inside], duration[~inside])
+        return _merged(inside, self.predict(inputs[inside], duration[inside]), exact) if inside.any() else exact
+
+
+def serve(model: PushModel) -> ServedModel:
+    """A model with a table, where there can be one; takes about a second for a VHGP of 1000 rows."""
+    if not isinstance(model.body, LearnedBody):
+        return ServedModel(model, "exact: only learnt models have a table")
+    how = ""
+    for density in DENSITIES:
+        try:
+            domain = tabulated_domain(model, model.body, density)
+        except TooFineError as too_fine:
+            return ServedModel(model, f"exact: {how}{too_fine}")
+        error = _error(model, domain)
+        if error.accepted:
+            return ServedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
+        how = f"a table gives {error}; "
+    return ServedModel(model, f"exact: {how}too far off")
+
+
+def _error(model: PushModel, domain: TabulatedDomain) -> TableError:
+    inputs = _probes(model)
+    inside, table = domain.predict(inputs)
+    assert table is not None, inputs[~inside]
+    exact = model.predict(inputs, np.full(len(inputs), model.training.duration[0]))
+    sd = np.sqrt(_variances(exact.covariance))
+    outcome = _variances(table.covariance) / sd**2 - 1.0
+    process = _variances(table.process_covariance) / _variances(exact.process_covariance) - 1.0
+    of_mean = np.max(np.abs(table.mean - exact.mean) / sd)
+    return TableError(float(of_mean), float(max(np.max(np.abs(outcome)), np.max(np.abs(process)))))
+
+
+def _variances(covariance: Array) -> Array:
+    return np.diagonal(covariance, axis1=1, axis2=2)
+
+
+def _probes(model: PushModel) -> Array:
+    """Pushes spread evenly over the domain, and training pushes."""
+    rng, known = np.random.default_rng(0), model.training.inputs
+    low, high = known.min(axis=0), known.max(axis=0)
+    low[1], high[1] = 0.0, 1.0
+    spread = rng.uniform(low, high, (20 * CHECKED, 3))
+    spread = spread[model.in_domain(spread)][:CHECKED]
+    return np.concatenate([spread, rng.permutation(known)[:CHECKED]])
+
+
+def _merged(chosen: BoolArray, one: Prediction, other: Prediction) -> Prediction:
+    """Row by row from `one` where chosen (n,), else from `other`."""
+    parts = []
+    for name in ("mean", "covariance", "process_covariance", "in_domain"):
+        first, second = getattr(one, name), getattr(other, name)
+        part = np.empty((len(chosen), *first.shape[1:]), first.dtype)
+        part[chosen], part[~chosen] = first, second
+        parts.append(part)
+    return Prediction(*parts)

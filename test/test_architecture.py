@@ -1,0 +1,63 @@
+"""Which way imports point, and what needs ROS: the picture in docs/architecture.md, checked."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LAYERS = ["geometry", "recordings", "models", "evaluation", "nodes"]
+ROS = ("rclpy", "rcl_interfaces", "push_predictor_interfaces", "launch", "ament_index_python")
+
+
+def imports_of(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text())
+    named = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    return named | {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+
+
+def modules(package: str) -> list[Path]:
+    return sorted((ROOT / "push_predictor" / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("package", ["geometry", "recordings", "models", "evaluation", "simulation", "commands"])
+def test_the_library_imports_no_ros(package: str) -> None:
+    for path in modules(package):
+        for name in imports_of(path):
+            assert not name.startswith((*ROS, "msg_adapters")) and "_msgs" not in name, f"{path}: {name}"
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_imports_point_one_way(package: str) -> None:
+    later = LAYERS[LAYERS.index(package) + 1 :]
+    for path in modules(package):
+        for name in imports_of(path):
+            assert not name.startswith(tuple(f"push_predictor.{layer}" for layer in later)), f"{path}: {name}"
+
+
+def test_the_simulator_knows_no_model() -> None:
+    for path in modules("simulation"):
+        for name in imports_of(path):
+            assert not name.startswith(("push_predictor.models", "push_predictor.evaluation")), f"{path}: {name}"
+
+
+def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
+    forbidden = "import sys; sys.modules.update(dict.fromkeys(['rclpy', 'matplotlib', 'rosbags', 'h5py', 'rich']))\n"
+    use = (
+        "import push_predictor.models.train, push_predictor.models.model_file, push_predictor.recordings.load\n"
+        "import push_predictor.recordings.importers, push_predictor.evaluation.offline\n"
+        "import push_predictor.simulation.rig_simulator, push_predictor.cli\n"
+        "push_predictor.cli.build_parser()\n"
+    )
+    subprocess.run([sys.executable, "-c", forbidden + use], check=True, cwd=ROOT)
+
+
+def test_versions_agree() -> None:
+    version = (ROOT / "package.xml").read_text().split("<version>")[1].split("<")[0]
+    assert f'__version__ = "{version}"' in (ROOT / "push_predictor" / "__init__.py").read_text()
+    assert f'version="{version}"' in (ROOT / "setup.py").read_text()
+    assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()

@@ -1,0 +1,104 @@
+"""Metrics and splits by their definitions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal, norm
+
+from push_predictor.evaluation.metrics import coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
+from push_predictor.evaluation.splits import held_out_pushes, push_bootstrap, push_folds
+from push_predictor.recordings.table import PushTable, concatenate
+
+RNG = np.random.default_rng(0)
+OUTCOMES = RNG.standard_normal((400, 3)) * [1e-3, 2e-3, 0.05]
+SD = np.array([1e-3, 2e-3, 0.05])
+
+
+def pushes(sizes: list[int]) -> PushTable:
+    push_id = np.repeat([f"p{k}" for k in range(len(sizes))], sizes)
+    n = len(push_id)
+    return PushTable(np.full((n, 3), 0.1), np.full(n, 0.2), np.zeros((n, 3)), push_id)
+
+
+def test_predicting_the_training_mean_scores_one_per_output() -> None:
+    mean = np.array([1e-3, 0.0, 0.01])
+    assert nmse(np.tile(mean, (400, 1)), OUTCOMES, mean) == pytest.approx(np.ones(3))
+    assert nmse(OUTCOMES, OUTCOMES, mean) == pytest.approx(np.zeros(3))
+
+
+def test_an_outcome_that_does_not_vary_has_no_nmse() -> None:
+    assert np.isnan(nmse(np.ones((3, 1)), np.zeros((3, 1)), np.zeros(1))[0])
+
+
+def test_nlpd_is_the_negative_log_density() -> None:
+    mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
+    assert gaussian_nlpd(mean, variance, OUTCOMES) == pytest.approx(-norm.logpdf(OUTCOMES, 0.0, SD))
+
+
+def test_units_move_nlpd_by_the_logarithm_of_their_ratio() -> None:
+    scale = np.array([1e3, 1e3, 1.0])
+    mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
+    in_si = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
+    in_mm = gaussian_nlpd(mean * scale, variance * scale**2, OUTCOMES * scale).sum(axis=1)
+    assert in_mm - in_si == pytest.approx(np.full(400, 2.0 * np.log(1000.0)))
+
+
+def test_the_joint_density_is_the_product_where_outputs_are_independent() -> None:
+    mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
+    product = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
+    assert joint_nlpd(mean, np.tile(np.diag(SD**2), (400, 1, 1)), OUTCOMES) == pytest.approx(product)
+
+
+def test_the_joint_density_of_correlated_outputs() -> None:
+    root = np.diag(SD) @ np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [-0.3, 0.2, 1.0]])
+    covariance = root @ root.T
+    expected = -multivariate_normal(np.zeros(3), covariance).logpdf(OUTCOMES)
+    assert joint_nlpd(np.zeros((400, 3)), np.tile(covariance, (400, 1, 1)), OUTCOMES) == pytest.approx(expected)
+
+
+def test_standardised_residuals_of_a_right_model_have_unit_covariance() -> None:
+    root = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, 0.0], [0.1, -0.4, 0.2]])
+    outcomes = np.random.default_rng(1).standard_normal((20_000, 3)) @ root.T
+    z = standardised(np.zeros_like(outcomes), np.tile(root @ root.T, (len(outcomes), 1, 1)), outcomes)
+    assert np.cov(z.T) == pytest.approx(np.eye(3), abs=0.04)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
+def test_a_right_model_covers_what_it_says(level: float) -> None:
+    outcomes = np.random.default_rng(2).standard_normal((20_000, 2))
+    shares = coverage(np.zeros_like(outcomes), np.ones_like(outcomes), outcomes, level)
+    assert shares == pytest.approx(np.full(2, level), abs=0.012)
+
+
+@given(sizes=st.lists(st.integers(1, 9), min_size=2, max_size=30), seed=st.integers(0, 99))
+def test_every_split_keeps_pushes_whole(sizes: list[int], seed: int) -> None:
+    table = pushes(sizes)
+    splits = [push_folds(table, 5, seed), held_out_pushes(table, 0.3, seed), *push_bootstrap(table.push_id, seed, 3)]
+    for labels in splits:
+        for push in table.pushes:
+            assert len(set(labels[table.push_id == push].tolist())) == 1
+
+
+@given(sizes=st.lists(st.integers(1, 9), min_size=5, max_size=30))
+def test_folds_hold_equally_many_pushes(sizes: list[int]) -> None:
+    table = pushes(sizes)
+    folds = push_folds(table, 5)
+    counts = [len(set(table.push_id[folds == k].tolist())) for k in range(5)]
+    assert max(counts) - min(counts) <= 1
+
+
+def test_a_bootstrap_draws_as_many_pushes_as_there_are() -> None:
+    table = pushes([1, 5, 2, 7])
+    first_rows = [table.push_id.tolist().index(push) for push in table.pushes]
+    assert np.all(push_bootstrap(table.push_id)[:, first_rows].sum(axis=1) == 4)
+
+
+def test_tables_keep_the_covariates_that_all_of_them_have() -> None:
+    one, other = pushes([2]), pushes([3])
+    one.covariates.update(a=np.zeros(2), b=np.ones(2))
+    other.covariates.update(b=np.zeros(3))
+    both = concatenate([one, other])
+    assert len(both) == 5 and list(both.covariates) == ["b"]

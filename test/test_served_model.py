@@ -1,0 +1,289 @@
+"""Served models: a table that is true to the model inside its domain, the model itself everywhere else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import triangle
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models import prediction_table
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.interpolation import Axis, TensorSpline, along
+from push_predictor.models.model_file import save_model
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.served import MEAN_TOLERANCE, VARIANCE_TOLERANCE, ServedModel, serve
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+OUTLINES = {
+    "square": shape_outline("rect1"),
+    "hexagon": shape_outline("hex"),
+    "ellipse": shape_outline("ellip3"),
+    "circle": shape_outline("ellip1"),
+    "triangle": triangle(),
+}
+FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
+
+
+def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> PushTable:
+    """Analytical outcomes with noise that grows with the angle; velocity, contact, angle between low and high (3,)."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.uniform(low, high, (n, 3))
+    duration = np.full(n, 0.2)
+    exact = AnalyticalPush(outline, 0.00475).displacement(inputs, duration)
+    noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    return PushTable(inputs, duration, exact + noise, np.array([f"p{k}" for k in range(n)]))
+
+
+def trained(outline: Outline, kind: str, low: Array, high: Array, n: int = 80) -> PushModel:
+    rig = Rig("made_up", outline, 0.00475, "plywood", 0.8)
+    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}")
+
+
+WIDE = np.array([0.01, 0.0, -1.0]), np.array([0.05, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def served() -> dict[tuple[str, str], ServedModel]:
+    return {
+        (shape, kind): serve(trained(outline, kind, *WIDE))
+        for shape, outline in OUTLINES.items()
+        for kind in ("gp", "vhgp")
+        if (shape, kind) != ("hexagon", "vhgp")  # as the square
+    }
+
+
+def inside(model: PushModel, n: int, seed: int = 5) -> Array:
+    """Pushes spread over the domain of a model."""
+    known = model.training.inputs
+    drawn = np.random.default_rng(seed).uniform(known.min(axis=0), known.max(axis=0), (10 * n, 3))
+    chosen = drawn[model.in_domain(drawn)][:n]
+    assert len(chosen) == n
+    return chosen
+
+
+def of(model: PushModel | ServedModel, inputs: Array) -> Prediction:
+    return model.predict(inputs, np.full(len(inputs), 0.2))
+
+
+def variances(covariance: Array) -> Array:
+    return np.diagonal(covariance, axis1=1, axis2=2)
+
+
+def assert_true_to_the_model(served: ServedModel, n: int = 400) -> None:
+    inputs = inside(served.model, n)
+    table, exact = of(served, inputs), of(served.model, inputs)
+    assert served.tabulated, served.how
+    assert np.max(np.abs(table.mean - exact.mean) / np.sqrt(variances(exact.covariance))) < MEAN_TOLERANCE
+    for ours, theirs in ((table.covariance, exact.covariance), (table.process_covariance, exact.process_covariance)):
+        assert np.max(np.abs(variances(ours) / variances(theirs) - 1.0)) < VARIANCE_TOLERANCE
+        assert np.all(ours - variances(ours)[:, :, None] * np.eye(3) == 0.0)
+    assert np.array_equal(table.in_domain, exact.in_domain)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+@pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
+def test_the_table_is_true_to_the_model(served: dict[tuple[str, str], ServedModel], shape: str, kind: str) -> None:
+    assert_true_to_the_model(served[shape, kind])
+
+
+NARROW = {
+    "one velocity": ([0.02, 0.0, -1.0], [0.02, 1.0, 1.0]),
+    "one angle": ([0.01, 0.0, 0.1], [0.05, 1.0, 0.1]),
+    "one contact": ([0.01, 0.1, -1.0], [0.05, 0.1, 1.0]),
+    "one velocity and contact": ([0.02, 0.4, -1.0], [0.02, 0.4, 1.0]),
+    "a part of an edge": ([0.01, 0.05, -1.0], [0.05, 0.2, 1.0]),
+}
+
+
+@pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
+@pytest.mark.parametrize("narrow", NARROW)
+def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
+    low, high = (np.array(limit) for limit in NARROW[narrow])
+    assert_true_to_the_model(serve(trained(OUTLINES[shape], "gp", low, high, n=60)), n=200)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    shape=st.sampled_from(list(OUTLINES)),
+    velocity=st.floats(0.005, 0.06),
+    contact=st.floats(0.0, 1.0, exclude_max=True),
+    angle=st.floats(-1.2, 1.2),
+)
+def test_a_push_gets_the_same_answer_alone_and_among_others(
+    served: dict[tuple[str, str], ServedModel], shape: str, velocity: float, contact: float, angle: float
+) -> None:
+    model, push = served[shape, "gp"], np.array([[velocity, contact, angle]])
+    others = inside(model.model, 20)
+    alone, among = of(model, push), of(model, np.concatenate([others[:10], push, others[10:]]))
+    # Outside the domain the model itself answers, whose solver takes one row or many in a different order.
+    precision = 1e-12 if alone.in_domain[0] else 1e-8
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(alone, name)[0], getattr(among, name)[10], rtol=precision, atol=1e-18)
+
+
+@settings(max_examples=40, deadline=None)
+@given(fraction=st.floats(0.02, 0.95), angle=st.floats(-0.9, 0.9), kind=st.sampled_from(["gp", "vhgp"]))
+def test_sides_that_symmetry_makes_one_are_one(
+    served: dict[tuple[str, str], ServedModel], fraction: float, angle: float, kind: str
+) -> None:
+    for shape, order in (("square", 4), ("ellipse", 2)):
+        turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
+        prediction = of(served[shape, kind], turned)
+        for name in FIELDS:
+            field = getattr(prediction, name)
+            np.testing.assert_allclose(field, np.broadcast_to(field[:1], field.shape), rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_a_circle_does_not_tell_contacts_apart(served: dict[tuple[str, str], ServedModel], kind: str) -> None:
+    contact = np.linspace(0.0, 0.999, 7)
+    inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
+    assert np.ptp(of(served["circle", kind], inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("shape", OUTLINES)
+def test_outside_the_domain_the_model_itself_answers(served: dict[tuple[str, str], ServedModel], shape: str) -> None:
+    model = served[shape, "gp"]
+    out = inside(model.model, 30)
+    out[::2, 0] = 0.2
+    out[1::2, 2] = 1.4
+    table, exact = of(model, out), of(model.model, out)
+    assert not table.in_domain.any()
+    mixed = of(model, np.concatenate([out, inside(model.model, 5)]))
+    for name in FIELDS:
+        assert np.array_equal(getattr(table, name), getattr(exact, name))
+        assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
+    assert np.array_equal(mixed.in_domain, [False] * 30 + [True] * 5)
+
+
+def test_the_rim_of_the_domain_belongs_to_it(served: dict[tuple[str, str], ServedModel]) -> None:
+    for model in served.values():
+        rim = np.array([[v, 0.3, a] for v in (0.0, 1.0) for a in (0.0, 1.0)])
+        known = model.model.training.inputs
+        rim[:, [0, 2]] = known.min(axis=0)[[0, 2]] + rim[:, [0, 2]] * np.ptp(known, axis=0)[[0, 2]]
+        table, exact = of(model, rim), of(model.model, rim)
+        assert np.array_equal(table.in_domain, exact.in_domain)
+        assert table.mean == pytest.approx(exact.mean, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_covariances_are_symmetric_and_positive_definite(served: dict[tuple[str, str], ServedModel], kind: str) -> None:
+    for shape in ("square", "ellipse", "circle"):
+        prediction = of(served[shape, kind], inside(served[shape, kind].model, 300))
+        assert np.array_equal(prediction.covariance, prediction.covariance.transpose(0, 2, 1))
+        assert np.all(np.linalg.eigvalsh(prediction.process_covariance) > 0.0)
+        assert np.all(variances(prediction.covariance - prediction.process_covariance) > 0.0)
+
+
+def test_no_rows_give_no_predictions(served: dict[tuple[str, str], ServedModel]) -> None:
+    prediction = of(served["square", "vhgp"], np.empty((0, 3)))
+    assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
+
+
+def test_the_analytical_model_answers_itself() -> None:
+    model = trained(OUTLINES["square"], "analytical", *WIDE)
+    answers, inputs = serve(model), inside(model, 5)
+    assert not answers.tabulated and answers.error is None and answers.how.startswith("exact")
+    assert np.array_equal(of(answers, inputs).mean, of(model, inputs).mean)
+
+
+def test_a_table_that_would_be_too_large_is_not_made(
+    served: dict[tuple[str, str], ServedModel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for limit in ("MOST_KNOTS", "MOST_NODES"):
+        with monkeypatch.context() as patch:
+            patch.setattr(prediction_table, limit, 100)
+            answers = serve(served["square", "gp"].model)
+        assert not answers.tabulated
+        assert "at most 100" in answers.how
+
+
+def test_a_table_that_is_not_true_to_the_model_is_not_used(
+    served: dict[tuple[str, str], ServedModel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = served["square", "vhgp"].model
+    for name in ("NODES_PER_LENGTHSCALE", "SIGNAL_CELLS_PER_LENGTHSCALE", "NOISE_CELLS_PER_LENGTHSCALE"):
+        monkeypatch.setattr(prediction_table, name, 0.3)
+    monkeypatch.setattr(prediction_table, "FEWEST_NODES", 3)
+    answers, inputs = serve(model), inside(model, 5)
+    assert not answers.tabulated
+    assert "too far off" in answers.how
+    assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
+
+
+# --- interpolation ----------------------------------------------------------------------------------------------
+
+
+def test_a_spline_takes_the_values_at_its_knots_and_reproduces_cubics() -> None:
+    axes = [Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7)]
+
+    def cubic(x: Array, y: Array) -> Array:
+        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
+
+    knots = np.meshgrid(np.linspace(-1.0, 2.0, 6), np.linspace(0.0, 0.5, 8), indexing="ij")
+    spline = TensorSpline(axes, cubic(*knots)[None])
+    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
+    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
+    assert spline(points, 0) == pytest.approx(cubic(*points.T), abs=1e-12)
+    assert np.array([spline.at(p.tolist(), 0) for p in points]) == pytest.approx(cubic(*points.T), abs=1e-12)
+
+
+def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
+    points = np.linspace(0.0, 1.0, 997)[:, None]
+    errors = []
+    for cells in (40, 80):
+        values = np.exp(np.sin(6.0 * np.linspace(0.0, 1.0, cells + 1)))
+        spline = TensorSpline([Axis(0.0, 1.0, cells)], values[None, :, None])
+        errors.append(np.max(np.abs(spline(points, 0)[:, 0] - np.exp(np.sin(6.0 * points[:, 0])))[100:-100]))
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.15)
+
+
+def test_few_nodes_resolve_a_smooth_function() -> None:
+    axis = Axis(0.2, 3.0, 10)
+    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
+        knots = along(0, axis.nodes_to_knots(count), np.exp(-(axis.nodes(count) ** 2)))
+        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
+
+
+# --- what the server answers ------------------------------------------------------------------------------------
+
+
+def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    from msg_adapters.predictions import (
+        PushQuery,
+        prediction_from_response,
+        query_to_batch_request,
+        query_to_request,
+    )
+    from push_predictor.nodes.answers import answer_batch, answer_load, answer_push
+    from push_predictor.nodes.model_shelf import ModelShelf
+    from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
+
+    model = trained(OUTLINES["square"], "vhgp", *WIDE)
+    save_model(model, tmp_path / "m.model")
+    shelf, loaded = ModelShelf(), LoadModel.Response()
+    answer_load(shelf, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
+    expected = serve(model)
+    assert expected.tabulated and expected.how in loaded.message and shelf.answering == [f"a vhgp: {expected.how}"]
+    inputs = inside(model, 40)
+    inputs[0, 0] = 0.2  # outside the domain
+    together, batch = of(expected, inputs), PredictPushBatch.Response()
+    answer_batch(shelf, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
+    for k, push in enumerate(inputs):
+        answer_push(shelf, query_to_request("", push, 0.2), single := PredictPush.Response())
+        for name in FIELDS:
+            answered = getattr(prediction_from_response(single), name)[0]
+            precision = 1e-12 if k else 1e-8
+            np.testing.assert_allclose(answered, getattr(together, name)[k], rtol=precision, atol=1e-18)
+    for name in FIELDS:
+        assert np.array_equal(getattr(prediction_from_response(batch), name), getattr(together, name))
