@@ -45,9 +45,8 @@ def main() -> int:
     begun = time.monotonic()
     print("1. learn from", TRAINING.relative_to(ROOT))
     paths = [_trained(kind) for kind in KINDS]
-    print(
-        f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (domain {os.environ['ROS_DOMAIN_ID']})"
-    )
+    domain = os.environ["ROS_DOMAIN_ID"]
+    print(f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (ROS_DOMAIN_ID {domain})")
     _replay_and_validate(paths)
     print("3. online against offline, window by window")
     models = [load_model(path) for path in paths]

@@ -1,4 +1,4 @@
-"""What /diagnostics says while a replay is validated, as a table that is drawn anew, or lines where there is no screen."""
+"""What /diagnostics says while a replay is validated: a table drawn anew, or lines where there is no screen."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class LiveTable:
 
     def _table(self) -> Table:
         replay = next((values for name, values in self._values.items() if "push_replay" in name), {})
-        table = Table(title=f"online validation; replay late p99 {replay.get('late p99 us', '-')} us")
+        table = Table(title=f"online validation; replay late p99 {replay.get('late_p99_us', '-')} us")
         for column in ("model", *COLUMNS):
             table.add_column(column, justify="right")
         for name in self._models():

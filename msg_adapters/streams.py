@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -47,22 +48,25 @@ class Inbox:
         self._kind = kind
         self._frame_id = frame_id
         self._waiting: list[bytes] = []
+        self._lock = threading.Lock()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def put(self, data: bytes) -> None:
-        """Take a message."""
-        self.received += 1
-        self._waiting.append(data)
-        if len(self._waiting) > LIMIT:
-            excess = LIMIT // 10  # at once, so that a full inbox does not move at every message
-            del self._waiting[:excess]
-            self.dropped += excess
+        """Take a message; any thread may."""
+        with self._lock:
+            self.received += 1
+            self._waiting.append(data)
+            if len(self._waiting) > LIMIT:
+                excess = LIMIT // 10  # at once, so that a full inbox does not move at every message
+                del self._waiting[:excess]
+                self.dropped += excess
 
     def take(self) -> tuple[np.ndarray, Array]:
         """Stamps (n,) in ns and numbers (n, k) of the usable messages since the last call."""
-        waiting, self._waiting = self._waiting, []
+        with self._lock:
+            waiting, self._waiting = self._waiting, []
         columns = decode(waiting, self._kind.layout)
         usable = columns.valid.copy()
         self._reject("unreadable", ~columns.valid)

@@ -246,6 +246,7 @@ def test_a_log_that_fails_leaves_the_older_one(models: dict[str, PushModel], tmp
     with pytest.raises(ValueError, match="JSON"):
         write_window_log(tmp_path / "log.json", windows, comparison)
     assert (tmp_path / "log.json").read_text() == older
+    assert [path.name for path in tmp_path.iterdir()] == ["log.json"]
 
 
 # --- whose model is it? ----------------------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ from msg_adapters.predictions import (
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
+from push_predictor.models.served import serve
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.predict_server import PARAMETERS
@@ -162,7 +163,7 @@ def server(folder):
 
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
 def test_it_answers_what_the_model_says(server, folder, kind):
-    model = load_model(folder / f"{kind}.model")
+    model = serve(load_model(folder / f"{kind}.model"))
     expected = model.predict(MANY, np.full(len(MANY), 0.2))
     answered = prediction_from_response(server.batch(MANY, model=kind))
     for k, push in enumerate(MANY):

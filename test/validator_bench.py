@@ -74,7 +74,8 @@ def assert_same_as_offline(folder: Path, model: Path, recording: Path = HEXAGON,
     """The same windows, their predictions equal to 1e-9, the metrics equal to rounding."""
     windows, comparison = validate_recording(load_model(model), recording)
     online = windows_of(folder, suffix)
-    assert [(w["push_id"], w["window"]) for w in online] == [(w.push_id, w.index) for w in windows]
+    found, expected = [(w["push_id"], w["window"]) for w in online], [(w.push_id, w.index) for w in windows]
+    assert found == expected, f"missing {sorted({*expected} - {*found})}, too many {sorted({*found} - {*expected})}"
     assert [(w["start"], w["end"]) for w in online] == [(w.start, w.end) for w in windows]
     predicted = np.array([w["predicted"] for w in online])
     assert np.max(np.abs(predicted - comparison.mean)) < 1e-9

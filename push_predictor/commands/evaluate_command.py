@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from push_predictor.commands.metrics_text import print_metrics
-from push_predictor.commands.output import add_command, add_rig, progress, write_json
+from push_predictor.commands.output import add_command, add_rig, check_data, progress, warn, write_json
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -33,14 +32,12 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
+    check_data(options.data)
     with progress("evaluate"):
         table = load_data(options.data, load_rig(options.rig) if options.rig else None)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
     if seen := trained_on(model, table):
-        print(
-            f"warning: {len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out",
-            file=sys.stderr,
-        )
+        warn(f"{len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out")
     if not write_json(options, metrics):
         print_metrics(metrics)

@@ -7,9 +7,11 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+from push_predictor.errors import RecordingError, RequestError
 
 PATIENCE = 2.0  # s before the first word, and between words
 
@@ -42,11 +44,40 @@ def write_json(options: argparse.Namespace, result: Mapping[str, object]) -> boo
     if options.json == "-":
         print(text)
         return True
-    path = Path(options.json)
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(text + "\n")
-    temporary.replace(path)
+    write_text(Path(options.json), text + "\n")
     return False
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file; an older one is replaced when the new one is complete. Raises OSError that names the path."""
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text)
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def warn(text: str) -> None:
+    """Say something on stderr that does not stop the work."""
+    print(f"warning: {text}", file=sys.stderr)
+
+
+def check_data(paths: Sequence[Path]) -> None:
+    """Raise RecordingError for a path that is not there, or that can be neither recording nor table."""
+    for path in paths:
+        if not path.exists():
+            raise RecordingError(f"{path}: no such file or folder")
+        if not (path.is_dir() or path.name.endswith((".mcap", ".csv", ".csv.gz"))):
+            raise RecordingError(f"{path}: give a recording (a folder or .mcap) or a push table (.csv or .csv.gz)")
+
+
+def check_seed(seed: int) -> None:
+    """Raise RequestError for a seed that no generator takes."""
+    if seed < 0:
+        raise RequestError("--seed", seed, "an integer from 0 on")
 
 
 @contextmanager

@@ -59,6 +59,9 @@ def run(options: argparse.Namespace) -> None:
 def _covariate(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
-        return name, float(value)
+        number = float(value)
     except ValueError:
-        raise RequestError("--covariate", text, "NAME=VALUE with a number") from None
+        number = None
+    if not name or number is None:
+        raise RequestError("--covariate", text, "NAME=VALUE with a number")
+    return name, number

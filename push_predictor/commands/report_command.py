@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, progress, write_json
+from push_predictor.commands.output import add_command, progress, write_json, write_text
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.models.model_file import load_model
 
     if (options.model is None) != (options.recording is None):
-        raise RequestError("--model", options.model, "both --model and --recording, or neither")
+        missing = "--model" if options.model is None else "--recording"
+        raise RequestError(missing, None, "both --model and --recording, or neither")
     options.out.mkdir(parents=True, exist_ok=True)
     with progress("report"):
         if options.model is None:
@@ -49,7 +50,7 @@ def run(options: argparse.Namespace) -> None:
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
         page, metrics = report_recording(models, recording, options.out)
-    (options.out / "validation.json").write_text(json.dumps(metrics, indent=2) + "\n")
+    write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):
         print(page)
 

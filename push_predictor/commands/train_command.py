@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, progress, write_json
+from push_predictor.commands.output import add_command, add_rig, check_data, check_seed, progress, write_json
+from push_predictor.errors import RequestError
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,6 +36,10 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.load import load_data, load_rig_for
     from push_predictor.recordings.windows import WindowOptions
 
+    check_data(options.data)
+    check_seed(options.seed)
+    if options.stride is not None and not 0.0 < options.stride < float("inf"):
+        raise RequestError("--stride", options.stride, "a number above 0, in s")
     rig = load_rig_for(options.data, options.rig)
     with progress("read"):
         table = load_data(options.data, rig, WindowOptions(stride=options.stride))

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from push_predictor.commands.metrics_text import print_metrics
-from push_predictor.commands.output import add_command, add_rig, progress, write_json
+from push_predictor.commands.output import add_command, add_rig, progress, warn, write_json
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,19 +25,23 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(options: argparse.Namespace) -> None:
-    """Validate and print."""
-    from push_predictor.evaluation.offline import validate_recording
-    from push_predictor.evaluation.validation import metrics_json
+    """Validate and print; warn where the model is of another rig, or a push was trained on."""
+    from push_predictor.evaluation.offline import recording_rig, rig_difference, validate_recording
+    from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.evaluation.window_log import write_window_log
     from push_predictor.models.model_file import load_model
     from push_predictor.recordings.rig import load_rig
+    from push_predictor.recordings.windows import windows_to_table
 
     model = load_model(options.model)
+    rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
-        windows, comparison = validate_recording(
-            model, options.recording, load_rig(options.rig) if options.rig else None
-        )
+        windows, comparison = validate_recording(model, options.recording, rig)
         metrics = metrics_json(comparison)
+    if difference := rig_difference(model, rig):
+        warn(difference)
+    if seen := trained_on(model, windows_to_table(windows)):
+        warn(f"{len(seen)} of {metrics['n_pushes']} pushes were trained on ({seen[0]}, ...): not held out")
     if options.windows:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):

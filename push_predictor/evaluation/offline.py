@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from push_predictor.errors import RecordingError
+from push_predictor.errors import RecordingError, RigError
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
 from push_predictor.models.served import serve
-from push_predictor.recordings.read import read_recording, require_rig
-from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.bag import open_bag
+from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
+from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.window_finder import find_windows
 from push_predictor.recordings.windows import PushWindow, WindowOptions, windows_to_table
@@ -33,6 +34,13 @@ def window_options(model: PushModel) -> WindowOptions:
     if model.kind == "analytical":
         return WindowOptions()
     return WindowOptions(duration=float(model.training.duration[0]))
+
+
+def recording_rig(path: Path) -> Rig:
+    """The rig that a recording names. Raises RigError that tells how to give it, RecordingError if it is none."""
+    if (rig := recorded_rig(open_bag(path))) is None:
+        raise RigError(f"{path}: the recording has no {RECORD_NAME} record; {HOW_TO_GIVE}")
+    return rig
 
 
 def rig_difference(model: PushModel, rig: Rig) -> str:

@@ -31,16 +31,29 @@ def write_window_log(
     """Write {"model", "windows", "refused", "unanswered"}; an older file is replaced when the new one is complete.
 
     windows: those of the comparison, one a row. refused: windows beside these. unanswered: how many more there were.
+    Raises OSError that names the path.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    with temporary.open("w") as stream:  # entry by entry: a day's windows as one text would take a gigabyte
-        stream.write(f'{{"model": {json.dumps(comparison.model)}, "windows": [')
-        for k, entry in enumerate(window_log(windows, comparison)):
-            stream.write(("," if k else "") + "\n" + json.dumps(entry, allow_nan=False))
-        rest = json.dumps([asdict(refusal) for refusal in refused])
-        stream.write(f'],\n"refused": {rest}, "unanswered": {unanswered}}}\n')
-    temporary.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("w") as stream:
+            stream.writelines(_lines(windows, comparison, refused, unanswered))
+        temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _lines(
+    windows: Sequence[PushWindow], comparison: Comparison, refused: Sequence[Refusal], unanswered: int
+) -> Iterator[str]:
+    """Entry by entry: a day's windows as one text would take a gigabyte."""
+    yield f'{{"model": {json.dumps(comparison.model)}, "windows": ['
+    for k, entry in enumerate(window_log(windows, comparison)):
+        yield ("," if k else "") + "\n" + json.dumps(entry, allow_nan=False)
+    rest = json.dumps([asdict(refusal) for refusal in refused])
+    yield f'],\n"refused": {rest}, "unanswered": {unanswered}}}\n'
 
 
 def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> Iterator[dict[str, object]]:

@@ -1,7 +1,8 @@
 """Predictions of a learnt model tabulated over a box: an answer costs the same however many rows it learnt from.
 
-Per output: the mean, the log variance of f, the log process variance. Each posterior is read at Chebyshev nodes as
-dense as its own lengthscales ask for; all share the knots of one spline.
+Per output: the mean and the variance of f, and the log process variance, which is what is smooth: the variance of f has
+narrow dips at the training pushes, of quadratic shape. Each posterior is read at Chebyshev nodes as dense as its own
+lengthscales ask for; all share the knots of one spline.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from math import exp
 
 import numpy as np
 
@@ -18,17 +20,25 @@ from push_predictor.models.interpolation import Axis, TensorSpline, along
 from push_predictor.models.kernels import SquaredExponential
 from push_predictor.models.push_chart import Chart, Whole
 from push_predictor.models.push_model import LearnedBody, Scaling
-from push_predictor.recordings.table import OUTPUTS
 from push_predictor.types import Array
 
 MOST_KNOTS = 1_000_000  # 72 MB
 MOST_NODES = 150_000  # of one posterior and edge: some seconds
 FEWEST_NODES = 10
 FEWEST_CELLS = 16
-NODES_PER_LENGTHSCALE = 3.0
-SIGNAL_CELLS_PER_LENGTHSCALE = 12.0  # the mean is wanted to a small part of the noise, the noise to a part of itself
-NOISE_CELLS_PER_LENGTHSCALE = 6.0
 _PATH = 65  # points along which lengthscales are counted
+
+
+@dataclass(frozen=True)
+class Density:
+    """Nodes and cells a lengthscale."""
+
+    nodes: float
+    cells: float
+
+
+SIGNAL = Density(nodes=4.0, cells=12.0)  # the signal is wanted to a small part of the noise, the noise to one of itself
+NOISE = Density(nodes=2.5, cells=6.0)
 
 
 class TooFineError(PushPredictorError):
@@ -37,46 +47,49 @@ class TooFineError(PushPredictorError):
 
 @dataclass(frozen=True, eq=False)
 class PredictionTable:
-    """columns: which of velocity, place and angle the splines run over; knots: how many in all."""
+    """columns: which of velocity, place and angle the splines run over; least: of the variances of f; knots: how
+    many in all.
+    """
 
     spline: TensorSpline
     columns: slice
+    least: list[float]
     knots: int
 
     def moments(self, points: Array, box: Whole) -> tuple[Array, Array, Array]:
         """Mean, outcome variance and process variance, (n, 3) each in SI units, at (n, 3) velocity, place, angle."""
-        return _moments(self.spline(points[:, self.columns], box))
+        values = self.spline(points[:, self.columns], box)
+        process = np.exp(values[:, 6:])
+        return values[:, :3], np.maximum(values[:, 3:6], self.least) + process, process
 
-    def moments_at(self, point: Sequence[float], box: int) -> tuple[Array, Array, Array]:
-        """The same at one point, (1, 3) each."""
-        return _moments(self.spline.at(point[self.columns], box)[None])
+    def moments_one(self, point: Sequence[float], box: int) -> tuple[list[float], list[float], list[float]]:
+        """The same for one point, in plain numbers."""
+        values = self.spline.at(point[self.columns], box).tolist()
+        process = [exp(value) for value in values[6:]]
+        total = [max(v, least) + p for v, least, p in zip(values[3:6], self.least, process, strict=True)]
+        return values[:3], total, process
 
 
-def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, density: float = 1.0) -> PredictionTable:
+def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinement: float = 1.0) -> PredictionTable:
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
-    density: how many times as many nodes and knots along each axis as usual. Raises TooFineError.
+    refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError.
     """
     regressions = [grid_regression(regression) for regression in body.regressions]
     sides = _sides(body.scaling, chart, low, high)
-    axes = [Axis(side.low, side.high, _cells(side, regressions, density)) for side in sides]
+    axes = [Axis(side.low, side.high, _cells(side, regressions, refinement)) for side in sides]
     knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
     if knots > MOST_KNOTS:
         raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are taken")
-    grid = _Grid(sides, axes, density)
+    grid = _Grid(sides, axes, refinement)
     outputs = [grid.outputs(regression) for regression in regressions]
     values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
     values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
-    sd, count = body.scaling.outcome_sd, len(OUTPUTS)
-    values[..., :count] = values[..., :count] * sd + body.scaling.outcome_mean
-    values[..., count:] += np.tile(2.0 * np.log(sd), 2)
-    return PredictionTable(TensorSpline(axes, values), _as_slice([side.column for side in sides]), knots)
-
-
-def _moments(values: Array) -> tuple[Array, Array, Array]:
-    variances = np.exp(values[:, 3:])
-    process = variances[:, 3:]
-    return values[:, :3], variances[:, :3] + process, process
+    sd, zero = body.scaling.outcome_sd, np.zeros(3)
+    values *= np.concatenate([sd, sd**2, np.ones(3)])
+    values += np.concatenate([body.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
+    least = (sd**2 * [regression.signal.least_variance for regression in regressions]).tolist()
+    return PredictionTable(TensorSpline(axes, values), _as_slice([side.column for side in sides]), least, knots)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +150,10 @@ def _as_slice(columns: Sequence[int]) -> slice:
     return slice(columns[0], columns[-1] + 1, columns[-1] - columns[0] if len(columns) == 2 else 1)
 
 
-def _cells(side: _Side, regressions: Sequence[GridRegression], density: float) -> int:
-    wanted = [SIGNAL_CELLS_PER_LENGTHSCALE * side.lengthscales(r.signal.kernel) for r in regressions]
-    wanted += [NOISE_CELLS_PER_LENGTHSCALE * side.lengthscales(r.noise.kernel) for r in regressions if r.noise]
-    return max(FEWEST_CELLS, int(np.ceil(density * max(wanted))))
+def _cells(side: _Side, regressions: Sequence[GridRegression], refinement: float) -> int:
+    wanted = [SIGNAL.cells * side.lengthscales(r.signal.kernel) for r in regressions]
+    wanted += [NOISE.cells * side.lengthscales(r.noise.kernel) for r in regressions if r.noise]
+    return max(FEWEST_CELLS, int(np.ceil(refinement * max(wanted))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,23 +162,22 @@ class _Grid:
 
     sides: Sequence[_Side]
     axes: Sequence[Axis]
-    density: float
+    refinement: float
 
     def outputs(self, regression: GridRegression) -> list[Array]:
-        """Mean, log variance of f and log process variance at the knots, (boxes, cells_1 + 1, ...) each.
+        """Mean and variance of f, and log process variance, at the knots, (boxes, cells_1 + 1, ...) each.
 
         Where the place is none of the sides, there is one box.
         """
-        mean, variance = self._moments(regression.signal)
-        log_variance = np.log(np.maximum(variance, regression.signal.least_variance))
+        mean, variance = self._moments(regression.signal, SIGNAL)
         if regression.noise is None:
-            return [mean, log_variance, np.full_like(mean, regression.log_noise)]
-        log_mean, spread = self._moments(regression.noise)
-        return [mean, log_variance, regression.log_noise + log_mean + 0.5 * spread]
+            return [mean, variance, np.full_like(mean, regression.log_noise)]
+        log_mean, spread = self._moments(regression.noise, NOISE)
+        return [mean, variance, regression.log_noise + log_mean + 0.5 * spread]
 
-    def _moments(self, posterior: GridPosterior) -> tuple[Array, Array]:
-        wanted = [NODES_PER_LENGTHSCALE * side.lengthscales(posterior.kernel) for side in self.sides]
-        counts = [int(self.density * (FEWEST_NODES + count)) for count in wanted]
+    def _moments(self, posterior: GridPosterior, density: Density) -> tuple[Array, Array]:
+        wanted = [density.nodes * side.lengthscales(posterior.kernel) for side in self.sides]
+        counts = [int(self.refinement * (FEWEST_NODES + count)) for count in wanted]
         if (total := float(np.prod(counts, dtype=np.float64))) > MOST_NODES:
             raise TooFineError(f"{total:.0f} nodes would be needed, at most {MOST_NODES} are taken")
         nodes = [axis.nodes(count) for axis, count in zip(self.axes, counts, strict=True)]

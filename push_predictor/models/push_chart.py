@@ -1,13 +1,14 @@
 """Where a push lies in a box of velocity, place on the outline and angle; one box for each edge that differs.
 
 The place is a fraction of an edge of a polygon, or of the part of a smooth outline that its symmetry repeats. In these
-coordinates a model's predictions are smooth; `features.push_features` is what its kernels compare. Every function here
-takes one number as well as an array of them.
+coordinates a model's predictions are smooth; `features.push_features` is what its kernels compare.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol, TypeAlias, cast
 
 import numpy as np
@@ -31,11 +32,14 @@ class Chart(Protocol):
     def place_columns(self) -> tuple[int, ...]:
         """The columns of the features that the place becomes."""
 
-    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
-        """Place and box of contacts in [0, 1)."""
+    def place(self, contact: Array) -> tuple[Array, Whole]:
+        """Places (n,) and boxes of contacts (n,) in [0, 1)."""
+
+    def place_one(self, contact: float) -> tuple[float, int]:
+        """The same for one contact, in plain numbers."""
 
     def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
-        """The features of places, column by column."""
+        """The features of one place or of many, column by column."""
 
     def place_range(self, places: Array) -> tuple[float, float]:
         """The part of its axis that a domain around places (m,) can reach."""
@@ -54,7 +58,11 @@ class CircleChart:
     boxes = 1
     place_columns: tuple[int, ...] = ()
 
-    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+    def place(self, contact: Array) -> tuple[Array, Whole]:
+        """See Chart."""
+        return contact, 0
+
+    def place_one(self, contact: float) -> tuple[float, int]:
         """See Chart."""
         return contact, 0
 
@@ -75,7 +83,11 @@ class SmoothChart:
     boxes = 1
     place_columns = (1, 2)
 
-    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+    def place(self, contact: Array) -> tuple[Array, Whole]:
+        """See Chart."""
+        return self.order * contact % 1.0, 0
+
+    def place_one(self, contact: float) -> tuple[float, int]:
         """See Chart."""
         return self.order * contact % 1.0, 0
 
@@ -97,11 +109,18 @@ class PolygonChart:
     def __init__(self, outline: Outline) -> None:
         self.boxes = len(outline.vertices) // outline.rotational_symmetry
         self._starts, self._per_length = outline.edge_starts, 1.0 / np.diff(outline.edge_starts)
+        self._edges = list(zip(self._starts.tolist(), self._per_length.tolist(), strict=False))
 
-    def place(self, contact: Numbers) -> tuple[Numbers, Whole]:
+    def place(self, contact: Array) -> tuple[Array, Whole]:
         """See Chart."""
         edge = self._starts.searchsorted(contact, side="right") - 1
         return (contact - self._starts[edge]) * self._per_length[edge], edge % self.boxes
+
+    def place_one(self, contact: float) -> tuple[float, int]:
+        """See Chart."""
+        edge = bisect_right(self._edges, (contact, inf)) - 1
+        start, per_length = self._edges[edge]
+        return (contact - start) * per_length, edge % self.boxes
 
     def place_features(self, place: Numbers, box: Whole) -> tuple[Numbers, ...]:
         """See Chart."""

@@ -19,7 +19,7 @@ from push_predictor.types import Array, BoolArray
 MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
 VARIANCE_TOLERANCE = 1e-2  # relative
 CHECKED = 250  # random pushes of the domain, and as many training pushes
-DENSITIES = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
+REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ def serve(model: PushModel) -> ServedModel:
     if not isinstance(model.body, LearnedBody):
         return ServedModel(model, "exact: only learnt models have a table")
     how = ""
-    for density in DENSITIES:
+    for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(model, model.body, density)
+            domain = tabulated_domain(model, model.body, refinement)
         except TooFineError as too_fine:
             return ServedModel(model, f"exact: {how}{too_fine}")
         error = _error(model, domain)

@@ -38,30 +38,38 @@ class TabulatedDomain:
     def predict_one(self, push: Sequence[float]) -> Prediction | None:
         """The prediction for one push in the domain, in plain numbers, several times as fast; else None."""
         velocity, contact, angle = push
-        place, box = self.chart.place(contact)
+        place, box = self.chart.place_one(contact)
         features = (velocity, *self.chart.place_features(place, box), angle)
-        if not all(low <= feature <= high for feature, (low, high) in zip(features, self._bounds, strict=True)):
-            return None
-        return _prediction(*self.table.moments_at((velocity, float(place), angle), int(box)))
+        for feature, (low, high) in zip(features, self._bounds, strict=True):
+            if not low <= feature <= high:
+                return None
+        return _prediction_of_one(*self.table.moments_one((velocity, place, angle), box))
 
     @cached_property
     def _bounds(self) -> list[tuple[float, float]]:
         return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
 
-def tabulated_domain(model: PushModel, body: LearnedBody, density: float = 1.0) -> TabulatedDomain:
-    """The domain of a model with this body; density: of the table, against the usual. Raises TooFineError."""
+def tabulated_domain(model: PushModel, body: LearnedBody, refinement: float = 1.0) -> TabulatedDomain:
+    """The domain of a model with this body; refinement: of the table. Raises TooFineError."""
     inputs, chart = model.training.inputs, push_chart(model.rig.outline)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
-    low[1], high[1] = chart.place_range(np.asarray(chart.place(inputs[:, 1])[0]))
+    low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
     features = push_features(model.rig.outline, inputs)
     least, most = features.min(axis=0), features.max(axis=0)
     margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
-    return TabulatedDomain(chart, least - margin, most + margin, tabulate(body, chart, low, high, density))
+    return TabulatedDomain(chart, least - margin, most + margin, tabulate(body, chart, low, high, refinement))
 
 
 def _prediction(mean: Array, total: Array, process: Array) -> Prediction:
     return Prediction(mean, _diagonal(total), _diagonal(process), np.ones(len(mean), dtype=np.bool_))
+
+
+def _prediction_of_one(mean: list[float], total: list[float], process: list[float]) -> Prediction:
+    (a, b, c), (p, q, r) = total, process
+    numbers = np.array([*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r])
+    covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
+    return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
 
 
 def _diagonal(variances: Array) -> Array:

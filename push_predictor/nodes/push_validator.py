@@ -114,6 +114,7 @@ class PushValidator(Node):
         while not self._closed.wait(0.1) and self._stop.error is None:
             pass
         self._report.stop()
+        self._inlet.close()
         if self._failure:
             raise PushPredictorError(self._failure)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
@@ -14,6 +15,7 @@ from push_predictor.nodes.polled import PolledGroup, take_all
 from push_predictor.recordings.streams import PoseStream, WrenchStream
 
 DEPTH = 1000
+PERIOD = 0.01  # s between two looks into the middleware, which keeps the last DEPTH messages only
 TOPICS = (
     ("slider", PoseStamped, "slider/pose", SLIDER),
     ("pusher", PoseStamped, "pusher/pose", TIP),
@@ -36,7 +38,8 @@ class Samples:
 class SensorInlet:
     """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides say otherwise.
 
-    frame_id: what the headers must name, empty for any.
+    frame_id: what the headers must name, empty for any. A thread empties the middleware's queues: a fast replay fills
+    them within the time that a portion of samples takes to be judged.
     """
 
     def __init__(self, node: Node, frame_id: str) -> None:
@@ -55,14 +58,27 @@ class SensorInlet:
             )
             for name, message, topic, _ in TOPICS
         }
+        self._draining, self._ending = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._keep_draining, name="sensor inlet", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._ending.set()
+        self._thread.join()
 
     def __len__(self) -> int:
         return sum(map(len, self._inboxes.values()))
 
     def drain(self) -> None:
-        """Bring in what has arrived."""
-        for subscription in self._subscriptions.values():
-            take_all(subscription)
+        """Bring in what has arrived by now."""
+        with self._draining:  # one at a time, so that messages stay in order
+            for subscription in self._subscriptions.values():
+                take_all(subscription)
+
+    def _keep_draining(self) -> None:
+        while not self._ending.wait(PERIOD):
+            self.drain()
 
     def take(self) -> Samples:
         """The usable samples since the last call."""

@@ -22,6 +22,7 @@ def server_status(
         "state": state,
         "models": shelf.names,
         "default_model": shelf.default,
+        "answers": shelf.answering,
         "problems": "; ".join(problems) or None,
         **log.values(),
     }
