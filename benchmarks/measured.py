@@ -19,7 +19,6 @@ from benchmarks.measured_scores import HEAD, Fold, figures, pooled, total, train
 from benchmarks.measured_square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.models.analytical import AnalyticalPush, fit_analytical
-from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
@@ -137,15 +136,12 @@ def mit_table(data: Path, work: Path, quick: bool) -> None:
     """The windows of the one push: what the analytical model says beside what was observed."""
     (path,) = import_source("mit", [data / "mit_raw"], work).written
     rig, table = load_rig_for([path]), load_data([path])
-    overlapping = load_data([path], None, WindowOptions(stride=STRIDE))
     for velocity, contact, angle in table.inputs:
         print(f"\nvelocity {1e3 * velocity:.0f} mm/s, contact {contact:.3f}, angle {np.degrees(angle):.1f} degrees")
     print("\n| | dx, mm | dy, mm | dtheta, degrees |\n|---|---|---|---|")
     print(_outcome_rows("observed", table.outcomes))
-    for fit in (False, True):
-        model = train_model(overlapping, rig, "analytical", name="analytical", fit=fit)
-        title = f"analytical, fitted to {len(overlapping)} overlapping windows of it" if fit else "analytical"
-        print(_outcome_rows(title, model.predict(table.inputs, table.duration).mean))
+    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
+    print(_outcome_rows("analytical, textbook", physics.displacement(table.inputs, table.duration)))
 
 
 def _outcome_rows(title: str, outcomes: Array) -> str:

@@ -75,7 +75,9 @@ def test_the_windows_of_a_long_push_tile_it_from_first_touch(found: dict[str, li
     windows = found[run]
     assert len({window.push_id for window in windows}) == 1
     assert gapless(windows), "no break of a lasting contact"
-    assert abs(windows[0].covariates["contact_gap"]) < 1.2e-3
+    gaps = [window.covariates["contact_gap"] for window in windows]
+    assert abs(np.median(gaps)) < 0.6e-3, "tip and tracker agree but for jitter of some ms at 130 mm/s"
+    assert abs(gaps[0]) < WindowOptions().touch_gap
 
 
 @pytest.mark.parametrize("run", RUNS)
@@ -207,21 +209,22 @@ def test_online_validation_of_a_measured_push_equals_offline(
 # --- the one push of the hexagon --------------------------------------------------------------------------------
 
 
-def test_the_hexagons_push_yields_a_window_at_full_speed(found: dict[str, list[PushWindow]]) -> None:
+def test_the_hexagons_push_is_found_as_its_file_name_tells_it(found: dict[str, list[PushWindow]]) -> None:
     (window,) = found[HEXAGON]
-    assert window.velocity == pytest.approx(0.150, abs=0.01), "the speed in the file's name"
-    assert window.covariates["edge"] == 1.0, "the side in the file's name"
-    assert window.displacement[0] == pytest.approx(0.026, abs=0.002)
+    assert window.angle == pytest.approx(-0.349, abs=0.02), "t in the file's name"
+    assert window.covariates["edge"] == 1.0, "i, the side"
+    assert (window.contact - 1.0 / 6.0) * 6.0 == pytest.approx(0.0, abs=0.02), "s, the position on the side"
+    assert 0.10 < window.velocity < 0.16, "v is 0.150; the tip sets off from rest in contact"
 
 
-def test_physics_tells_the_signs_of_the_hexagons_motion_not_its_size(
+def test_physics_tells_the_sense_of_the_hexagons_turn_not_its_size(
     imported: dict[str, Path], found: dict[str, list[PushWindow]]
 ) -> None:
     rig, table = load_rig_for([imported[HEXAGON]]), load_data([imported[HEXAGON]])
     predicted = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(table.inputs, table.duration)[0]
     observed = found[HEXAGON][0].displacement
-    assert np.all(np.sign(predicted) == np.sign(observed))
     assert np.hypot(*(predicted - observed)[:2]) < 0.005
+    assert observed[2] < 2.0 * predicted[2] < 0.0, "struck at its corner at 150 mm/s it spins faster than it is pushed"
 
 
 # --- the square's table through the command line ----------------------------------------------------------------
@@ -317,7 +320,7 @@ def gapless(windows: list[PushWindow]) -> bool:
 def test_the_force_keeps_a_contact_that_the_tracker_sees_open() -> None:
     """The tip was never free, so the sensor's zero is known from its rest alone."""
     pushed = beginning_near()
-    assert len(windows_of(pushed)) == 10 and gapless(windows_of(pushed))
+    assert len(windows_of(pushed)) == 9 and gapless(windows_of(pushed))  # 1.9 s of contact
     assert not gapless(windows_of(replace(pushed, wrench=None)))
 
 

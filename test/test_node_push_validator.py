@@ -19,10 +19,11 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from replay_bags import RIG
-from ros_harness import NodeProcess, call, free_domain, node_process, ros_context, wait_until
+from ros_harness import REPOSITORY, NodeProcess, call, free_domain, node_process, ros_context, wait_until
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
+from synthetic import rows, wrench_rows
 from validator_bench import (
     CIRCLE,
     HEXAGON,
@@ -40,9 +41,13 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.nodes import push_validator
+from push_predictor.nodes.sensor_inlet import Samples
+from push_predictor.nodes.validation_run import ValidationRun
 from push_predictor.recordings.bag import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.window_finder import find_windows
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import LoadModel, PredictPush, Seek
 
@@ -191,6 +196,37 @@ def test_the_schema_in_the_recording_is_the_installed_message():
         name: kind.replace("double", "float64") for name, kind in PushResidual.get_fields_and_field_types().items()
     }
     assert list(written.items()) == list(installed.items())
+
+
+def test_a_stream_that_is_late_by_a_minute_of_the_recording_is_waited_for(models: dict[str, Path]):
+    """At rate 100 a minute passes in 0.6 s, which the middleware may take on a busy machine."""
+    recording = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    assert recording.rig is not None and recording.wrench is not None
+    asked: list[PredictPush.Request] = []
+    client = SimpleNamespace(ask=lambda request, on_answer: asked.append(request))
+    run = ValidationRun(recording.rig, {"analytical": load_model(models["analytical"])}, client, lambda *shown: None)
+    stamps = [stream.stamp for stream in (recording.slider, recording.pusher, recording.wrench)]
+    early, late = stamps[0][0] + 100 * 10**9, stamps[0][0] + 40 * 10**9
+
+    def portion(start: int, wrench_start: int, end: int, wrench_end: int) -> Samples:
+        inside = [(s >= begin) & (s < stop) for s, begin, stop in zip(
+            stamps, (start, start, wrench_start), (end, end, wrench_end), strict=True)]  # fmt: skip
+        return Samples(
+            rows(recording.slider, inside[0]),
+            rows(recording.pusher, inside[1]),
+            wrench_rows(recording.wrench, inside[2]),
+        )
+
+    for samples in (
+        portion(0, 0, early, late),
+        portion(early, late, early + 1, early),
+        portion(early + 1, early, 2**62, 2**62),
+    ):
+        run.feed(samples)
+    run.finish()
+    expected = find_windows(recording, recording.rig)
+    assert [(w.push_id, w.index) for w in run.validation.windows] == [(w.push_id, w.index) for w in expected]
+    assert [r.velocity for r in asked] == pytest.approx([w.velocity for w in expected], rel=1e-9)
 
 
 @pytest.mark.parametrize("given", ["gp", ""])

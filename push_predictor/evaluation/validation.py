@@ -10,6 +10,7 @@ from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussia
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.recordings.windows import TIMED_ID
 from push_predictor.types import Array
 
 
@@ -80,8 +81,21 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
 
 
 def trained_on(model: PushModel, table: PushTable) -> list[str]:
-    """The pushes of a table that the model was trained on: its figures on them are not held out."""
-    return sorted(set(table.pushes) & set(model.training.pushes))
+    """The pushes of a table that the model was trained on: its figures on them are not held out.
+
+    A push was trained on if one of its windows was, or if it began at the very time at which a training push did.
+    """
+    known = {row.tobytes() for row in np.column_stack([model.training.inputs, model.training.outcomes])}
+    rows = np.column_stack([table.inputs, table.outcomes])
+    same_rows = {push for push, row in zip(table.push_id.tolist(), rows, strict=True) if row.tobytes() in known}
+    begun = {_timed(push) for push in model.training.pushes} - {None}
+    return sorted(same_rows | {push for push in table.pushes if _timed(push) in begun})
+
+
+def _timed(push_id: str) -> str | None:
+    """The part of an id that the window finder made of the time of first touch, None for other ids."""
+    name = push_id.rpartition("/")[2]
+    return name if name.startswith(TIMED_ID) else None
 
 
 def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:

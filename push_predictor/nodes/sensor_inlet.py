@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from dataclasses import dataclass
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
@@ -45,12 +46,14 @@ class SensorInlet:
     def __init__(self, node: Node, frame_id: str) -> None:
         self._node = node
         self._inboxes = {name: Inbox(kind, frame_id) for name, _, _, kind in TOPICS}
+        self.lost: Counter[str] = Counter()
+        self._last: dict[str, int] = {}
         group, overriding = PolledGroup(), QoSOverridingOptions.with_default_policies()
         self._subscriptions = {
             name: node.create_subscription(
                 message,
                 topic,
-                self._inboxes[name].put,
+                self._inboxes[name].put,  # not called: drain() takes the messages
                 QoSProfile(depth=DEPTH),
                 callback_group=group,
                 qos_overriding_options=overriding,
@@ -73,8 +76,16 @@ class SensorInlet:
     def drain(self) -> None:
         """Bring in what has arrived by now."""
         with self._draining:  # one at a time, so that messages stay in order
-            for subscription in self._subscriptions.values():
-                take_all(subscription)
+            for name, subscription in self._subscriptions.items():
+                for data, sequence in take_all(subscription):
+                    self._note_loss(name, subscription.topic_name, sequence)
+                    self._inboxes[name].put(data)
+
+    def _note_loss(self, name: str, topic: str, sequence: int) -> None:
+        """A publisher counts its messages; what is left out was overwritten before it was taken."""
+        last, self._last[name] = self._last.get(name, sequence), sequence
+        if sequence > last + 1 and self._node.count_publishers(topic) == 1:
+            self.lost[name] += sequence - last - 1
 
     def _keep_draining(self) -> None:
         while not self._ending.wait(PERIOD):
@@ -93,6 +104,8 @@ class SensorInlet:
             found |= {f"{name} rejected {kind}": count for kind, count in inbox.rejected.items()}
             if inbox.dropped:
                 found[f"{name} dropped"] = inbox.dropped
+            if self.lost[name]:
+                found[f"{name} lost"] = self.lost[name]
         return found
 
     def problems(self) -> list[str]:
@@ -105,6 +118,8 @@ class SensorInlet:
             if inbox.rejected:
                 kinds = ", ".join(f"{kind} {count}" for kind, count in inbox.rejected.items())
                 found.append(f"{topic}: {inbox.rejected.total()} of {inbox.received} samples rejected ({kinds})")
+            if lost := self.lost[name]:
+                found.append(f"{topic}: {lost} samples lost, this machine is too busy: replay slower, or a deeper QoS")
             if inbox.dropped:
                 found.append(f"{topic}: {inbox.dropped} samples dropped while model or rig were unknown")
         return found

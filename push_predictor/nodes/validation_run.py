@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from time import monotonic
 
 import numpy as np
 
@@ -15,10 +16,12 @@ from push_predictor.nodes.prediction_client import PredictionClient
 from push_predictor.nodes.residual_recorder import residual_message
 from push_predictor.nodes.sensor_inlet import Samples
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.window_finder import WindowFinder
+from push_predictor.recordings.window_finder import HOLD, WindowFinder
 from push_predictor.recordings.windows import PushWindow
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import PredictPush
+
+SILENCE = 5.0  # s of waiting for a stream that lags behind the others
 
 
 class ValidationRun:
@@ -41,6 +44,8 @@ class ValidationRun:
         self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
         self._show = show
+        self._newest: dict[str, int] = {}  # stamp (ns) by stream
+        self._together = monotonic()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -52,11 +57,23 @@ class ValidationRun:
         self._finder.add_wrench(samples.wrench)
         self._finder.add_pusher(samples.pusher)
         self._finder.add_slider(samples.slider)
-        self._ask_about(self._finder.take_ready())
+        if self._in_step(samples):
+            self._ask_about(self._finder.take_ready())
 
     def finish(self) -> None:
         """No more samples will come."""
         self._ask_about(self._finder.finish())
+
+    def _in_step(self, samples: Samples) -> bool:
+        """Are the streams together, or is one of them silent rather than late?
+
+        The finder goes on without a stream that lags by HOLD. In a fast replay that is little time.
+        """
+        self._newest |= {name: int(stream.stamp[-1]) for name, stream in vars(samples).items() if len(stream)}
+        if max(self._newest.values()) - min(self._newest.values()) < 0.5e9 * HOLD:
+            self._together = monotonic()
+            return True
+        return monotonic() - self._together > SILENCE
 
     def _ask_about(self, windows: Sequence[PushWindow]) -> None:
         for window in windows:

@@ -12,9 +12,11 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.track import Track
 from push_predictor.types import Array, BoolArray
 
-MOTION_HALF_SPAN = 0.05  # s on either side of a sample over which the pusher's speed is judged
+LOOKAHEAD = 0.05  # s that the streams must have passed a sample before it is judged
 FORWARD_SPAN = 0.03  # s after a sample in which the pusher must move already
-LOOKAHEAD = MOTION_HALF_SPAN  # s that the streams must have passed a sample before it is judged
+FIT_SPAN = 0.020  # s of a window that give its velocity and angle (contract, section 2)
+SET_OFF = 0.8  # of the speed over LOOKAHEAD, reached within FIT_SPAN: the tip is not just setting off
+SHORTEST_SPAN = 1e-3  # s; below it a difference says nothing about a speed
 JUMP = 0.005  # m between two samples, beside JUMP_SPEED: a reset of the slider, not a push
 JUMP_SPEED = 1.5  # m/s
 TURN = 0.1  # rad between two samples, beside TURN_SPEED
@@ -25,17 +27,20 @@ TURN_SPEED = 8.0  # rad/s
 class Judged:
     """One slider sample. stamp ns, time s, gap m between pusher and outline, height m of the tip above the slider.
 
-    force: (fx, fy) N as the sensor says, None where unknown. speed: the pusher's, m/s, the smaller of around and after
-    the sample. blind: a stream is silent here; broken: one was silent since the sample before; jumped: the slider was
-    put elsewhere since the sample before.
+    closing: how fast the gap shrinks after the sample, m/s. force: (fx, fy) N as the sensor says, None where unknown.
+    speed: the pusher's, m/s, the smaller of around and after the sample; underway: it is not just setting off.
+    blind: a stream is silent here; broken: one was silent since the sample before; jumped: the slider was put elsewhere
+    since the sample before.
     """
 
     stamp: int
     time: float
     gap: float
     height: float
+    closing: float
     force: Array | None
     speed: float
+    underway: bool
     blind: bool
     broken: bool
     jumped: bool
@@ -44,29 +49,38 @@ class Judged:
 def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: int, last: int) -> Iterator[Judged]:
     """Judge slider samples first to last - 1 (indices into the track)."""
     time, stamp = slider.time[first:last], slider.stamp[first:last]
-    pose, tip = slider.values[first:last], pusher.at(time)
-    touch = rig.outline.project(to_body(tip[:, :2], pose[:, [0, 1, 3]]))
+    height = pusher.at(time)[:, 2] - slider.values[first:last, 2]
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     broken, blind = _silences([t for t in (slider, pusher, wrench) if t is not None], before, time)
-    forces = _forces(wrench, time)
-    speed = np.minimum(
-        _speed(pusher, time - MOTION_HALF_SPAN, time + MOTION_HALF_SPAN), _speed(pusher, time, time + FORWARD_SPAN)
-    )
-    jumped = _jumps(slider, first, last)
+    gap, closing = _gaps(rig, slider, pusher, first, last)
+    around, after = _speed(pusher, time - LOOKAHEAD, time + LOOKAHEAD), _speed(pusher, time, time + FORWARD_SPAN)
+    underway = _speed(pusher, time, time + FIT_SPAN) >= SET_OFF * _speed(pusher, time, time + LOOKAHEAD)
+    speed, forces, jumped = np.minimum(around, after), _forces(wrench, time), _jumps(slider, first, last)
     for k in range(len(time)):
-        force = None if np.isnan(forces[k, 0]) else forces[k]
-        gap, height = float(touch.distance[k]) - rig.pusher_radius, float(tip[k, 2] - pose[k, 2])
         yield Judged(
-            int(stamp[k]),
-            float(time[k]),
-            gap,
-            height,
-            force,
-            float(speed[k]),
-            bool(blind[k]),
-            bool(broken[k]),
-            bool(jumped[k]),
+            stamp=int(stamp[k]),
+            time=float(time[k]),
+            gap=float(gap[k]),
+            height=float(height[k]),
+            closing=float(closing[k]),
+            force=None if np.isnan(forces[k, 0]) else forces[k],
+            speed=float(speed[k]),
+            underway=bool(underway[k]),
+            blind=bool(blind[k]),
+            broken=bool(broken[k]),
+            jumped=bool(jumped[k]),
         )
+
+
+def _gaps(rig: Rig, slider: Track, pusher: Track, first: int, last: int) -> tuple[Array, Array]:
+    """Gap (n,) m at the samples, and how fast it shrinks (n,) m/s in the LOOKAHEAD after each."""
+    ahead = int(np.searchsorted(slider.time, slider.time[last - 1] + LOOKAHEAD, side="right"))
+    time, pose = slider.time[first:ahead], slider.values[first:ahead][:, [0, 1, 3]]
+    gap = rig.outline.project(to_body(pusher.at(time)[:, :2], pose)).distance - rig.pusher_radius
+    # The last sample within reach, not a value in between: what comes after it may not have arrived yet.
+    later = np.searchsorted(time, time + LOOKAHEAD, side="right") - 1
+    closing = (gap - gap[later]) / np.maximum(time[later] - time, SHORTEST_SPAN)
+    return gap[: last - first], closing[: last - first]
 
 
 def _silences(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray, BoolArray]:
@@ -87,7 +101,7 @@ def _speed(pusher: Track, start: Array, end: Array) -> Array:
     """Mean speed (m/s) of the tip between two times each, as far as its stream reaches."""
     start, end = np.maximum(start, pusher.time[0]), np.minimum(end, pusher.time[-1])
     way = np.linalg.norm(pusher.at(end)[:, :2] - pusher.at(start)[:, :2], axis=1)
-    return way / np.maximum(end - start, 1e-3)
+    return np.asarray(way / np.maximum(end - start, SHORTEST_SPAN))
 
 
 def _jumps(slider: Track, first: int, last: int) -> BoolArray:

@@ -7,13 +7,16 @@ from collections import deque
 import numpy as np
 
 from push_predictor.recordings.contact_judge import Judged
+from push_predictor.recordings.track import NANOSECOND
 from push_predictor.recordings.window_cut import PushContext
-from push_predictor.recordings.windows import WindowOptions
+from push_predictor.recordings.windows import TIMED_ID, WindowOptions
 from push_predictor.types import Array
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0
+CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks faster is still an approach
+LEAST_CLOSING = 0.001  # m/s, below the noise of a tracker
 LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
 
 
@@ -33,6 +36,7 @@ class PushTracker:
         self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # near the slider, before the first push
         self._touching = False
         self._first_touch: int | None = None
+        self._last_contact: int | None = None
 
     @property
     def start(self) -> int | None:
@@ -77,7 +81,12 @@ class PushTracker:
         if sample.force is not None and self._free_force:
             return pressed
         # What a resting tip reads may be a preload: it can keep a contact but not tell where one begins or ends.
-        return sample.gap <= self.options.touch_gap_alone or (self._touching and pressed)
+        near = sample.gap <= self.options.touch_gap_alone
+        return (near and (self._touching or self._arrived(sample))) or (self._touching and pressed)
+
+    def _arrived(self, sample: Judged) -> bool:
+        """Whether the tip closes in on the slider no more: where no force tells, that is the touch."""
+        return sample.closing <= max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
 
     def _presses(self, force: Array | None) -> bool:
         zero, noise = self._zero()
@@ -96,8 +105,8 @@ class PushTracker:
         if self.push is None or self._idle > self.options.push_pause:
             self._begin_push(sample)
         self._idle = 0.0
-        self._last_good = sample.time
-        if self._start is None:
+        self._last_good, self._last_contact = sample.time, sample.stamp
+        if self._start is None and sample.underway:
             self._start = sample.stamp
         return self._complete(sample.stamp)
 
@@ -120,7 +129,8 @@ class PushTracker:
         first = self._first_touch if self._first_touch is not None else sample.stamp
         if self.push is not None and first == self.push.first_touch:
             first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again
-        self.push = PushContext(_push_id(first), self._pushes, first, self._zero()[0], None, 0)
+        dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
+        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._zero()[0], None, 0)
         self._pushes += 1
         self._start = None
 
@@ -130,4 +140,4 @@ class PushTracker:
 
 def _push_id(stamp: int) -> str:
     """Named by its first touch, so that the same push has the same name online, offline and in a copy."""
-    return f"push-{stamp // 10**9}.{stamp % 10**9 // 10**6:03d}"
+    return f"{TIMED_ID}{stamp // 10**9}.{stamp % 10**9 // 10**6:03d}"

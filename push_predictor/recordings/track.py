@@ -15,7 +15,8 @@ NANOSECOND = 1e-9
 class Track:
     """Samples of one stream: header stamps (n,) in ns, times (n,) in s after `origin` (ns), values (n, width).
 
-    angle: the column that holds an angle, kept unwrapped. A sample whose stamp does not increase is refused and counted.
+    angle: the column that holds an angle, kept unwrapped. A sample whose stamp does not increase is refused and
+    counted.
     """
 
     def __init__(self, width: int, angle: int | None = None) -> None:
@@ -56,9 +57,9 @@ class Track:
 
     def silent_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
         """For intervals (start, end] (m,): whether a dropout overlaps each, and whether one reaches beyond its end."""
-        begins, ends = self._dropouts()
-        overlap = (begins[None] < end[:, None]) & (ends[None] > start[:, None])
-        return np.any(overlap, axis=1), np.any(overlap & (ends[None] > end[:, None]), axis=1)
+        begins, ends = self._dropouts()  # in order and disjoint: the last that begins before `end` decides
+        last = np.searchsorted(begins, end, side="left") - 1
+        return ends[last] > start, ends[last] > end
 
     def _dropouts(self) -> tuple[Array, Array]:
         """Starts (k,) and ends (k,); the stream is silent before its first sample and, some time on, after its last."""

@@ -8,12 +8,12 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.geometry.outline import Outline, Projection
+from push_predictor.recordings.contact_judge import FIT_SPAN
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.track import NANOSECOND, Track
 from push_predictor.recordings.windows import PushWindow
 from push_predictor.types import Array
 
-FIT_SPAN = 0.020  # s of the window that give velocity and angle (contract, section 2)
 FIT_SAMPLES = 4  # or this many samples, where those take longer
 
 
@@ -26,25 +26,47 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
+class Tracks:
+    """The streams; wrench is None where there is none."""
+
+    slider: Track
+    pusher: Track
+    wrench: Track | None
+
+
+@dataclass(frozen=True, eq=False)
 class PushContext:
-    """What a window inherits from its push: id, number, first touch (ns), the force without contact (2,) N or None,
-    the edge of the window before or None, and where in the push it stands."""
+    """What a window inherits from its push.
+
+    push_id, push_index; first_touch ns; dwell: s without contact before it; tare: the force without contact (2,) N,
+    None where unknown; last_edge: that of the window before, None for the first; window_index: within the push.
+    """
 
     push_id: str
     push_index: int
     first_touch: int
+    dwell: float
     tare: Array | None
     last_edge: int | None
     window_index: int
 
 
 def cut_window(
-    rig: Rig, slider: Track, pusher: Track, wrench: Track | None, origin: int, start: int, end: int, push: PushContext
+    rig: Rig,
+    tracks: Tracks,
+    origin: int,
+    start: int,
+    end: int,
+    push: PushContext,
+    slid: float,
 ) -> PushWindow | None:
-    """The window from start to end (ns), or None where the pusher does not push into the slider."""
+    """Cut the window from start to end (ns), or answer None where the pusher does not push into the slider.
+
+    slid: m that the slider has been pushed so far.
+    """
     begin, finish = (start - origin) * NANOSECOND, (end - origin) * NANOSECOND
-    pose, pose_after = slider.at(np.array([begin, finish]))[:, [0, 1, 3]]
-    line = pusher_line(pusher, begin)
+    pose, pose_after = tracks.slider.at(np.array([begin, finish]))[:, [0, 1, 3]]
+    line = pusher_line(tracks.pusher, begin)
     touch = rig.outline.project(to_body(line.position, pose)[None])
     edge, contact = contact_at(rig.outline, touch, push.last_edge)
     normal = rotate(rig.outline.inward_normal(np.array([contact]))[0], pose[2])
@@ -54,18 +76,6 @@ def cut_window(
     if not (abs(angle) < np.pi / 2.0 and speed > 0.0):
         return None
     moved = rotate(pose_after[:2] - pose[:2], np.array(-heading))
-    covariates = {
-        "elapsed_time": begin,
-        "push_index": float(push.push_index),
-        "time_since_contact": (start - push.first_touch) * NANOSECOND,
-        "slider_x": float(pose[0]),
-        "slider_y": float(pose[1]),
-        "slider_heading": float(wrap_angle(pose[2])),
-        "push_heading": heading,
-        "edge": float(edge),
-        "contact_gap": float(touch.distance[0] - rig.pusher_radius),
-        **_forces(wrench, begin, finish, push.tare, normal),
-    }
     return PushWindow(
         push_id=push.push_id,
         index=push.window_index,
@@ -79,8 +89,27 @@ def cut_window(
         slider_start=pose,
         slider_end=pose_after,
         push_heading=heading,
-        covariates=covariates,
+        covariates={
+            "elapsed_time": begin,
+            "slid_distance": slid,
+            "push_heading": heading,
+            "edge": float(edge),
+            "contact_gap": float(touch.distance[0] - rig.pusher_radius),
+            **_conditions(pose, start, push),
+            **_forces(tracks.wrench, begin, finish, push.tare, normal),
+        },
     )
+
+
+def _conditions(pose: Array, start: int, push: PushContext) -> dict[str, float]:
+    return {
+        "push_index": float(push.push_index),
+        "dwell_time": push.dwell,
+        "time_since_contact": (start - push.first_touch) * NANOSECOND,
+        "slider_x": float(pose[0]),
+        "slider_y": float(pose[1]),
+        "slider_heading": float(wrap_angle(pose[2])),
+    }
 
 
 def pusher_line(pusher: Track, begin: float) -> Line:

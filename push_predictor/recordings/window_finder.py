@@ -16,7 +16,7 @@ from push_predictor.recordings.push_tracker import PushTracker
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.track import Track
-from push_predictor.recordings.window_cut import cut_window
+from push_predictor.recordings.window_cut import Tracks, cut_window
 from push_predictor.recordings.windows import PushWindow, WindowOptions
 from push_predictor.types import Array, IntArray
 
@@ -27,12 +27,7 @@ CLOCK_SET_BACK = 1_000_000_000  # ns; a stamp earlier than this before the last 
 
 def find_windows(recording: Recording, rig: Rig, options: WindowOptions | None = None) -> list[PushWindow]:
     """All windows of a recording, in order of time."""
-    finder = WindowFinder(rig, options)
-    if recording.wrench is not None:
-        finder.add_wrench(recording.wrench)
-    finder.add_pusher(recording.pusher)
-    finder.add_slider(recording.slider)
-    return finder.finish()
+    return WindowFinder(rig, options).find(recording)
 
 
 class WindowFinder:
@@ -47,6 +42,14 @@ class WindowFinder:
         self.counts = dict.fromkeys(("refused", "clock_set_back", "dropouts", "resets", "not_a_push"), 0)
         self._ready: list[PushWindow] = []
         self._begin()
+
+    def find(self, recording: Recording) -> list[PushWindow]:
+        """All windows of a recording, with its scalar topics as covariates; see find_windows."""
+        if recording.wrench is not None:
+            self.add_wrench(recording.wrench)
+        self.add_pusher(recording.pusher)
+        self.add_slider(recording.slider)
+        return [_with_topics(window, recording) for window in self.finish()]
 
     def add_slider(self, stream: PoseStream) -> None:
         """Samples of the slider's pose."""
@@ -76,6 +79,7 @@ class WindowFinder:
         self._tracks = {"slider": Track(4, angle=3), "pusher": Track(3), "wrench": Track(2)}
         self._tracker = PushTracker(self.options)
         self._origin: int | None = None
+        self._slid = 0.0
         self._judged_stamp = np.iinfo(np.int64).min
 
     def _end(self) -> None:
@@ -127,7 +131,8 @@ class WindowFinder:
         slider, pusher, wrench = self._tracks.values()
         if not (len(slider) and len(pusher)):
             return None
-        if not all([track.settled(final) for track in (slider, pusher, wrench) if len(track)]):
+        settled = [track.settled(final) for track in (slider, pusher, wrench) if len(track)]
+        if not all(settled):
             return None
         if final:
             return float(min(slider.time[-1], pusher.time[-1]))
@@ -142,13 +147,15 @@ class WindowFinder:
         push = self._tracker.push
         if push is None or self._origin is None:
             return
-        slider, pusher = self._tracks["slider"], self._tracks["pusher"]
-        window = cut_window(self.rig, slider, pusher, self._wrench(), self._origin, start, end, push)
+        tracks = Tracks(self._tracks["slider"], self._tracks["pusher"], self._wrench())
+        window = cut_window(self.rig, tracks, self._origin, start, end, push, self._slid)
         if window is None:
             self.counts["not_a_push"] += 1
             return
         edge = int(window.covariates["edge"])
         self._tracker.push = replace(push, last_edge=edge, window_index=push.window_index + 1)
+        # From window to window: summed over samples, the tracker's noise would count as a way.
+        self._slid += float(np.hypot(*window.displacement[:2]))
         self._ready.append(window)
 
     def _forget(self, judged: float) -> None:
@@ -156,3 +163,13 @@ class WindowFinder:
         needed = judged if start is None or self._origin is None else min(judged, (start - self._origin) * 1e-9)
         for track in self._tracks.values():
             track.forget_before(needed - KEPT_BEHIND)
+
+
+def _with_topics(window: PushWindow, recording: Recording) -> PushWindow:
+    """The window with the value that each recorded scalar had at its start."""
+    topics = {
+        f"topic:{name}": float(np.interp(window.start, stream.stamp.astype(np.float64), stream.value))
+        for name, stream in recording.scalars.items()
+        if len(stream)
+    }
+    return replace(window, covariates={**window.covariates, **topics})

@@ -10,6 +10,8 @@ import numpy as np
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
+TIMED_ID = "push-"  # begins the id of a push that is named by the time of its first touch
+
 
 @dataclass(frozen=True)
 class WindowOptions:
