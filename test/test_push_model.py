@@ -232,7 +232,7 @@ def test_a_failed_save_leaves_the_old_file(models: dict[str, PushModel], tmp_pat
     save_model(models["gp"], tmp_path / "m")
     before = (tmp_path / "m").read_bytes()
     (tmp_path / "m.d").mkdir()
-    with pytest.raises(OSError, match="m.d"):
+    with pytest.raises(OSError, match=r"m\.d"):
         save_model(models["vhgp"], tmp_path / "m.d")
     assert (tmp_path / "m").read_bytes() == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["m", "m.d"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from dataclasses import dataclass
+from time import monotonic
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
@@ -17,6 +18,7 @@ from push_predictor.recordings.streams import PoseStream, WrenchStream
 
 DEPTH = 1000
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last DEPTH messages only
+PATIENCE = 1.0  # s
 TOPICS = (
     ("slider", PoseStamped, "slider/pose", SLIDER),
     ("pusher", PoseStamped, "pusher/pose", TIP),
@@ -48,6 +50,7 @@ class SensorInlet:
         self._inboxes = {name: Inbox(kind, frame_id) for name, _, _, kind in TOPICS}
         self.lost: Counter[str] = Counter()
         self._last: dict[str, int] = {}
+        self._empty = monotonic()  # when nothing waited
         group, overriding = PolledGroup(), QoSOverridingOptions.with_default_policies()
         self._subscriptions = {
             name: node.create_subscription(
@@ -72,6 +75,13 @@ class SensorInlet:
 
     def __len__(self) -> int:
         return sum(map(len, self._inboxes.values()))
+
+    def complete(self) -> bool:
+        """Has every topic sent something that waits, or one of them nothing for a second after the others?"""
+        waiting = [len(inbox) > 0 for inbox in self._inboxes.values()]
+        if not any(waiting):
+            self._empty = monotonic()
+        return all(waiting) or monotonic() - self._empty > PATIENCE
 
     def drain(self) -> None:
         """Bring in what has arrived by now."""

@@ -12,10 +12,11 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.track import Track
 from push_predictor.types import Array, BoolArray
 
-LOOKAHEAD = 0.05  # s that the streams must have passed a sample before it is judged
+REACH = 0.1  # s that the streams must have passed a sample before it is judged
+NEAR = 0.05  # s around a sample over which motion and gap are judged
 FORWARD_SPAN = 0.03  # s after a sample in which the pusher must move already
 FIT_SPAN = 0.020  # s of a window that give its velocity and angle (contract, section 2)
-SET_OFF = 0.8  # of the speed over LOOKAHEAD, reached within FIT_SPAN: the tip is not just setting off
+NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is setting off
 SHORTEST_SPAN = 1e-3  # s; below it a difference says nothing about a speed
 JUMP = 0.005  # m between two samples, beside JUMP_SPEED: a reset of the slider, not a push
 JUMP_SPEED = 1.5  # m/s
@@ -53,8 +54,8 @@ def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: i
     before = slider.time[max(first - 1, 0) : last - 1] if first else np.append(time[0], time[:-1])
     broken, blind = _silences([t for t in (slider, pusher, wrench) if t is not None], before, time)
     gap, closing = _gaps(rig, slider, pusher, first, last)
-    around, after = _speed(pusher, time - LOOKAHEAD, time + LOOKAHEAD), _speed(pusher, time, time + FORWARD_SPAN)
-    underway = _speed(pusher, time, time + FIT_SPAN) >= SET_OFF * _speed(pusher, time, time + LOOKAHEAD)
+    around, after = _speed(pusher, time - NEAR, time + NEAR), _speed(pusher, time, time + FORWARD_SPAN)
+    underway = _underway(pusher, time)
     speed, forces, jumped = np.minimum(around, after), _forces(wrench, time), _jumps(slider, first, last)
     for k in range(len(time)):
         yield Judged(
@@ -72,13 +73,22 @@ def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: i
         )
 
 
+def _underway(pusher: Track, time: Array) -> BoolArray:
+    """Whether the tip does not just set off at times (n,); a stream too slow to tell is taken at its word."""
+    if 3.0 * pusher.period > FIT_SPAN:
+        return np.ones(len(time), dtype=np.bool_)
+    first = _speed(pusher, time, time + FIT_SPAN)
+    near, later = _speed(pusher, time, time + NEAR), _speed(pusher, time + FIT_SPAN, time + REACH)
+    return np.asarray((first >= NEAR_SHARE * near) & (first >= REACH_SHARE * later))
+
+
 def _gaps(rig: Rig, slider: Track, pusher: Track, first: int, last: int) -> tuple[Array, Array]:
-    """Gap (n,) m at the samples, and how fast it shrinks (n,) m/s in the LOOKAHEAD after each."""
-    ahead = int(np.searchsorted(slider.time, slider.time[last - 1] + LOOKAHEAD, side="right"))
+    """Gap (n,) m at the samples, and how fast it shrinks (n,) m/s in the NEAR after each."""
+    ahead = int(np.searchsorted(slider.time, slider.time[last - 1] + NEAR, side="right"))
     time, pose = slider.time[first:ahead], slider.values[first:ahead][:, [0, 1, 3]]
     gap = rig.outline.project(to_body(pusher.at(time)[:, :2], pose)).distance - rig.pusher_radius
     # The last sample within reach, not a value in between: what comes after it may not have arrived yet.
-    later = np.searchsorted(time, time + LOOKAHEAD, side="right") - 1
+    later = np.searchsorted(time, time + NEAR, side="right") - 1
     closing = (gap - gap[later]) / np.maximum(time[later] - time, SHORTEST_SPAN)
     return gap[: last - first], closing[: last - first]
 

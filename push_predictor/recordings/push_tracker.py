@@ -15,7 +15,7 @@ from push_predictor.types import Array
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0
-CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks faster is still an approach
+CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
 LEAST_CLOSING = 0.001  # m/s, below the noise of a tracker
 LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
 
@@ -82,11 +82,13 @@ class PushTracker:
             return pressed
         # What a resting tip reads may be a preload: it can keep a contact but not tell where one begins or ends.
         near = sample.gap <= self.options.touch_gap_alone
-        return (near and (self._touching or self._arrived(sample))) or (self._touching and pressed)
+        return (near and self._stays(sample)) or (self._touching and pressed)
 
-    def _arrived(self, sample: Judged) -> bool:
-        """Whether the tip closes in on the slider no more: where no force tells, that is the touch."""
-        return sample.closing <= max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
+    def _stays(self, sample: Judged) -> bool:
+        """Whether the gap shrinks no more, as it does before the touch; without any force, nor grows, as after it."""
+        limit = max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
+        parts = sample.force is None and sample.closing < -limit
+        return not parts and (self._touching or sample.closing <= limit)
 
     def _presses(self, force: Array | None) -> bool:
         zero, noise = self._zero()

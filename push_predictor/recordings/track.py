@@ -55,6 +55,11 @@ class Track:
             self._period = float(np.median(np.diff(self.time[: PERIOD_SAMPLES + 1]))) if len(self) > 1 else 0.0
         return self._period is not None
 
+    @property
+    def period(self) -> float:
+        """Median interval of the first samples, s; 0 while it is not settled."""
+        return self._period or 0.0
+
     def silent_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
         """For intervals (start, end] (m,): whether a dropout overlaps each, and whether one reaches beyond its end."""
         begins, ends = self._dropouts()  # in order and disjoint: the last that begins before `end` decides
@@ -63,7 +68,7 @@ class Track:
 
     def _dropouts(self) -> tuple[Array, Array]:
         """Starts (k,) and ends (k,); the stream is silent before its first sample and, some time on, after its last."""
-        limit = max(SHORTEST_DROPOUT, DROPOUT_PERIODS * (self._period or 0.0))
+        limit = max(SHORTEST_DROPOUT, DROPOUT_PERIODS * self.period)
         late = np.flatnonzero(np.diff(self.time) > limit)
         begins = np.concatenate([[-np.inf], self.time[late], [self.time[-1] + limit]])
         return begins, np.concatenate([[self.time[0]], self.time[late + 1], [np.inf]])

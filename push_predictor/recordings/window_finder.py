@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.recordings.contact_judge import LOOKAHEAD, judge
+from push_predictor.recordings.contact_judge import REACH, judge
 from push_predictor.recordings.push_tracker import PushTracker
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
@@ -138,7 +138,7 @@ class WindowFinder:
             return float(min(slider.time[-1], pusher.time[-1]))
         newest = max(track.time[-1] for track in (slider, pusher, wrench) if len(track))
         reached = min(track.time[-1] if len(track) else -np.inf for track in (slider, pusher, wrench))
-        return float(max(reached, newest - HOLD) - LOOKAHEAD)
+        return float(max(reached, newest - HOLD) - REACH)
 
     def _wrench(self) -> Track | None:
         return self._tracks["wrench"] if len(self._tracks["wrench"]) else None
