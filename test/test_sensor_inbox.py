@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
 from msg_adapters import streams
 from msg_adapters.streams import SLIDER, TIP, Inbox, slider_stream, tip_stream, wrench_stream
+from push_predictor.nodes import sensor_inlet
 from push_predictor.recordings.read import read_recording
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
@@ -61,6 +64,7 @@ def test_good_messages_become_a_stream_in_order():
         (pose(*GOOD, nanosec=1_000_000_000), "unreadable"),
         (pose(*GOOD)[:40], "unreadable"),
     ],
+    ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
 )
 def test_a_useless_slider_pose_is_counted_by_kind_and_the_others_are_taken(message: bytes, kind: str):
     inbox = filled(Inbox(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
@@ -125,3 +129,21 @@ def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Pa
     assert read.wrench is not None
     for name in ("stamp", "fx", "fy", "torque"):
         assert np.array_equal(getattr(force, name), getattr(read.wrench, name)), name
+
+
+def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_second(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(sensor_inlet, "monotonic", lambda: now[0])
+    slider: list[bytes] = []
+    wrench: list[bytes] = []
+    inlet: Any = SimpleNamespace(_inboxes={"slider": slider, "wrench": wrench}, _empty=0.0)
+    complete = sensor_inlet.SensorInlet.complete
+    assert not complete(inlet), "nothing has come"
+    slider.append(b"pose")
+    now[0] += 0.9
+    assert not complete(inlet)
+    now[0] += 0.2
+    assert complete(inlet), "there is no wrench"
+    wrench.append(b"force")
+    inlet._empty = now[0]
+    assert complete(inlet), "all are there"

@@ -24,11 +24,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(options: argparse.Namespace) -> None:
-    """Evaluate and print; warn where a push was trained on."""
+    """Evaluate and print; warn where a push was trained on, or the data are of another slider."""
+    from push_predictor.evaluation.offline import rig_difference
     from push_predictor.evaluation.validation import compare, metrics_json, trained_on
     from push_predictor.models.model_file import load_model
     from push_predictor.models.request import check_table
-    from push_predictor.recordings.load import load_data
+    from push_predictor.recordings.load import known_rig, load_data
     from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
@@ -37,6 +38,10 @@ def run(options: argparse.Namespace) -> None:
         table = load_data(options.data, load_rig(options.rig) if options.rig else None)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
+    for path in options.data:
+        rig = load_rig(options.rig) if options.rig else known_rig(path)
+        if rig is not None and (difference := rig_difference(model, rig)):
+            warn(f"{path}: {difference}")
     if seen := trained_on(model, table):
         warn(f"{len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out")
     if not write_json(options, metrics):

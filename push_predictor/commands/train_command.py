@@ -38,6 +38,8 @@ def run(options: argparse.Namespace) -> None:
 
     check_data(options.data)
     check_seed(options.seed)
+    if options.fit and options.model != "analytical":
+        raise RequestError("--fit", options.model, "it with --model analytical only, a learnt model has nothing to fit")
     if options.stride is not None and not 0.0 < options.stride < float("inf"):
         raise RequestError("--stride", options.stride, "a number above 0, in s")
     rig = load_rig_for(options.data, options.rig)

@@ -153,12 +153,12 @@ class PushValidator(Node):
 
     def _collect(self) -> None:
         """Feed the score with what has arrived; until models and rig are known, the samples wait."""
-        models = self._source.models()
+        models, complete = self._source.models(), self._inlet.complete()
         if models is None or self._rig is None or not len(self._inlet) or self._rig_changed():
             return
         if not self._open:
             # Reading a recording gives the finder every stream from its beginning, so a score begins with all of them.
-            if not (self._inlet.complete() or self._closing.is_set() or self._finish.asked()):
+            if not (complete or self._closing.is_set() or self._finish.asked()):
                 return
             self._run = ValidationRun(self._rig, models, self._client, self._show)
             self._open, self._failure = True, ""

@@ -77,7 +77,10 @@ class SensorInlet:
         return sum(map(len, self._inboxes.values()))
 
     def complete(self) -> bool:
-        """Has every topic sent something that waits, or one of them nothing for a second after the others?"""
+        """Has every topic sent something that waits, or one of them nothing for a second after the others?
+
+        To be asked often, for it takes the time since nothing waited.
+        """
         waiting = [len(inbox) > 0 for inbox in self._inboxes.values()]
         if not any(waiting):
             self._empty = monotonic()

@@ -56,12 +56,14 @@ def _load(path: Path, rig: Rig | None, options: WindowOptions) -> PushTable:
     return windows_to_table(find_windows(recording, require_rig(recording), options))
 
 
+def known_rig(path: Path) -> Rig | None:
+    """The rig that a recording holds or that lies beside a table, None where there is none."""
+    return recorded_rig(open_bag(path)) if is_recording(path) else rig_beside(path)
+
+
 def _rig_of(path: Path) -> Rig:
-    if is_recording(path):
-        rig, place = recorded_rig(open_bag(path)), "the recording"
-    else:
-        rig, place = rig_beside(path), str(rig_path(path))
-    if rig is None:
+    if (rig := known_rig(path)) is None:
+        place = "the recording" if is_recording(path) else str(rig_path(path))
         raise RigError(f"{path}: no {RECORD_NAME} in {place}; {HOW_TO_GIVE}")
     return rig
 

@@ -64,6 +64,13 @@ class McapFile:
         if not self._read_summary():
             for _ in self.messages(topics=()):
                 pass
+        if not (self.notes or self._closed()):
+            self._note(self._size, "the end of the file is missing, the messages before it are whole")
+
+    def _closed(self) -> bool:
+        with self.path.open("rb") as stream:
+            stream.seek(self._size - len(MAGIC))
+            return stream.read() == MAGIC
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note.
