@@ -90,7 +90,6 @@ def cut_window(
         slider_end=pose_after,
         push_heading=heading,
         covariates={
-            "elapsed_time": begin,
             "slid_distance": slid,
             "push_heading": heading,
             "edge": float(edge),

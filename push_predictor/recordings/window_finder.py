@@ -15,13 +15,16 @@ from push_predictor.recordings.contact_judge import REACH, judge
 from push_predictor.recordings.push_tracker import PushTracker
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
-from push_predictor.recordings.track import Track
+from push_predictor.recordings.track import NANOSECOND, Track
 from push_predictor.recordings.window_cut import Tracks, cut_window
 from push_predictor.recordings.windows import PushWindow, WindowOptions
 from push_predictor.types import Array, IntArray
 
 HOLD = 30.0  # s by which a stream may lag before the others go on without it
 KEPT_BEHIND = 1.0  # s of samples kept behind what was judged
+# ns; times are counted from a multiple of this, not from the sample that happens to come first: they must not round
+# differently with the order of arrival.
+ORIGIN_STEP = 1_000_000_000_000
 CLOCK_SET_BACK = 1_000_000_000  # ns; a stamp earlier than this before the last one of its stream
 
 
@@ -79,6 +82,7 @@ class WindowFinder:
         self._tracks = {"slider": Track(4, angle=3), "pusher": Track(3), "wrench": Track(2)}
         self._tracker = PushTracker(self.options)
         self._origin: int | None = None
+        self._first = 0
         self._slid = 0.0
         self._judged_stamp = np.iinfo(np.int64).min
 
@@ -106,7 +110,8 @@ class WindowFinder:
             self._add(name, stamp[cut:], values[cut:])
             return
         if self._origin is None:
-            self._origin = int(stamp[0])
+            self._first = int(stamp[0])
+            self._origin = self._first // ORIGIN_STEP * ORIGIN_STEP
         self._tracks[name].extend(stamp, values, self._origin)
 
     # --- judging what all streams have passed -------------------------------------------------------------------
@@ -156,7 +161,8 @@ class WindowFinder:
         self._tracker.push = replace(push, last_edge=edge, window_index=push.window_index + 1)
         # From window to window: summed over samples, the tracker's noise would count as a way.
         self._slid += float(np.hypot(*window.displacement[:2]))
-        self._ready.append(window)
+        elapsed = (start - self._first) * NANOSECOND
+        self._ready.append(replace(window, covariates={"elapsed_time": elapsed, **window.covariates}))
 
     def _forget(self, judged: float) -> None:
         start = self._tracker.start
