@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -179,7 +180,7 @@ def test_the_recording_of_residuals_is_read_by_our_reader_and_by_rosbags(watched
     bag = open_bag(out / "residuals")
     assert bag.topics == {"/push_residual": RESIDUAL_TYPE}
     ours = [deserialize_message(message.data, PushResidual) for message in bag.messages()]
-    key = lambda m: (m.model, m.push_id, m.window)  # noqa: E731
+    key = attrgetter("model", "push_id", "window")
     assert sorted(ours, key=key) == sorted(heard.residuals, key=key)
     ends = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in ours]
     assert ends == sorted(ends)

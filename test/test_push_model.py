@@ -136,9 +136,9 @@ def test_a_bad_request_names_field_value_and_what_is_accepted(
     models: dict[str, PushModel], change: dict[str, object], message: str
 ) -> None:
     request = {"velocity": 0.02, "contact": 0.1, "angle": 0.2, "duration": 0.2, "covariates": {}}
-    check_request(models["vhgp"], **request)  # type: ignore[arg-type]
+    check_request(models["vhgp"], **request)
     with pytest.raises(RequestError, match=message):
-        check_request(models["vhgp"], **{**request, **change})  # type: ignore[arg-type]
+        check_request(models["vhgp"], **{**request, **change})
 
 
 def test_the_first_bad_push_of_a_batch_is_named_by_its_index(models: dict[str, PushModel]) -> None:

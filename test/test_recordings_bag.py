@@ -39,7 +39,7 @@ def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options:
     """A file by the mcap package's own writer; metadata=(name, record) goes to its end, encoding is the channels'."""
     metadata, encoding = options.pop("metadata", None), str(options.pop("encoding", "cdr"))
     with path.open("wb") as stream:
-        writer = Writer(stream, **options)  # type: ignore[arg-type]
+        writer = Writer(stream, **options)
         writer.start(profile="ros2")
         channels = {}
         for name, (kind, _) in topics.items():
@@ -50,7 +50,7 @@ def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options:
                 if i < len(messages):
                     writer.add_message(channels[name], t, messages[i], t)
         if metadata:
-            writer.add_metadata(*metadata)  # type: ignore[misc]
+            writer.add_metadata(*metadata)
         writer.finish()
     return path
 

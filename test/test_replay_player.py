@@ -43,10 +43,10 @@ class Stage:
         self.states: list[str] = []
         self.settled: list[int] = []
         self.cost = 0
-        self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))  # type: ignore[arg-type]
+        self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
         outlet = Outlet(self.publish, lambda: self.settled.append(len(self.log)), self.states.append)
         settings = {"window": 10, "loop": False, "delay": 0, **options}
-        self.player = ReplayPlayer(ListSource(messages), self.clock, self, outlet, **settings)  # type: ignore[arg-type]
+        self.player = ReplayPlayer(ListSource(messages), self.clock, self, outlet, **settings)
 
     def now(self) -> int:
         return self.time

@@ -26,7 +26,7 @@ LIFTED = 0.03  # m
 
 def spec_of(seed: int = 1, pushes: int = 12, **options: object) -> SimulationSpec:
     plan = random_pushes(pushes, [0.02, 0.05], 0.02, np.random.default_rng(seed), angle_limit=0.8)
-    return SimulationSpec("rect1", "abs", plan, seed=seed, **options)  # type: ignore[arg-type]
+    return SimulationSpec("rect1", "abs", plan, seed=seed, **options)
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +83,8 @@ def test_dropouts_come_as_often_as_asked_and_not_otherwise() -> None:
 
 def test_the_slider_moves_only_when_pushed_or_while_the_tip_is_lifted(simulated: Recording) -> None:
     slider = simulated.slider
-    pushed = np.hypot(simulated.wrench.fx, simulated.wrench.fy) > 0.4  # type: ignore[union-attr]
-    touched = np.interp(slider.stamp, simulated.wrench.stamp, pushed) > 0.0  # type: ignore[union-attr]
+    pushed = np.hypot(simulated.wrench.fx, simulated.wrench.fy) > 0.4
+    touched = np.interp(slider.stamp, simulated.wrench.stamp, pushed) > 0.0
     moved = np.hypot(np.diff(slider.x), np.diff(slider.y)) / np.diff(seconds(slider)) > 0.025
     explained = touched | lifted_at(simulated, slider.stamp)
     coasting = np.convolve(explained, np.ones(9), mode="same") > 0

@@ -33,13 +33,14 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
+    given = load_rig(options.rig) if options.rig else None
     check_data(options.data)
     with progress("evaluate"):
-        table = load_data(options.data, load_rig(options.rig) if options.rig else None)
+        table = load_data(options.data, given)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
     for path in options.data:
-        rig = load_rig(options.rig) if options.rig else known_rig(path)
+        rig = given or known_rig(path)
         if rig is not None and (difference := rig_difference(model, rig)):
             warn(f"{path}: {difference}")
     if seen := trained_on(model, table):

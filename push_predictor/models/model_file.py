@@ -231,7 +231,7 @@ def _regression(
     if not all(np.all(np.isfinite(value)) for value in values.values()):
         raise ValueError("a hyperparameter is not finite")
     if kind == "gp":
-        return GaussianProcess(features, column, GpParameters(**values))  # type: ignore[arg-type]
+        return GaussianProcess(features, column, GpParameters(**values))  # type: ignore[arg-type]  # from JSON
     if sites is None or sites.shape != column.shape or not np.all(np.isfinite(sites)) or np.any(sites < 0.0):
         raise ValueError(f"site precisions are missing or not {len(column)} finite numbers from 0 on")
-    return VHGP(features, column, VhgpParameters(**values), sites)  # type: ignore[arg-type]
+    return VHGP(features, column, VhgpParameters(**values), sites)  # type: ignore[arg-type]  # from JSON

@@ -150,7 +150,8 @@ class ReplayTopics:
         except PushPredictorError as error:
             self.skipped[topic] = str(error)
             return
-        stamped = list(found.get_fields_and_field_types().values())[:1] == ["std_msgs/Header"]  # type: ignore[attr-defined]
+        fields = found.get_fields_and_field_types()  # type: ignore[attr-defined]  # every message class has it
+        stamped = list(fields.values())[:1] == ["std_msgs/Header"]
         if self._restamper is not None and not stamped:
             self.unstamped.append(topic)
         try:

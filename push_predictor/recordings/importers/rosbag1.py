@@ -76,17 +76,17 @@ def _vicon_body(topics: dict[str, str]) -> str | None:
 
 
 def _transform(message: object) -> tuple[float, float, float, float]:
-    pose = message.transform  # type: ignore[attr-defined]
+    pose = message.transform  # type: ignore[attr-defined]  # typed at run time
     return pose.translation.x, pose.translation.y, pose.rotation.z, pose.rotation.w
 
 
 def _wrench(message: object) -> tuple[float, float, float]:
-    wrench = message.wrench  # type: ignore[attr-defined]
+    wrench = message.wrench  # type: ignore[attr-defined]  # typed at run time
     return wrench.force.x, wrench.force.y, wrench.torque.z
 
 
 def _position(message: object) -> tuple[float, float, float]:
-    position = message.pose.position  # type: ignore[attr-defined]
+    position = message.pose.position  # type: ignore[attr-defined]  # typed at run time
     return position.x, position.y, position.z
 
 
