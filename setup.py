@@ -25,7 +25,7 @@ setup(
     ],
     install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4"],
     extras_require={
-        "report": ["matplotlib>=3.8"],
+        "report": ["matplotlib>=3.8", "joblib>=1.4", "rich>=13"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "test": [
@@ -36,6 +36,7 @@ setup(
             "mypy>=1.11",
             "scikit-learn>=1.4",
             "mcap-ros2-support>=0.5",
+            "dask[distributed]>=2024.5",
         ],
     },
     entry_points={

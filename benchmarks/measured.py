@@ -103,12 +103,19 @@ def _summary(recording: Recording) -> str:
 def _leave_one_out_row(runs: Sequence[Path], kind: str, fit: bool, stride: float | None) -> str:
     folds = leave_one_run_out(runs, kind, fit, stride)
     counts = [len(fold.model.training) for fold in folds]
-    inside, whole = np.concatenate([fold.in_domain for fold in folds]), pooled(folds)
-    there = nmse(whole.mean[inside], whole.observed[inside], whole.training_mean[inside]).sum()
-    by_run = " ".join(f"{total(fold.comparison, 'nmse'):.2f}" for fold in folds)
+    inside, there = np.concatenate([fold.in_domain for fold in folds]), _nmse_in_domain(folds)
+    by_run = " ".join(f"{total(fold.tally, 'nmse'):.2f}" for fold in folds)
     title = f"{kind}, fitted" if fit else kind
     rows = f"{min(counts)} to {max(counts)}{' overlapping' if stride else ''}"
-    return f"| {title} | {rows} | {figures(whole)} | {inside.mean():.0%}, {there:.2f} | {by_run} |"
+    return f"| {title} | {rows} | {figures(pooled(folds))} | {inside.mean():.0%}, {there:.2f} | {by_run} |"
+
+
+def _nmse_in_domain(folds: Sequence[Fold]) -> float:
+    """Of the windows that their models do not flag, summed over the outputs."""
+    rows = [(fold.comparison, fold.in_domain) for fold in folds]
+    error = np.concatenate([(c.observed - c.mean)[inside] ** 2 for c, inside in rows])
+    spread = np.concatenate([(c.observed - c.training_mean)[inside] ** 2 for c, inside in rows])
+    return float(np.sum(error.sum(axis=0) / spread.sum(axis=0)))
 
 
 def _physics_in_words(runs: Sequence[Path]) -> str:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from push_predictor.evaluation.metrics import gaussian_nlpd
-from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.evaluation.validation import Comparison, compare, metrics_json
+from push_predictor.evaluation import tally as tallies
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS
+from push_predictor.evaluation.tally import Tally
+from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
+from push_predictor.paper.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
 HEAD = "NMSE (dx dy dtheta) | 95 % of NMSE | NLPD | 95 % of NLPD | exact NLPD | within 95 % (dx dy dtheta)"
+WITHIN = COVERAGE_LEVELS.index(0.95)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,75 +32,54 @@ class Fold:
     in_domain: BoolArray
     cpu: float
 
+    @property
+    def tally(self) -> Tally:
+        """Its sums by push."""
+        return tallies.tally(self.comparison)
 
-def trained(
-    table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False, n: int | None = None, seed: int = 0
-) -> Fold:
-    """Train on n rows of one table (all if None), predict another."""
+
+def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False) -> Fold:
+    """Train on one table, predict another."""
     start = time.process_time()
-    model = train_model(table, rig, kind, name=kind, n_train=n, seed=seed, fit=fit)
+    model = train_model(table, rig, kind, name=kind, fit=fit)
     cpu = time.process_time() - start
     return Fold(model, compare(model, test), model.predict(test.inputs, test.duration).in_domain, cpu)
 
 
-def pooled(folds: Sequence[Fold]) -> Comparison:
-    """The rows of all folds as one; each row keeps its own model's training mean as reference of the NMSE."""
-    parts = [fold.comparison for fold in folds]
-
-    def rows(name: str) -> Array:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    return Comparison(
-        model=parts[0].model,
-        n_train=min(part.n_train for part in parts),
-        push_id=rows("push_id"),
-        mean=rows("mean"),
-        covariance=rows("covariance"),
-        observed=rows("observed"),
-        exact_log_density=None if parts[0].exact_log_density is None else rows("exact_log_density"),
-        training_mean=np.concatenate([np.tile(part.training_mean, (len(part.mean), 1)) for part in parts]),
-    )
+def pooled(folds: Sequence[Fold]) -> Tally:
+    """The windows of all folds together; each keeps its own model's training mean as reference of the NMSE."""
+    return tallies.pooled([fold.tally for fold in folds])
 
 
-def figures(comparison: Comparison) -> str:
+def figures(tally: Tally) -> str:
     """The cells under HEAD: totals over the outputs in SI units, intervals by resampling whole pushes."""
-    m: dict[str, Any] = metrics_json(comparison)
-    by_output = " ".join(f"{m['nmse'][name]:.3f}" for name in ("dx", "dy", "dtheta"))
-    low_high = {key: f"{m['interval'][key]['low']:.2f} to {m['interval'][key]['high']:.2f}" for key in ("nmse", "nlpd")}
-    exact = f"{m['exact_nlpd']['total']:.2f}" if m["exact_nlpd"] else ""
-    cover = " ".join(f"{share:.2f}" for share in m["coverage"]["0.95"].values())
-    nmse, nlpd = f"{m['nmse']['total']:.3f} ({by_output})", f"{m['nlpd']['total']:.2f}"
-    return " | ".join([nmse, low_high["nmse"], nlpd, low_high["nlpd"], exact, cover])
+    totals = tally.totals()
+    nmse, nlpd = by_push(tally, total_nmse), by_push(tally, total_nlpd)
+    exact = "" if _gaussian(tally) else f"{total(tally, 'exact_nlpd'):.2f}"
+    cells = (f"{nmse.value:.3f} ({_listed(totals.nmse[0], '.3f')})", _between(nmse, ".2f"))
+    cells += (f"{nlpd.value:.2f}", _between(nlpd, ".2f"), exact, _listed(totals.coverage[0, :, WITHIN], ".2f"))
+    return " | ".join(cells)
 
 
-def difference(first: Comparison, second: Comparison) -> str:
+def difference(first: Tally, second: Tally) -> str:
     """The cells under HEAD for what the second model gains over the first on the same rows: differences, paired."""
-    weights = push_bootstrap(first.push_id)
-    spread = (first.observed - first.training_mean) ** 2
-    errors = (second.observed - second.mean) ** 2 - (first.observed - first.mean) ** 2
-    worse = _nlpd(second) - _nlpd(first)
-    nmse = np.sum((weights @ errors) / (weights @ spread), axis=1)
-    nlpd = (weights @ worse) / weights.sum(axis=1)
-    values = float(np.sum(errors.sum(axis=0) / spread.sum(axis=0))), float(worse.mean())
-    exact = "" if second.exact_log_density is None else f"{np.mean(_exact(second) - _nlpd(first)):+.2f}"
-    return f"{values[0]:+.3f} | {_between(nmse, '+.3f')} | {values[1]:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"
+    nmse, nlpd = (difference_by_push(first, second, figure) for figure in (total_nmse, total_nlpd))
+    exact = "" if _gaussian(second) else f"{total(second, 'exact_nlpd') - total(first, 'nlpd'):+.2f}"
+    return f"{nmse.value:+.3f} | {_between(nmse, '+.3f')} | {nlpd.value:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"
 
 
-def total(comparison: Comparison, key: str) -> float:
-    """One figure, summed over the outputs."""
-    m: dict[str, Any] = metrics_json(comparison)
-    return float(m[key]["total"])
+def total(tally: Tally, key: str) -> float:
+    """One figure (nmse, nlpd, exact_nlpd), summed over the outputs."""
+    return float(np.sum(getattr(tally.totals(), key)))
 
 
-def _nlpd(comparison: Comparison) -> Array:
-    return np.asarray(gaussian_nlpd(comparison.mean, comparison.variance, comparison.observed).sum(axis=1))
+def _gaussian(tally: Tally) -> bool:
+    return np.array_equal(tally.exact_nlpd, tally.nlpd)
 
 
-def _exact(comparison: Comparison) -> Array:
-    assert comparison.exact_log_density is not None
-    return np.asarray(-comparison.exact_log_density.sum(axis=1))
+def _listed(values: Array, form: str) -> str:
+    return " ".join(format(value, form) for value in values.tolist())
 
 
-def _between(draws: Array, form: str) -> str:
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return f"{low:{form}} to {high:{form}}"
+def _between(estimate: Estimate, form: str) -> str:
+    return f"{estimate.low:{form}} to {estimate.high:{form}}"

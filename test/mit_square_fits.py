@@ -8,43 +8,49 @@ from pathlib import Path
 
 import numpy as np
 
+from push_predictor.evaluation import splits
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.models.gp import GaussianProcess, fit_gp
 from push_predictor.models.quadrature import exact_log_density, gaussian_log_density
 from push_predictor.models.vhgp import VHGP, fit_vhgp
+from push_predictor.recordings.importers.mit_square import read_mit_square, square_rig
+from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
+
+ROWS = 3500
 
 
 @dataclass(frozen=True)
 class Square:
-    """Rows (3500,) of contact and angle -> dx, dy to the left, dtheta, with the push each comes from."""
+    """Rows (3500,) of contact and angle -> dx, dy to the left, dtheta, and the table that `import mit-square` reads."""
 
     inputs: Array
     outputs: Array
-    push: IntArray
+    table: PushTable
     subset: dict[int, BoolArray]
 
 
 @cache
 def load_square(folder: Path) -> Square:
-    with np.load(folder / "mit_square" / "pushes_3500.npz") as file:
+    path = folder / "mit_square" / "pushes_3500.npz"
+    with np.load(path) as file:
         outputs = np.column_stack([file["dx"], -file["dy"], file["dtheta"]])
-        push = np.unique(file["push_group_est"], return_inverse=True)[1]
         subset = {n: file[f"in_subset_{n}"] for n in (100, 200, 500, 1000)}
-        return Square(np.column_stack([file["c"], file["beta"]]), outputs, push, subset)
+        inputs = np.column_stack([file["c"], file["beta"]])
+    return Square(inputs, outputs, read_mit_square(path, square_rig().outline), subset)
 
 
 def random_split(n: int, seed: int) -> tuple[IntArray, IntArray]:
     """Training and test rows; windows of one push fall on both sides, so this tests interpolation only."""
-    order = np.random.default_rng(0).permutation(3500)
-    return order[1000:][np.random.default_rng(1000 + seed).permutation(2500)[:n]], order[:1000]
+    nothing = np.zeros((ROWS, 3))  # the split only counts rows
+    split = splits.random_split(PushTable(nothing, nothing[:, 0], nothing, np.full(ROWS, "push")), seed)
+    return split.first(n), split.test
 
 
 def split_by_push(square: Square, n: int, fold: int) -> tuple[IntArray, IntArray]:
     """Training and test rows of different pushes."""
-    folds = np.random.default_rng(0).permutation(square.push.max() + 1)[square.push] % 5
-    others = np.flatnonzero(folds != fold)
-    return np.random.default_rng(fold).permutation(others)[:n], np.flatnonzero(folds == fold)
+    split = splits.split_by_push(square.table, fold)
+    return split.first(n), split.test
 
 
 @dataclass(frozen=True)

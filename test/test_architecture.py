@@ -24,7 +24,7 @@ def modules(package: str) -> list[Path]:
     return sorted((ROOT / "push_predictor" / package).rglob("*.py"))
 
 
-@pytest.mark.parametrize("package", ["geometry", "recordings", "models", "evaluation", "simulation", "commands"])
+@pytest.mark.parametrize("package", [*LAYERS[:-1], "simulation", "paper", "commands"])
 def test_the_library_imports_no_ros(package: str) -> None:
     for path in modules(package):
         for name in imports_of(path):
@@ -37,6 +37,12 @@ def test_imports_point_one_way(package: str) -> None:
     for path in modules(package):
         for name in imports_of(path):
             assert not name.startswith(tuple(f"push_predictor.{layer}" for layer in later)), f"{path}: {name}"
+
+
+@pytest.mark.parametrize("package", [*LAYERS, "simulation"])
+def test_only_commands_know_the_paper(package: str) -> None:
+    for path in modules(package):
+        assert not any(name.startswith("push_predictor.paper") for name in imports_of(path)), path
 
 
 def test_the_simulator_knows_no_model() -> None:

@@ -63,7 +63,7 @@ def test_gradient_equals_finite_differences() -> None:
         return float((weights * SquaredExponential(vector[:3], vector[3]).matrix(inputs)).sum())
 
     at = np.append(KERNEL.log_lengthscales, KERNEL.log_sd)
-    gradient = KERNEL.gradient(inputs, KERNEL.matrix(inputs), weights)
+    gradient = KERNEL.gradient(inputs, KERNEL.matrix(inputs), weights.copy())
     steps = 1e-3 * np.eye(4)
     expected = [
         (8 * (contracted(at + h) - contracted(at - h)) - (contracted(at + 2 * h) - contracted(at - 2 * h))) / 12e-3

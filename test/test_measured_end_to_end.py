@@ -16,17 +16,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mit_square_fits import Scores, fit_scaled, load_square
-from mit_square_fits import random_split as expected_random_split
 from mit_square_fits import split_by_push as expected_split_by_push
 from ros_harness import free_domain, node_process, wait_until
 from synthetic import Push, pose_stream, stamps, translating_push
 
 from benchmarks.measured import leave_one_run_out, mean_speed, travelled
 from benchmarks.measured_scores import pooled, total
-from benchmarks.measured_square import random_split, split_by_push
 from push_predictor.cli import main
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.offline import validate_recording
+from push_predictor.evaluation.splits import split_by_push
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.evaluation.window_log import window_log
 from push_predictor.models.analytical import AnalyticalPush
@@ -124,7 +123,7 @@ def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: d
     """Steel run 3 alone turns clockwise: what was learnt from the others fails there, and says so."""
     folds = leave_one_run_out(block_runs(imported, "St"), "vhgp")
     outside = [fold.in_domain.mean() < 0.5 for fold in folds]
-    scores = [total(fold.comparison, "nmse") for fold in folds]
+    scores = [total(fold.tally, "nmse") for fold in folds]
     assert outside == [False, False, True, False]
     assert scores[2] > 1.0 > 0.3 > max(scores[:2] + scores[3:])
 
@@ -238,37 +237,22 @@ def square(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return out / "pushes_3500.csv"
 
 
-def test_the_splits_of_the_benchmark_are_those_the_learning_tests_use(measured_data: Path, square: Path) -> None:
-    table = read_table(square)
-    for k in range(5):
-        for ours, theirs in (
-            (random_split(table, k), expected_random_split(100, k)),
-            (split_by_push(table, k), expected_split_by_push(load_square(measured_data), 100, k)),
-        ):
-            training, test, seed = ours
-            drawn = training[np.random.default_rng(seed).permutation(len(training))[:100]]
-            np.testing.assert_array_equal(drawn, theirs[0])
-            np.testing.assert_array_equal(test, theirs[1])
-    training, test, _ = split_by_push(table, 0)
-    assert not set(table.push_id[training].tolist()) & set(table.push_id[test].tolist())
-
-
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_import_train_evaluate_score_what_the_regressors_score_by_themselves(
     measured_data: Path, square: Path, tmp_path: Path, kind: str
 ) -> None:
-    table = read_table(square)
-    training, test, seed = split_by_push(table, 0)
-    for name, rows in (("training", training), ("test", test)):
+    table, fold = read_table(square), 0
+    split = split_by_push(table, fold)
+    for name, rows in (("training", np.sort(split.training)), ("test", split.test)):
         write_table(tmp_path / f"{name}.csv", table.take(rows))
         shutil.copy(square.with_suffix(".rig.yaml"), tmp_path / f"{name}.rig.yaml")
     model, report = str(tmp_path / "square.pushmodel"), tmp_path / "metrics.json"
-    options = ["--model", kind, "--n-train", "100", "--seed", str(seed), "--out", model]
+    options = ["--model", kind, "--n-train", "100", "--seed", str(fold), "--out", model]
     assert main(["train", str(tmp_path / "training.csv"), *options]) == 0
     assert main(["evaluate", model, str(tmp_path / "test.csv"), "--json", str(report)]) == 0
     metrics = json.loads(report.read_text())
     direct = fitted_directly(measured_data, kind)
-    assert (metrics["n_train"], metrics["n_test"]) == (100, len(test))
+    assert (metrics["n_train"], metrics["n_test"]) == (100, len(split.test))
     assert metrics["nlpd"]["total"] == pytest.approx(direct.nlpd, abs=1e-6)
     assert kind == "gp" or metrics["exact_nlpd"]["total"] == pytest.approx(direct.exact_nlpd, abs=1e-6)
     assert metrics["nmse"]["total"] == pytest.approx(direct.nmse, rel=1e-6)

@@ -19,7 +19,7 @@ from push_predictor.models.kernels import SquaredExponential
 from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.quadrature import exact_log_density
-from push_predictor.models.vhgp_bound import JITTER
+from push_predictor.models.vhgp_parameters import JITTER
 from push_predictor.types import Array
 
 OUTPUTS = ("dx", "dy", "dtheta")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, norm
 
 from push_predictor.evaluation.metrics import coverage, gaussian_nlpd, joint_nlpd, nmse, standardised
-from push_predictor.evaluation.splits import held_out_pushes, push_bootstrap, push_folds
+from push_predictor.evaluation.splits import FOLDS, push_bootstrap, push_folds, random_split, split_by_push
 from push_predictor.recordings.table import PushTable, concatenate
 
 RNG = np.random.default_rng(0)
@@ -76,7 +76,7 @@ def test_a_right_model_covers_what_it_says(level: float) -> None:
 @given(sizes=st.lists(st.integers(1, 9), min_size=2, max_size=30), seed=st.integers(0, 99))
 def test_every_split_keeps_pushes_whole(sizes: list[int], seed: int) -> None:
     table = pushes(sizes)
-    splits = [push_folds(table, 5, seed), held_out_pushes(table, 0.3, seed), *push_bootstrap(table.push_id, seed, 3)]
+    splits = [push_folds(table, 5, seed), *push_bootstrap(table.push_id, seed, 3)]
     for labels in splits:
         for push in table.pushes:
             assert len(set(labels[table.push_id == push].tolist())) == 1
@@ -88,6 +88,40 @@ def test_folds_hold_equally_many_pushes(sizes: list[int]) -> None:
     folds = push_folds(table, 5)
     counts = [len(set(table.push_id[folds == k].tolist())) for k in range(5)]
     assert max(counts) - min(counts) <= 1
+
+
+def test_the_split_by_push_tests_every_row_once_and_learns_from_no_push_it_tests() -> None:
+    table = pushes([3, 1, 4, 1, 5, 9, 2, 6])
+    splits = [split_by_push(table, fold) for fold in range(FOLDS)]
+    assert np.sort(np.concatenate([s.test for s in splits])).tolist() == list(range(len(table)))
+    for s in splits:
+        assert sorted([*s.training, *s.test]) == list(range(len(table)))
+        assert not set(table.push_id[s.training].tolist()) & set(table.push_id[s.test].tolist())
+
+
+def test_pushes_are_dealt_in_the_order_of_their_numbers_whatever_the_order_of_rows() -> None:
+    """As docs/measured.md tells: default_rng(0).permutation(pushes) % 5, push 9 before push 10."""
+    numbers = np.random.default_rng(3).permutation(np.repeat(np.arange(23), 2))
+    n = len(numbers)
+    table = PushTable(np.full((n, 3), 0.1), np.full(n, 0.2), np.zeros((n, 3)), numbers.astype(np.str_))
+    dealt = (np.random.default_rng(0).permutation(23) % 5)[numbers]
+    for fold in range(FOLDS):
+        split = split_by_push(table, fold)
+        assert split.test.tolist() == np.flatnonzero(dealt == fold).tolist()
+        expected = np.random.default_rng(fold).permutation(np.flatnonzero(dealt != fold))
+        assert split.first(7).tolist() == expected[:7].tolist()
+
+
+@pytest.mark.parametrize("rows, tested", [(3500, 1000), (100, 30)])
+def test_the_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
+    table = pushes([rows])
+    order = np.random.default_rng(0).permutation(rows)
+    for seed in range(3):
+        split = random_split(table, seed)
+        assert split.test.tolist() == order[:tested].tolist()
+        drawn = order[tested:][np.random.default_rng(1000 + seed).permutation(rows - tested)[:9]]
+        assert split.first(9).tolist() == drawn.tolist()
+        assert set(split.first(5).tolist()) < set(split.first(9).tolist()), "smaller sets lie within larger ones"
 
 
 def test_a_bootstrap_draws_as_many_pushes_as_there_are() -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from push_predictor.errors import PushPredictorError, TableError
-from push_predictor.evaluation.figures.calibration import LEVELS, coverage_curve, pit
+from push_predictor.evaluation.figures.calibration import LEVELS, coverage_curve
 from push_predictor.evaluation.figures.ellipses import ellipse, inside
 from push_predictor.evaluation.figures.nearby import examples, spread_rows
 from push_predictor.evaluation.figures.push_maps import colour_scale
@@ -34,7 +34,7 @@ from push_predictor.evaluation.maps import (
 )
 from push_predictor.evaluation.report import write_validation_report
 from push_predictor.evaluation.report_tables import paired_difference
-from push_predictor.evaluation.validation import Comparison, compare, metrics_json
+from push_predictor.evaluation.validation import Comparison, compare, metrics_json, pit
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import SHAPES, shape_outline
 from push_predictor.models.push_model import PushModel

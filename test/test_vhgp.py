@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
@@ -9,9 +11,11 @@ from scipy.stats import multivariate_normal
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gp import GaussianProcess, GpParameters, fit_gp
+from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.vhgp import VHGP, fit_vhgp
-from push_predictor.models.vhgp_bound import Bound, VhgpParameters, VhgpProblem, bound_and_gradient
+from push_predictor.models.vhgp_bound import Bound, Sites, VhgpProblem, bound_and_gradient
 from push_predictor.models.vhgp_inner import maximise_over_noise
+from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
 
 PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0)
@@ -81,9 +85,9 @@ def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
     best = maximise_over_noise(problem, None, 1e-13)
     rng = np.random.default_rng(3)
     for size in (1e-3, 1e-2, 1e-1, 1.0):
-        sites = best.site_precisions * np.exp(size * rng.normal(size=60))
-        potentials = best.site_potentials + size * rng.normal(size=60)
-        assert Bound.at(problem, sites, potentials).value < best.value
+        precisions = best.sites.precisions * np.exp(size * rng.normal(size=60))
+        potentials = best.sites.potentials + size * rng.normal(size=60)
+        assert Bound.at(problem, Sites(precisions, potentials)).value < best.value
 
 
 def test_at_the_maximum_one_number_per_row_describes_q() -> None:
@@ -94,10 +98,40 @@ def test_at_the_maximum_one_number_per_row_describes_q() -> None:
     assert Bound.tied(problem, best.site_precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
+def test_a_loose_search_for_q_is_described_by_one_number_per_row_too() -> None:
+    problem = VhgpProblem.of(*rows(250), PARAMETERS)
+    loose = maximise_over_noise(problem, None, 1e-4)
+    best = maximise_over_noise(problem, None, 1e-12).value
+    tied = Bound.tied(problem, loose.tied_precisions)
+    np.testing.assert_allclose(tied.noise_mean, loose.noise_mean, atol=1e-9)
+    assert best - 1e-3 < loose.value <= best + 1e-9
+    assert best - 1e-3 < tied.value <= best + 1e-9
+
+
+def test_far_from_a_goal_the_search_for_q_ends_sooner() -> None:
+    problem = VhgpProblem.of(*rows(60), PARAMETERS)
+    best = maximise_over_noise(problem, None, 1e-12).value
+    near, far = (maximise_over_noise(problem, None, 1e-12, goal=best + gap).value for gap in (0.0, 50.0))
+    assert near == pytest.approx(best, abs=1e-6)
+    assert best - 1.0 < far < best - 1e-6
+
+
+@pytest.mark.parametrize("choice", [DEFAULT_CHOICE, KernelChoice("matern52", noise_nugget=True)])
+def test_a_fit_takes_less_memory_than_six_dense_matrices(choice: KernelChoice) -> None:
+    inputs, outputs = rows(700)
+    tracemalloc.start()
+    try:
+        fit_vhgp(inputs, outputs, choice, most_iterations=3)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 6 * 8 * 700**2
+
+
 def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
     inputs, outputs = rows(80)
     elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
-    start = maximise_over_noise(VhgpProblem.of(inputs, outputs, elsewhere), None, 1e-3)
+    start = maximise_over_noise(VhgpProblem.of(inputs, outputs, elsewhere), None, 1e-3).sites
     problem = VhgpProblem.of(inputs, outputs, PARAMETERS)
     fresh, warm = (maximise_over_noise(problem, where, 1e-12) for where in (None, start))
     assert warm.value == pytest.approx(fresh.value, abs=1e-8)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor.commands.output import add_command, progress, write_json, write_text
-from push_predictor.errors import RequestError
+from push_predictor.errors import PushPredictorError, RequestError
 
 if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
 
 KINDS = ("vhgp", "gp", "analytical")
 SPEEDS = (0.01, 0.02, 0.05)
+OF_ONE_KIND = {"paper": ("data", "recordings", "jobs", "cluster"), "validation": ("model", "recording")}
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,20 +24,75 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "report",
-        "A page with tables and pictures: models against a recording they were not trained on. Without --model and "
+        "A page with tables and pictures. paper: what Bauza and Rodriguez 2017 report, claim by claim, on simulated "
+        "pushes and, with --data, on measured ones; what was computed is kept in DIR/work, an interrupted report goes "
+        "on from there. validation: models against a recording they were not trained on; without --model and "
         "--recording, both are made by the rig simulator (a square on abs).",
         "push_predictor report validation --model square_abs.pushmodel --recording bags/square_abs_test --out report",
     )
-    parser.add_argument("kind", choices=("validation",), metavar="KIND", help="validation")
-    parser.add_argument("--model", type=Path, nargs="+", metavar="MODEL", help="model files; the first is the main one")
-    parser.add_argument("--recording", type=Path, metavar="RECORDING", help="held out from training")
-    parser.add_argument("--quick", action="store_true", help="simulate a fifth of the pushes")
+    parser.add_argument("kind", choices=tuple(OF_ONE_KIND), metavar="KIND", help="paper or validation")
+    parser.add_argument("--quick", action="store_true", help="less of everything, to see that it runs")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder that receives the report")
+    paper = parser.add_argument_group("report paper")
+    paper.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="measured pushes: mit_square, or files of the MIT set"
+    )
+    paper.add_argument("--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings (about 1 GB)")
+    paper.add_argument("--jobs", type=int, metavar="N", help="pieces of work at once (default: one per core)")
+    paper.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler; all machines see --out and --data")
+    validation = parser.add_argument_group("report validation")
+    validation.add_argument("--model", type=Path, nargs="+", metavar="MODEL", help="files; the first is the main one")
+    validation.add_argument("--recording", type=Path, metavar="RECORDING", help="held out from training")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Compare and write the page."""
+    """Compute and write the page."""
+    for kind, names in OF_ONE_KIND.items():
+        for name in names:
+            if kind != options.kind and getattr(options, name) is not None:
+                raise RequestError(f"--{name}", getattr(options, name), f"`report {kind}` alone")
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.kind == "paper":
+        _paper(options)
+    else:
+        _validation(options)
+
+
+def _paper(options: argparse.Namespace) -> None:
+    from push_predictor.commands.progress_bar import ProgressBar
+    from push_predictor.paper.plan import FULL, QUICK
+    from push_predictor.paper.report import report_paper
+    from push_predictor.paper.work import Work
+
+    if options.jobs is not None and options.jobs < 1:
+        raise RequestError("--jobs", options.jobs, "a number from 1 on")
+    if options.data is not None and not options.data.is_dir():
+        raise RequestError("--data", str(options.data), "a folder that exists")
+    plan = QUICK if options.quick else FULL
+    with _spread(options.cluster), ProgressBar() as bar:
+        work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
+        page, content = report_paper(plan, work, options.out, options.data, options.recordings, bar)
+    if not write_json(options, {"report": str(page), **content}):
+        print(page)
+
+
+@contextmanager
+def _spread(cluster: str | None) -> Iterator[None]:
+    """While it lasts, joblib sends its work to a dask scheduler, if one was named."""
+    if cluster is None:
+        yield
+        return
+    try:
+        import joblib
+        from distributed import Client
+    except ImportError as error:
+        raise PushPredictorError(f"--cluster needs dask ({error}); pip install 'dask[distributed]'") from None
+    with Client(cluster, timeout="10s"), joblib.parallel_config(backend="dask"):
+        yield
+
+
+def _validation(options: argparse.Namespace) -> None:
     import json
 
     from push_predictor.evaluation.offline import report_recording
@@ -43,7 +101,6 @@ def run(options: argparse.Namespace) -> None:
     if (options.model is None) != (options.recording is None):
         missing = "--model" if options.model is None else "--recording"
         raise RequestError(missing, None, "both --model and --recording, or neither")
-    options.out.mkdir(parents=True, exist_ok=True)
     with progress("report"):
         if options.model is None:
             models, recording = _simulated(options.out, 60 if options.quick else 300)

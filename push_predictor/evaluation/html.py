@@ -31,6 +31,14 @@ figcaption { font-size: .9rem; color: #333; max-width: 46rem; margin-top: .5rem;
 dl { display: grid; grid-template-columns: minmax(7rem, max-content) 1fr; gap: .15rem 1.2rem; }
 dt { color: #555; }
 dd { margin: 0; }
+.finding { border-left: 4px solid #888; padding: .2rem .9rem; margin: .7rem 0; background: #f7f7f7; max-width: 46rem; }
+.finding p { margin: .25rem 0; }
+.verdict { font-size: .85rem; font-weight: 600; white-space: nowrap; padding: 0 .45rem; border-radius: .2rem;
+  background: #6b6b6b; color: #fff; }
+.finding.holds { border-color: #009e73; } .holds .verdict { background: #00704f; }
+.finding.holds-in-part { border-color: #0072b2; } .holds-in-part .verdict { background: #0072b2; }
+.finding.does-not-hold { border-color: #d55e00; } .does-not-hold .verdict { background: #b34700; }
+.verdicts th, .verdicts td { white-space: normal; text-align: left; }
 @media (max-width: 36rem) {
   dl { display: block; } dd { margin: 0 0 .4rem; }
   .picture { overflow-x: auto; } .picture img { max-width: none; width: 44rem; }
@@ -49,9 +57,33 @@ def page(title: str, parts: Sequence[str]) -> str:
     )
 
 
-def heading(text: str) -> str:
-    """A section's heading."""
-    return f"<h2>{escape(text)}</h2>"
+def heading(text: str, anchor: str = "") -> str:
+    """A section's heading; anchor: the name by which links reach it."""
+    name = f' id="{escape(anchor)}"' if anchor else ""
+    return f"<h2{name}>{escape(text)}</h2>"
+
+
+def finding(claim: str, verdict: str, sentence: str) -> str:
+    """A claim, whether it holds, and why."""
+    return (
+        f'<div class="finding {_mark(verdict)}"><p><strong>{escape(claim)}</strong> '
+        f'<span class="verdict">{escape(verdict)}</span></p><p>{escape(sentence)}</p></div>'
+    )
+
+
+def verdicts(rows: Sequence[tuple[str, str, str, str]]) -> str:
+    """A table of (anchor, section, claim, verdict) that leads to the sections."""
+    body = "\n".join(
+        f'<tr><td><a href="#{escape(anchor)}">{escape(section)}</a></td><td>{escape(claim)}</td>'
+        f'<td class="{_mark(verdict)}"><span class="verdict">{escape(verdict)}</span></td></tr>'
+        for anchor, section, claim, verdict in rows
+    )
+    head = "<thead><tr><th>section</th><th>claim of the paper</th><th>here</th></tr></thead>"
+    return f'<div class="table"><table class="verdicts">{head}\n<tbody>\n{body}\n</tbody></table></div>'
+
+
+def _mark(verdict: str) -> str:
+    return verdict.replace(" ", "-")
 
 
 def paragraph(text: str, kind: str = "") -> str:

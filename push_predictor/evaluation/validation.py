@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse
 from push_predictor.evaluation.splits import push_bootstrap
@@ -80,6 +81,11 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
     }
 
 
+def pit(comparison: Comparison) -> Array:
+    """Probability integral transform (n, 3): the predicted probability of an outcome below the observed one."""
+    return np.asarray(ndtr((comparison.observed - comparison.mean) / np.sqrt(comparison.variance)))
+
+
 def trained_on(model: PushModel, table: PushTable) -> list[str]:
     """The pushes of a table that the model was trained on: its figures on them are not held out.
 
@@ -90,6 +96,13 @@ def trained_on(model: PushModel, table: PushTable) -> list[str]:
     same_rows = {push for push, row in zip(table.push_id.tolist(), rows, strict=True) if row.tobytes() in known}
     begun = {_timed(push) for push in model.training.pushes} - {None}
     return sorted(same_rows | {push for push in table.pushes if _timed(push) in begun})
+
+
+def by_push(push: np.ndarray, rows: Array) -> Array:
+    """Sums (p, ...) of rows (n, ...) over the rows of each push; push (n,) numbers them from 0."""
+    sums = np.zeros((int(push.max()) + 1, *rows.shape[1:]))
+    np.add.at(sums, push, rows)
+    return sums
 
 
 def _timed(push_id: str) -> str | None:
@@ -104,16 +117,9 @@ def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:
         return {"level": 0.95, "by": "push", "nmse": None, "nlpd": None}
     weights = push_bootstrap(pushes)  # by push, not by row: 1000 draws of a day's windows would not fit in memory
     error, spread = (c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2
-    nmse_draws = np.sum((weights @ _by_push(push, error)) / (weights @ _by_push(push, spread)), axis=1)
-    nlpd_draws = (weights @ _by_push(push, nlpd.sum(axis=1))) / (weights @ np.bincount(push))
+    nmse_draws = np.sum((weights @ by_push(push, error)) / (weights @ by_push(push, spread)), axis=1)
+    nlpd_draws = (weights @ by_push(push, nlpd.sum(axis=1))) / (weights @ np.bincount(push))
     return {"level": 0.95, "by": "push", "nmse": _interval(nmse_draws), "nlpd": _interval(nlpd_draws)}
-
-
-def _by_push(push: np.ndarray, rows: Array) -> Array:
-    """Sums (p, ...) of rows (n, ...) over the rows of each push (n,)."""
-    sums = np.zeros((int(push.max()) + 1, *rows.shape[1:]))
-    np.add.at(sums, push, rows)
-    return sums
 
 
 def _interval(draws: Array) -> dict[str, float | None]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError
-from scipy.optimize import minimize
+from scipy.linalg import LinAlgError, blas
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.kernels import SquaredExponential
+from push_predictor.models.descent import Cost, Descent
+from push_predictor.models.kernels import DEFAULT_CHOICE, ArdKernel, KernelChoice, KernelFamily, ard_kernel
 from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.ridge import factorise
@@ -21,20 +21,22 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
+_STOP = 1e-8
 
 
 @dataclass(frozen=True)
 class GpParameters:
-    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation."""
+    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation; the kernel's family."""
 
     log_lengthscales: Array
     log_signal_sd: float
     log_noise_sd: float
+    family: KernelFamily = "squared_exponential"
 
     @property
-    def kernel(self) -> SquaredExponential:
+    def kernel(self) -> ArdKernel:
         """Kernel of f."""
-        return SquaredExponential(self.log_lengthscales, self.log_signal_sd)
+        return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)
 
     @property
     def noise_variance(self) -> float:
@@ -69,23 +71,21 @@ class GaussianProcess:
 
 
 def fit_gp(
-    inputs: Array, outputs: Array, start: GpParameters | None = None, *, most_iterations: int = 100
+    inputs: Array, outputs: Array, choice: KernelChoice = DEFAULT_CHOICE, *, most_iterations: int = 100
 ) -> GaussianProcess:
-    """Maximise the marginal likelihood over the hyperparameters by L-BFGS from `start`.
+    """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. Raises TrainingError when the rows do not match or are not
-    finite.
+    inputs (n, D) and outputs (n,) standardised. choice: of it, the family. Raises TrainingError when the rows do not
+    match or are not finite.
     """
     check_rows(inputs, outputs)
-    dimensions = inputs.shape[1]
-    start = start or GpParameters(np.zeros(dimensions), 0.0, np.log(0.3))
-    bounds = [_LENGTHSCALE_BOUNDS] * dimensions + [_SIGNAL_BOUNDS, _NOISE_BOUNDS]
-    first = np.append(start.log_lengthscales, [start.log_signal_sd, start.log_noise_sd])
-    found = minimize(
-        _negative_log_likelihood, np.clip(first, *np.transpose(bounds)), (inputs, outputs), jac=True,
-        method="L-BFGS-B", bounds=bounds, options={"maxiter": most_iterations, "ftol": 1e-9},
-    )  # fmt: skip
-    return GaussianProcess(inputs, outputs, _parameters(found.x))
+    d = inputs.shape[1]
+    box = np.array([_LENGTHSCALE_BOUNDS] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
+    descent = Descent(box, most_iterations, _STOP)
+    first = np.append(np.zeros(d + 1), np.log(0.3))
+    # From the start with all rows: likelihoods have several maxima, and a part of the rows may lead to another one.
+    found = descent.run(_cost(inputs, outputs, choice.family), first)
+    return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
 
 
 def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:
@@ -94,15 +94,15 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
     Raises LinAlgError where the kernel matrix plus noise is not positive definite.
     """
     kernel, noise = parameters.kernel, parameters.noise_variance
-    factorised = factorise(kernel.matrix(inputs))
+    factorised = factorise(kernel.matrix(inputs), smooth=kernel.smooth)
     ridge = factorised.regularise(np.full(len(outputs), 1.0 / noise))
     alpha = ridge.residual(outputs / noise)
     constant = len(outputs) * np.log(2.0 * np.pi * noise)
     value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
-    weights = -ridge.precision()
-    weights += np.outer(alpha, alpha)
-    of_noise = noise * np.trace(weights)
-    return value, np.append(0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
+    weights = ridge.precision()
+    blas.dger(-1.0, alpha, alpha, a=weights.T, overwrite_a=1)
+    of_noise = -noise * np.trace(weights)
+    return value, np.append(-0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
 
 
 def check_rows(inputs: Array, outputs: Array) -> Array:
@@ -116,13 +116,16 @@ def check_rows(inputs: Array, outputs: Array) -> Array:
     return inputs
 
 
-def _parameters(vector: Array) -> GpParameters:
-    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]))
+def _parameters(vector: Array, family: KernelFamily) -> GpParameters:
+    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]), family)
 
 
-def _negative_log_likelihood(vector: Array, inputs: Array, outputs: Array) -> tuple[float, Array]:
-    try:
-        value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector))
-    except LinAlgError:
-        return _REFUSED, np.zeros_like(vector)
-    return -value, -gradient
+def _cost(inputs: Array, outputs: Array, family: KernelFamily) -> Cost:
+    def negative_log_likelihood(vector: Array) -> tuple[float, Array]:
+        try:
+            value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector, family))
+        except LinAlgError:
+            return _REFUSED, np.zeros_like(vector)
+        return -value, -gradient
+
+    return negative_log_likelihood

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from push_predictor.models.gp import GaussianProcess
-from push_predictor.models.kernels import SquaredExponential
+from push_predictor.models.kernels import ArdKernel
 from push_predictor.models.ridge import factorise
 from push_predictor.models.vhgp import VHGP
 from push_predictor.models.vhgp_bound import Bound, VhgpProblem
@@ -36,7 +36,7 @@ class GridPosterior:
     point; least_variance, what its posterior variance cannot fall below.
     """
 
-    kernel: SquaredExponential
+    kernel: ArdKernel
     inputs: Array
     noise_variances: Array
     weights: Array
@@ -103,11 +103,12 @@ def _of_vhgp(regression: VHGP) -> GridRegression:
     inputs, parameters = regression.inputs, regression.parameters
     problem = VhgpProblem.of(inputs, regression.outputs, parameters)
     bound = Bound.tied(problem, regression.site_precisions)
-    jitter, sites = parameters.jitter, 1.0 / bound.site_precisions
+    jitter, nugget = parameters.jitter, parameters.nugget
     of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
+    seen_through, least = nugget + 1.0 / bound.site_precisions, nugget + _EPSILON * of_noise
     jittered = bound.noise_level + jitter
     signal = GridPosterior(parameters.signal, inputs, jittered, bound.alpha, of_signal + jitter, jitter)
-    noise = GridPosterior(parameters.noise, inputs, sites, bound.mean_weights, of_noise, _EPSILON * of_noise)
+    noise = GridPosterior(parameters.noise, inputs, seen_through, bound.mean_weights, of_noise + nugget, least)
     return GridRegression(signal, parameters.noise_mean, noise)
 
 

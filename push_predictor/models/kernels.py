@@ -1,6 +1,8 @@
-"""The automatic-relevance squared exponential kernel, its values and its derivatives.
+"""Kernels with automatic relevance determination: squared exponential and Matern-5/2, values and derivatives.
 
-    k(x, x') = s^2 exp(-1/2 sum_d ((x_d - x'_d) / l_d)^2)
+    r^2 = sum_d ((x_d - x'_d) / l_d)^2
+    k(x, x') = s^2 exp(-r^2 / 2)                            squared exponential
+    k(x, x') = s^2 (1 + t + t^2 / 3) exp(-t), t = 5^1/2 r   Matern-5/2 (Rasmussen and Williams 2006, eq. 4.17)
 
 Both hyperparameters are kept as logarithms. A derivative is never formed as a matrix: `gradient` contracts
 a weight matrix with all of them at once.
@@ -8,16 +10,37 @@ a weight matrix with all of them at once.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from push_predictor.types import Array
 
+_BLOCK = 64
+
+KernelFamily = Literal["squared_exponential", "matern52"]
+
 
 @dataclass(frozen=True)
-class SquaredExponential:
-    """ARD squared exponential; log_lengthscales (D,), log_sd the log of the standard deviation s."""
+class KernelChoice:
+    """The kernels of a regression: the family of both, and whether the noise process has a nugget.
+
+    A nugget is a variance of log noise variances that neighbouring rows do not share; a standard GP has none.
+    """
+
+    family: KernelFamily = "squared_exponential"
+    noise_nugget: bool = False
+
+
+DEFAULT_CHOICE = KernelChoice()
+
+
+@dataclass(frozen=True)
+class ArdKernel(ABC):
+    """A kernel of r; log_lengthscales (D,), log_sd the log of the standard deviation s."""
 
     log_lengthscales: Array
     log_sd: float
@@ -35,15 +58,11 @@ class SquaredExponential:
         """Kernel between the rows of left (n, D) and right (m, D), shape (n, m)."""
         a, b = self._scaled(left), self._scaled(right)
         if len(a) == 1:
-            exponent = -0.5 * ((a - b) ** 2).sum(axis=1)[None, :]
-        else:
-            # One matrix of (n, m) is all the memory used. Rounding may leave a tiny positive exponent at r = 0.
-            exponent = a @ b.T
-            exponent -= 0.5 * (a * a).sum(axis=1)[:, None] + 0.5 * (b * b).sum(axis=1)
-            np.minimum(exponent, 0.0, out=exponent)
-        exponent += 2.0 * self.log_sd
-        np.exp(exponent, out=exponent)
-        return np.asarray(exponent)
+            return self._values(-0.5 * ((a - b) ** 2).sum(axis=1)[None, :])
+        kernel = np.empty((len(a), len(b)))
+        for rows, exponents in _exponents(a, b):
+            kernel[rows] = self._values(exponents)
+        return kernel
 
     def gradient(self, inputs: Array, matrix: Array, weights: Array) -> Array:
         """sum_ij weights_ij d matrix_ij / d(log_lengthscales, log_sd), shape (D + 1,).
@@ -51,11 +70,76 @@ class SquaredExponential:
         inputs (n, D); matrix is `self.matrix(inputs)`; weights (n, n) symmetric.
         """
         z = self._scaled(inputs)
-        contracted = weights * matrix
-        rows = contracted.sum(axis=1)
-        # sum_ij G_ij (z_i - z_j)^2 = 2 (rows' z^2 - z' G z) for a symmetric G
-        lengthscales = 2.0 * (rows @ (z * z) - (z * (contracted @ z)).sum(axis=0))
-        return np.append(lengthscales, 2.0 * rows.sum())
+        of_lengthscales, of_sd = np.zeros(z.shape[1]), 0.0
+        for rows, exponents in _exponents(z, z):
+            contracted = weights[rows] * matrix[rows]
+            of_sd += 2.0 * float(contracted.sum())
+            contracted = self._sloped(contracted, weights[rows], exponents)
+            # sum_ij G_ij (z_i - z_j)^2 = 2 sum_ij G_ij (z_i^2 - z_i z_j) for a symmetric G
+            square = contracted.sum(axis=1) @ (z[rows] * z[rows])
+            of_lengthscales += 2.0 * (square - (z[rows] * (contracted @ z)).sum(axis=0))
+        return np.append(of_lengthscales, of_sd)
 
     def _scaled(self, inputs: Array) -> Array:
         return inputs * np.exp(-self.log_lengthscales)
+
+    @property
+    @abstractmethod
+    def smooth(self) -> bool:
+        """Whether it has derivatives of all orders, so that matrices of many rows are of low rank."""
+
+    @abstractmethod
+    def _values(self, exponents: Array) -> Array:
+        """The kernel at exponents -r^2 / 2, whose memory it may use."""
+
+    @abstractmethod
+    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
+        """Weights times the kernel's derivative wrt the exponents; contracted is weights times the kernel."""
+
+
+@dataclass(frozen=True)
+class SquaredExponential(ArdKernel):
+    """ARD squared exponential."""
+
+    smooth = True
+
+    def _values(self, exponents: Array) -> Array:
+        exponents += 2.0 * self.log_sd
+        return np.asarray(np.exp(exponents, out=exponents))
+
+    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
+        return contracted
+
+
+@dataclass(frozen=True)
+class Matern52(ArdKernel):
+    """ARD Matern-5/2: of functions with two derivatives, where a squared exponential's have all."""
+
+    smooth = False
+
+    def _values(self, exponents: Array) -> Array:
+        t = np.sqrt(-10.0 * exponents)
+        return np.asarray((1.0 + t * (1.0 + t / 3.0)) * np.exp(2.0 * self.log_sd - t))
+
+    def _sloped(self, contracted: Array, weights: Array, exponents: Array) -> Array:
+        t = np.sqrt(-10.0 * exponents)
+        return np.asarray(weights * (5.0 / 3.0 * (1.0 + t)) * np.exp(2.0 * self.log_sd - t))
+
+
+_FAMILIES: dict[KernelFamily, type[ArdKernel]] = {"squared_exponential": SquaredExponential, "matern52": Matern52}
+FAMILIES = tuple(_FAMILIES)
+
+
+def ard_kernel(family: KernelFamily, log_lengthscales: Array, log_sd: float) -> ArdKernel:
+    """The kernel of a family with these hyperparameters."""
+    return _FAMILIES[family](log_lengthscales, log_sd)
+
+
+def _exponents(a: Array, b: Array) -> Iterator[tuple[slice, Array]]:
+    """-1/2 |a_i - b_j|^2 of the rows of a (n, D) and b (m, D), block by block of a's rows, to stay in the cache."""
+    of_a, of_b = 0.5 * (a * a).sum(axis=1)[:, None], 0.5 * (b * b).sum(axis=1)
+    for start in range(0, len(a), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        exponents = a[rows] @ b.T
+        exponents -= of_a[rows] + of_b
+        yield rows, np.minimum(exponents, 0.0, out=exponents)  # at r = 0 rounding may leave a tiny positive one

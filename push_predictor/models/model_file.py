@@ -21,6 +21,7 @@ from push_predictor import __version__
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.gp import GaussianProcess, GpParameters
+from push_predictor.models.kernels import DEFAULT_CHOICE, FAMILIES
 from push_predictor.models.limit_surface import Support
 from push_predictor.models.push_model import (
     KINDS,
@@ -32,13 +33,13 @@ from push_predictor.models.push_model import (
     scaled_features,
 )
 from push_predictor.models.vhgp import VHGP
-from push_predictor.models.vhgp_bound import VhgpParameters
+from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.recordings.rig import Rig, rig_from_record
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 2: other kernels than the squared exponential, and a nugget; a file without them stays at 1
 LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
 HEADER = "header"
 
@@ -114,17 +115,23 @@ def _read_header(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    body = _body_header(model.body, arrays)
     return {
         "format": FORMAT,
-        "format_version": FORMAT_VERSION,
+        "format_version": _version(body),
         "written_by": __version__,
         "name": model.name,
         "kind": model.kind,
         "rig": model.rig.to_record(),
         "provenance": {**vars(model.provenance), "sources": list(model.provenance.sources)},
         "covariates": list(model.training.covariates),
-        "body": _body_header(model.body, arrays),
+        "body": body,
     }
+
+
+def _version(body: dict[str, Any]) -> int:
+    """The lowest version whose readers understand a body."""
+    return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in body.get("regressions", ())) else 1
 
 
 def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -> PushModel:
@@ -195,7 +202,12 @@ def _body_header(body: LearnedBody | AnalyticalBody, arrays: dict[str, np.ndarra
 
 
 def _parameters_header(regression: GaussianProcess | VHGP) -> dict[str, Any]:
-    return {key: np.asarray(value).tolist() for key, value in vars(regression.parameters).items()}
+    """The hyperparameters, without those that version 1 did not know where they are what it took for granted."""
+    values = dict(vars(regression.parameters))
+    if values["family"] == DEFAULT_CHOICE.family:
+        del values["family"]
+    chosen = {key: value for key, value in values.items() if value is not None}
+    return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
 
 
 def _analytical_body(header: dict[str, Any], rig: Rig) -> AnalyticalBody:
@@ -227,11 +239,20 @@ def _learned_body(
 def _regression(
     kind: str, features: Array, column: Array, parameters: dict[str, Any], sites: np.ndarray | None
 ) -> GaussianProcess | VHGP:
-    values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in parameters.items()}
-    if not all(np.all(np.isfinite(value)) for value in values.values()):
-        raise ValueError("a hyperparameter is not finite")
+    values = _hyperparameters(parameters)
     if kind == "gp":
-        return GaussianProcess(features, column, GpParameters(**values))  # type: ignore[arg-type]  # from JSON
+        return GaussianProcess(features, column, GpParameters(**values))
     if sites is None or sites.shape != column.shape or not np.all(np.isfinite(sites)) or np.any(sites < 0.0):
         raise ValueError(f"site precisions are missing or not {len(column)} finite numbers from 0 on")
-    return VHGP(features, column, VhgpParameters(**values), sites)  # type: ignore[arg-type]  # from JSON
+    return VHGP(features, column, VhgpParameters(**values), sites)
+
+
+def _hyperparameters(header: dict[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = dict(header)
+    family = values.pop("family", DEFAULT_CHOICE.family)
+    if family not in FAMILIES:
+        raise ValueError(f"kernel family {family!r}, known are {', '.join(FAMILIES)}")
+    values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in values.items()}
+    if not all(np.all(np.isfinite(value)) for value in values.values()):
+        raise ValueError("a hyperparameter is not finite")
+    return {**values, "family": family}

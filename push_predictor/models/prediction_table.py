@@ -17,7 +17,7 @@ import numpy as np
 from push_predictor.errors import PushPredictorError
 from push_predictor.models.grid_posterior import GridPosterior, GridRegression, grid_regression
 from push_predictor.models.interpolation import Axis, TensorSpline, along
-from push_predictor.models.kernels import SquaredExponential
+from push_predictor.models.kernels import ArdKernel, SquaredExponential
 from push_predictor.models.push_chart import Chart, Whole
 from push_predictor.models.push_model import LearnedBody, Scaling
 from push_predictor.types import Array
@@ -42,7 +42,7 @@ NOISE = Density(nodes=2.5, cells=6.0)
 
 
 class TooFineError(PushPredictorError):
-    """A model varies too fast for a table of a reasonable size."""
+    """A model varies too fast for a table of a reasonable size, or its kernels allow none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +73,12 @@ class PredictionTable:
 def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinement: float = 1.0) -> PredictionTable:
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
-    refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError.
+    refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError, also for kernels
+    that are no products over the axes.
     """
     regressions = [grid_regression(regression) for regression in body.regressions]
+    if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in regressions):
+        raise TooFineError("only squared exponential kernels are products over the axes of a table")
     sides = _sides(body.scaling, chart, low, high)
     axes = [Axis(side.low, side.high, _cells(side, regressions, refinement)) for side in sides]
     knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
@@ -102,7 +105,7 @@ class _Side:
     used: list[int]
     features: Callable[[Array], Array]  # values (m,) -> standardised features (boxes, m, len(used))
 
-    def lengthscales(self, kernel: SquaredExponential) -> float:
+    def lengthscales(self, kernel: ArdKernel) -> float:
         """How many lengthscales of a kernel lie between low and high; around a closed outline 2 pi at least."""
         path = self._scaled(kernel, self.features(np.linspace(self.low, self.high, _PATH))[0])
         length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
@@ -114,7 +117,7 @@ class _Side:
         inputs = self._scaled(posterior.kernel, posterior.inputs[:, self.used])
         return np.asarray(np.exp(-0.5 * ((points - inputs) ** 2).sum(axis=2)))
 
-    def _scaled(self, kernel: SquaredExponential, features: Array) -> Array:
+    def _scaled(self, kernel: ArdKernel, features: Array) -> Array:
         return np.asarray(features / np.exp(kernel.log_lengthscales[self.used]))
 
 

@@ -11,6 +11,7 @@ from push_predictor.errors import TrainingError
 from push_predictor.models.analytical import AnalyticalPush, fit_analytical
 from push_predictor.models.features import push_features
 from push_predictor.models.gp import GaussianProcess, fit_gp
+from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.push_model import (
     KINDS,
     AnalyticalBody,
@@ -40,11 +41,13 @@ def train_model(
     n_train: int | None = None,
     seed: int = 0,
     fit: bool = False,
+    choice: KernelChoice = DEFAULT_CHOICE,
 ) -> PushModel:
     """Train a model of one of KINDS on rows of the table.
 
     n_train: that many rows at random by default_rng(seed); None takes all up to 1000, beyond that 1000 drawn evenly
     over the pushes. fit: estimate the analytical model's friction and pressure instead of taking the textbook's.
+    choice: the kernels of a learnt model.
     Raises TrainingError for an unknown kind, too few rows, or outcomes that do not vary.
     """
     if kind not in KINDS:
@@ -52,7 +55,7 @@ def train_model(
     rows = table.take(training_rows(table, n_train, seed))
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
-    body = _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind)
+    body = _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice)
     provenance = Provenance(tuple(sources), len(rows.pushes), seed, __version__)
     return PushModel(name, kind, rig, body, rows, provenance)
 
@@ -78,16 +81,15 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
 
 
-def _learned(rows: PushTable, rig: Rig, kind: str) -> LearnedBody:
+def _learned(rows: PushTable, rig: Rig, kind: str, choice: KernelChoice) -> LearnedBody:
     scaling = _scaling(rows, rig)
     features = scaled_features(rig, scaling, rows.inputs)
     scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    return LearnedBody(rig, scaling, tuple(_regression(features, column, kind) for column in scaled.T))
+    return LearnedBody(rig, scaling, tuple(_regression(features, column, kind, choice) for column in scaled.T))
 
 
-def _regression(features: Array, column: Array, kind: str) -> GaussianProcess | VHGP:
-    process = fit_gp(features, column)
-    return process if kind == "gp" else fit_vhgp(features, column, start=process)
+def _regression(features: Array, column: Array, kind: str, choice: KernelChoice) -> GaussianProcess | VHGP:
+    return fit_gp(features, column, choice) if kind == "gp" else fit_vhgp(features, column, choice)
 
 
 def _scaling(rows: PushTable, rig: Rig) -> Scaling:

@@ -32,7 +32,8 @@ class SimulationSpec:
     """A recording to be made.
 
     shape: name of the MIT set, or a Slider. surface: name, or a Surface. seed draws what differs from push to push
-    and the sensors' noise; surface_seed draws the table and the slider, so that two recordings can share them.
+    and the sensors' noise; surface_seed draws the table, slider_seed the slider as it was made: recordings can share
+    them.
     contact_friction: mean coefficient. acceleration: the robot's, m/s^2. place_spread (m), turn_spread (rad):
     standard deviations of where the slider is put before a push.
     """
@@ -42,6 +43,7 @@ class SimulationSpec:
     pushes: PushPlan
     seed: int = 0
     surface_seed: int = 0
+    slider_seed: int = 0
     name: str = "simulated"
     contact_friction: float = CONTACT_FRICTION
     acceleration: float = ACCELERATION
@@ -68,7 +70,7 @@ def simulated_rig(spec: SimulationSpec) -> Rig:
     """The push_rig record of a spec: nominal values, not what single pushes drew."""
     slider = spec.slider
     points = support_points(slider.outline)
-    shares = built_shares(points, spec.surface_seed)
+    shares = built_shares(points, spec.slider_seed)
     return Rig(
         shape=slider.name,
         outline=slider.outline,
@@ -91,7 +93,7 @@ def physics_of(spec: SimulationSpec, length: float) -> Physics:
         mass=np.full(n, slider.mass),
         inertia=np.full(n, slider.inertia),
         support=points,
-        shares=np.tile(built_shares(points, spec.surface_seed), (n, 1)),
+        shares=np.tile(built_shares(points, spec.slider_seed), (n, 1)),
         contact_friction=np.full(n, spec.contact_friction),
         surface=friction_field(spec.table, spec.surface_seed),
         pressure=_pressure(spec, points, knots_for(length)),

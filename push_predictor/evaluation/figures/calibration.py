@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from scipy.stats import binom
 
 from push_predictor.evaluation.figures.canvas import COLOURS, SYMBOLS, grid
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.evaluation.validation import Comparison
+from push_predictor.evaluation.validation import Comparison, pit
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -42,11 +42,6 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
     axes[-1, 0].set_xlabel("nominal share")
     for ax in axes[-1, 1:]:
         ax.set_xlabel("predicted probability")
-
-
-def pit(comparison: Comparison) -> Array:
-    """Probability integral transform (n, 3): the predicted probability of an outcome below the observed one."""
-    return np.asarray(ndtr((comparison.observed - comparison.mean) / np.sqrt(comparison.variance)))
 
 
 def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Array, Array, Array]:

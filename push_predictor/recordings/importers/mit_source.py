@@ -7,7 +7,9 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +39,21 @@ class MitFile:
         return next(base[: -len(suffix)] for suffix in SUFFIXES if base.lower().endswith(suffix))
 
 
+@dataclass(frozen=True)
+class MitPlace:
+    """Where a file lies, unread: path, and member if path is a zip archive. size in bytes, changed in ns since 1970."""
+
+    path: Path
+    member: str | None
+    size: int
+    changed: int
+
+    @property
+    def name(self) -> str:
+        """As MitFile.name."""
+        return str(self.path) if self.member is None else f"{self.path}/{self.member}"
+
+
 def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
     """All files of the set in files, folders (recursive) and zip archives. Raises ImportSourceError for none."""
     for source in sources:
@@ -44,11 +61,36 @@ def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
             raise ImportSourceError(f"{source}: does not exist, give a file, a folder or a zip archive")
         paths = [source]
         if source.is_dir():
-            paths = sorted(path for path in source.rglob("*") if path.suffix.lower() in (*SUFFIXES, ".zip"))
+            paths = paths_in(source)
         if not paths:
             raise ImportSourceError(f"{source}: holds no {', '.join(SUFFIXES)} or .zip file")
         for path in paths:
             yield from _files_of(path, alone=path == source)
+
+
+def mit_places(path: Path) -> list[MitPlace]:
+    """The files in a zip archive, or the file itself. Raises ImportSourceError for an archive that cannot be read."""
+    status = path.stat()
+    if path.suffix.lower() != ".zip":
+        return [MitPlace(path, None, status.st_size, status.st_mtime_ns)]
+    with _archive(path) as archive:
+        members = [info for info in archive.infolist() if info.filename.lower().endswith(SUFFIXES)]
+    return [MitPlace(path, info.filename, info.file_size, status.st_mtime_ns) for info in members]
+
+
+def read_places(places: Sequence[MitPlace]) -> Iterator[MitFile]:
+    """Their files; those of one archive are best given in a row. Raises ImportSourceError, OSError."""
+    for path, inside in groupby(places, lambda place: place.path):
+        members = [place.member for place in inside if place.member is not None]
+        if members:
+            yield from _members(path, members)
+        else:
+            yield MitFile(str(path), path.read_bytes(), alone=False)
+
+
+def paths_in(folder: Path) -> list[Path]:
+    """Paths in a folder (recursive) that may be files of the set or archives of them."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in (*SUFFIXES, ".zip"))
 
 
 def file_metadata(name: str) -> dict[str, str]:
@@ -78,13 +120,23 @@ def _files_of(path: Path, alone: bool) -> Iterator[MitFile]:
 
 
 def _zipped(path: Path) -> Iterator[MitFile]:
+    names = sorted(place.member for place in mit_places(path) if place.member is not None)
+    if not names:
+        raise ImportSourceError(f"{path}: the archive holds no {', '.join(SUFFIXES)} file")
+    yield from _members(path, names)
+
+
+def _members(path: Path, names: Sequence[str]) -> Iterator[MitFile]:
+    with _archive(path) as archive:
+        for name in names:
+            yield MitFile(f"{path}/{name}", archive.read(name), alone=False)
+
+
+@contextmanager
+def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
-            names = sorted(name for name in archive.namelist() if name.lower().endswith(SUFFIXES))
-            if not names:
-                raise ImportSourceError(f"{path}: the archive holds no {', '.join(SUFFIXES)} file")
-            for name in names:
-                yield MitFile(f"{path}/{name}", archive.read(name), alone=False)
+            yield archive
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
         raise ImportSourceError(f"{path}: the archive cannot be read ({error})") from None
 

@@ -1,0 +1,85 @@
+"""Repeated pushes: where the slider's centre went, time after time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from push_predictor.evaluation.figures.canvas import COLOURS, START, grid
+from push_predictor.evaluation.figures.ellipses import ellipse
+from push_predictor.evaluation.figures.slider import start_pose
+from push_predictor.geometry.frames import rotate, to_world
+from push_predictor.paper.plan import GRID_TRAVEL
+from push_predictor.recordings.rig import Rig
+from push_predictor.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+GREEN, RED, TIP = COLOURS[2], COLOURS[1], "#6b6b6b"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Repetitions of one push: typical inputs (3,), paths (r, t, 3) in m, m, rad along the push."""
+
+    title: str
+    inputs: Array
+    paths: Array
+
+
+def paint_trajectories(figure: Figure, rig: Rig, shown: Sequence[Trajectories]) -> None:
+    """A column a push: above the slider and where it goes, below the trajectories enlarged."""
+    above, below = figure.subplots(2, len(shown), squeeze=False, height_ratios=(1.15, 1.0))
+    for number, (ax, near, push) in enumerate(zip(above, below, shown, strict=True)):
+        _paint_scene(ax, rig, push)
+        _paint_near(near, push)
+        if number == 0:
+            ax.set_ylabel("across (mm)")
+            near.set_ylabel("centre's displacement across (mm)")
+    named = {
+        name: mark for ax in (above[0], below[0]) for mark, name in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(list(named.values()), list(named), loc="outside upper center", ncols=len(named))
+
+
+def _paint_scene(ax: Axes, rig: Rig, push: Trajectories) -> None:
+    pose = start_pose(rig.outline, push.inputs)
+    contact, way = push.inputs[1:2], 1e3 * GRID_TRAVEL
+    corners = rig.outline.point(np.linspace(0.0, 1.0, 400, endpoint=False))
+    ax.fill(*(to_world(corners, pose).T * 1e3), facecolor="0.95", edgecolor=START, label="slider at the start")
+    tip = -1e3 * rig.pusher_radius * rotate(rig.outline.inward_normal(contact)[0], pose[2])
+    turn = np.linspace(0.0, 2.0 * np.pi, 61)
+    disc = tip + 1e3 * rig.pusher_radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    ax.fill(*disc.T, facecolor="0.8", edgecolor=TIP, linewidth=0.8)
+    arrow = {"arrowstyle": "-|>", "color": TIP, "shrinkA": 0.0, "shrinkB": 0.0}
+    ax.annotate("", (way + tip[0], tip[1]), (tip[0], tip[1]), arrowprops=arrow)
+    ax.plot([], [], color=TIP, label="tip and its way")
+    for path in push.paths:
+        ax.plot(*(1e3 * (pose[:2] + path[:, :2]).T), color=GREEN, linewidth=0.5, alpha=0.5)
+    _ellipse(ax, push, 1e3 * pose[:2])
+    ax.set_aspect("equal")
+    ax.set(title=push.title, xlabel="along the push (mm)")
+
+
+def _paint_near(ax: Axes, push: Trajectories) -> None:
+    grid(ax)
+    for number, path in enumerate(push.paths):
+        name = "slider's centre" if number == 0 else None
+        ax.plot(*(1e3 * path[:, :2].T), color=GREEN, linewidth=0.5, alpha=0.5, label=name)
+    ax.plot(*(1e3 * push.paths[:, -1, :2].T), ".", color="0.15", markersize=2.0, label="final pose")
+    _ellipse(ax, push, np.zeros(2), "95 % ellipse of final poses")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    ax.locator_params(nbins=6)
+    ax.set_xlabel("centre's displacement along (mm)")
+
+
+def _ellipse(ax: Axes, push: Trajectories, origin: Array, name: str | None = None) -> None:
+    ends = 1e3 * push.paths[:, -1, :2]
+    outline = origin + ends.mean(axis=0) + ellipse(np.cov(ends.T))
+    ax.plot(*outline.T, color=RED, linewidth=1.3, label=name)

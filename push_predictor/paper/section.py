@@ -1,0 +1,45 @@
+"""What one claim gives to the report: findings, tables, pictures, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from push_predictor.evaluation.figures.canvas import Picture
+
+Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim of the paper in our words, whether it holds here, and the sentence with number and interval for it.
+
+    The verdict follows from the numbers by a rule that the sentence lets the reader see.
+    """
+
+    claim: str
+    verdict: Verdict
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text: caption (which pushes, which split, which interval), head, rows; see html.table."""
+
+    caption: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One section of the report. data: the numbers behind it, for the JSON; NaN is not allowed, give None."""
+
+    key: str
+    title: str
+    findings: tuple[Finding, ...]
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    notes: tuple[str, ...] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
