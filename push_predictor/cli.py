@@ -14,7 +14,7 @@ from importlib import import_module
 from push_predictor import __version__
 from push_predictor.errors import PushPredictorError
 
-COMMANDS = ("import", "simulate", "train", "predict", "evaluate", "validate", "report", "info")
+COMMANDS = ("import", "simulate", "train", "predict", "evaluate", "validate", "trace", "report", "info")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, truth
 
-from push_predictor.paper.claims.divergence import divergences, estimate, good, lower, section, trainings
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.paper.claims.divergence import section
+from push_predictor.paper.claims.divergence_models import trainings
+from push_predictor.paper.claims.divergence_rules import divergences, estimate, good, lower
 from push_predictor.paper.estimate import Estimate
 from push_predictor.paper.fits import Answer
+from push_predictor.paper.grid_maps import block_weights, mean_of, median_of
 from push_predictor.paper.section import Section
 from push_predictor.types import Array
 
@@ -37,19 +41,31 @@ def test_the_truth_has_next_to_no_divergence_and_a_wider_model_a_known_one() -> 
     assert found.correct[1].mean() == pytest.approx(3.0 * (np.log(2.0) + 0.125 + 0.125 - 0.5), abs=0.05)
     assert found.of_mean[1].mean() == pytest.approx(3.0 * 0.125, abs=0.03)
     assert found.printed[1].mean() == pytest.approx(found.correct[1].mean() - 1.5 * np.log(2.0), abs=0.02)
+    np.testing.assert_allclose(found.of_sd + found.of_mean, found.correct)
     assert np.median(found.sd_ratio[1]) == pytest.approx(2.0, abs=0.05)
 
 
 def test_an_estimate_is_the_mean_over_seeds_with_pushes_drawn_anew() -> None:
     values = np.array([[1.0, 2.0, 9.0], [3.0, 4.0, 5.0]])
-    assert estimate(values, np.mean).value == 4.0
-    assert estimate(values, np.median).value == 3.0
-    assert estimate(values, np.mean).low == pytest.approx(2.0) and estimate(values, np.mean).high == pytest.approx(7.0)
+    weights = push_bootstrap(np.arange(3))
+    assert estimate(values, mean_of, weights).value == 4.0
+    assert estimate(values, median_of, weights).value == 3.0
+    found = estimate(values, mean_of, weights)
+    assert (found.low, found.high) == (pytest.approx(2.0), pytest.approx(7.0))
+
+
+def test_pushes_that_are_alike_in_blocks_leave_a_wider_interval_than_independent_ones() -> None:
+    grid = made_up_grid(replace(PLAN, contacts=11, angle_step=0.2, repetitions=12))
+    block = np.array([np.floor(cell.fraction / 0.2 + 1e-9) + np.floor(cell.angle / 0.4 + 1e-9) for cell in grid.seen])
+    weights = (block_weights(grid.seen), push_bootstrap(np.arange(len(block))))
+    blocks, single = (estimate(block[None], mean_of, w) for w in weights)
+    assert blocks.high - blocks.low > 1.4 * (single.high - single.low)
+    np.testing.assert_array_equal(divergences(grid, [answer(grid.typical_inputs)]).weights, weights[0])
 
 
 def test_a_difference_draws_the_same_pushes_for_both() -> None:
     values = np.random.default_rng(0).gamma(1.0, size=(2, 30))
-    difference = estimate(values, np.mean, values + 1.0)
+    difference = estimate(values, mean_of, push_bootstrap(np.arange(30)), values + 1.0)
     assert (difference.low, difference.high) == (pytest.approx(-1.0), pytest.approx(-1.0))
 
 

@@ -10,6 +10,7 @@ from paper_studies import made_up_corpus, made_up_study, rig_of
 
 from push_predictor.evaluation.tally import Tally
 from push_predictor.paper.claims import learning_curves
+from push_predictor.paper.claims.learning_curves import band_or_range
 from push_predictor.paper.claims.learning_findings import circle, saturation, surface
 from push_predictor.paper.corpus import Corpus, PushSet
 from push_predictor.paper.curves import Curves, gathered, nmse_of
@@ -74,6 +75,12 @@ def test_the_sentence_tells_the_difference_to_each_shape():
     assert "square NMSE 0.150" in circle(CORPUS, round_is(0.5, -1.0, noise=0.0), PAIRS).sentence
 
 
+def test_folds_of_a_set_are_no_sets_of_their_own():
+    """One surface among three gives the whole gap: five folds of each do not make that sure."""
+    one = made_up(lambda shape, u, n: 0.3 - (0.29 if (shape, u) == ("ellip1", "pu") else 0.0), noise=0.001)
+    assert circle(CORPUS, one, PAIRS).verdict == "not decided"
+
+
 def test_without_a_circle_nothing_is_decided():
     pairs = tuple(pair for pair in PAIRS if pair[0] != "ellip1")
     assert circle(CORPUS, round_is(0.5, -1.0), pairs).verdict == "not decided"
@@ -124,6 +131,20 @@ def test_the_gain_is_told_per_doubling_whatever_the_ratio_of_sizes():
     assert "lowers the NMSE by 30.0" in saturation(CORPUS, falling(0.3, 0.5, (100, 800)), PAIRS).sentence
 
 
+def test_the_gain_of_one_set_has_an_interval_by_push():
+    finding = saturation(CORPUS, falling(0.02, 0.01), PAIRS[:1])
+    assert finding.verdict == "holds" and "one set, all folds, interval by push" in finding.sentence
+
+
+def test_a_gain_that_differs_from_set_to_set_is_not_made_sure_by_folds():
+    def level(shape: str, u: str, n: int) -> float:
+        return 0.3 if n == 500 else 0.3 * (1.0 - (0.3 if (shape, u) == ("rect1", "pu") else 0.0))
+
+    gains = saturation(CORPUS, made_up(level, lambda s, u, n: 0.5 * (n == 500), noise=0.0), PAIRS)
+    low, high = gains.sentence.split("NMSE by ")[1].split(" (")[1].split(")")[0].replace("−", "-").split(" to ")
+    assert (float(low), float(high)) == pytest.approx((-4.4, 11.0), abs=0.1)  # t of 9 sets, by hand: 3.33 +- 7.69
+
+
 def test_one_size_decides_nothing():
     assert saturation(CORPUS, falling(0.3, 0.5, (100,)), PAIRS).verdict == "not decided"
 
@@ -142,6 +163,12 @@ def test_the_mean_over_pairs_is_taken_seed_by_seed():
         for pair, level in ((a, 1.0), (b, 2.0))
     }
     assert Curves(cells).values([a, b], "vhgp", "push", 10, nmse_of) == pytest.approx([1.5, 2.5])
+
+
+def test_two_folds_show_their_range_and_three_an_interval():
+    two, three = band_or_range([0.2, 0.4]), band_or_range([0.2, 0.3, 0.4])
+    assert (two.value, two.low, two.high) == pytest.approx((0.3, 0.2, 0.4))
+    assert three.high == pytest.approx(0.3 + 4.303 * 0.1 / np.sqrt(3), abs=1e-3)
 
 
 def test_the_section_has_a_figure_per_surface_and_per_shape_and_every_pair_in_its_table(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_study, rig_of
 
 from push_predictor.paper.claims.map_agreement import Likeness, agreement_findings, likenesses
-from push_predictor.paper.claims.map_peaks import MIRRORED, NAMED, Peaks, peak_findings, peaks_of, region
+from push_predictor.paper.claims.map_peaks import MIRRORED, NAMED, Peaks, agreed, peak_findings, peaks_of, region
 from push_predictor.paper.claims.maps import examples, section
 from push_predictor.paper.estimate import Estimate, of_draws
 from push_predictor.paper.fits import Answer
@@ -22,15 +22,18 @@ from push_predictor.paper.grid_maps import (
     block_weights,
     by_blocks,
     correlation,
+    mean_of,
+    median_of,
     on_grid,
     redrawn,
     relative_error,
     unbiased,
 )
-from push_predictor.paper.map_models import ANGLES, FRACTIONS, ModelMap, square_maps
+from push_predictor.paper.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
 from push_predictor.paper.peaks import Peak, peak
 from push_predictor.paper.plan import GRID_SPEED
 from push_predictor.paper.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
+from push_predictor.paper.section import Verdict
 from push_predictor.types import Array
 
 GRID = replace(PLAN, contacts=11, angle_step=0.25, repetitions=24)
@@ -41,7 +44,7 @@ Formula = Callable[[Array, Array], Array]  # contact, angle -> (n, 3)
 def grid_of(mean: Formula, sd: float = 0.01, spoilt: int = 0) -> RepeatedGrid:
     """Repetitions of a mean by formula, evenly spread about it; the first `spoilt` pushes were hardly seen."""
     rig, spread = rig_of("rect1", "plywood"), np.linspace(-1.7, 1.7, GRID.repetitions)[:, None]
-    cells = []
+    cells: list[Repetitions] = []
     for fraction in GRID.grid_fractions.tolist():
         for angle in GRID.grid_angles.tolist():
             contact = float(contact_on_first_side(rig.outline, np.array(fraction)))
@@ -96,9 +99,7 @@ def test_a_model_that_disagrees_with_the_repetitions_makes_it_hold_in_part() -> 
 
 def test_a_push_that_comes_close_to_the_largest_counts_in_part_and_one_that_is_not_seen_not_at_all() -> None:
     def found(reach: float) -> Peaks:
-        elsewhere = Peak(Estimate(1.0, 1.0, 1.0), (0.1, 1.0), ((0.1, 1.0),), Estimate(reach, reach, reach))
-        nothing = Estimate(np.nan, np.nan, np.nan)
-        return Peaks((elsewhere,) * 3, (elsewhere,) * 3, (nothing, nothing))
+        return peaks_at([(0.1, 1.0)], Estimate(reach, reach, reach))
 
     assert [f.verdict for f in peak_findings(found(0.95), 9)] == [
         "holds in part",
@@ -110,6 +111,46 @@ def test_a_push_that_comes_close_to_the_largest_counts_in_part_and_one_that_is_n
     assert {f.verdict for f in peak_findings(found(np.nan), 9)} == {"not decided"}
 
 
+def peaks_at(places: list[Place], reach: Estimate) -> Peaks:
+    """The same by repetitions and by the model, no handedness."""
+    one, nothing = Peak(Estimate(1.0, 1.0, 1.0), places[0], tuple(places), reach), Estimate(np.nan, np.nan, np.nan)
+    return Peaks((one,) * 3, (one,) * 3, (nothing, nothing))
+
+
+@pytest.mark.parametrize(
+    ("places", "ends", "verdict"),
+    [
+        ([(0.5, 0.0), (0.6, 0.1)], (0.2, 0.3), "holds"),
+        ([(0.5, 0.0), (0.9, 1.0)], (0.2, 0.3), "holds in part"),
+        ([(0.9, 1.0)], (0.92, 0.99), "holds in part"),
+        ([(0.9, 1.0)], (0.85, 0.99), "not decided"),
+        ([(0.9, 1.0)], (0.6, 0.85), "does not hold"),
+    ],
+)
+def test_what_is_uncertain_about_a_peak_does_not_help_the_claim(
+    places: list[Place], ends: tuple[float, float], verdict: str
+) -> None:
+    """All places must lie near, and the whole interval of what the paper's push reaches counts."""
+    assert peak_findings(peaks_at(places, Estimate(0.95, *ends)), 9)[0].verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "verdict"),
+    [
+        ("holds", "holds", "holds"),
+        ("holds", "not decided", "holds in part"),
+        ("not decided", "holds", "holds in part"),
+        ("holds", "does not hold", "holds in part"),
+        ("holds in part", "not decided", "holds in part"),
+        ("does not hold", "not decided", "not decided"),
+        ("does not hold", "does not hold", "does not hold"),
+        ("not decided", "not decided", "not decided"),
+    ],
+)
+def test_what_one_source_cannot_decide_holds_in_part_at_most(one: Verdict, other: Verdict, verdict: str) -> None:
+    assert agreed(one, other) == verdict
+
+
 def test_a_peak_tells_as_few_places_as_hold_95_percent_of_the_draws() -> None:
     axes, shown = (np.array([0.0, 0.5, 1.0]), np.array([-1.0, 0.0, 1.0])), np.zeros((3, 3))
     drawn = np.zeros((100, 3, 3))
@@ -119,7 +160,8 @@ def test_a_peak_tells_as_few_places_as_hold_95_percent_of_the_draws() -> None:
     assert found.place == (0.5, 0.0)
     assert found.places == ((0.5, 0.0), (1.0, -1.0))
     assert found.reach.value == 0.5
-    assert found.near([(0.9, -0.9)], (0.1, 0.1)) and not found.near([(0.0, 1.0)], (0.1, 0.1))
+    assert found.near([(0.9, -0.9)], (0.1, 0.1)) == [False, True]
+    assert found.near([(0.0, 1.0)], (0.1, 0.1)) == [False, False]
 
 
 def test_pushes_that_were_hardly_seen_are_never_the_largest() -> None:
@@ -143,6 +185,18 @@ def test_maps_are_read_between_their_points() -> None:
     plane = 2.0 * fractions[None, :] + 3.0 * angles[:, None]
     read = at_places(fractions, angles, np.stack([plane, -plane]), [(0.3, 0.1), (0.8, -1.2)])
     np.testing.assert_allclose(read, [[0.9, -2.0], [-0.9, 2.0]])
+
+
+def test_means_and_medians_of_weighted_pushes_are_those_of_pushes_written_out() -> None:
+    values, weights = np.array([5.0, 1.0, 9.0, 2.0]), np.array([[1.0, 1.0, 1.0, 1.0], [2.0, 0.0, 1.0, 0.0]])
+    drawn = [[5.0, 1.0, 9.0, 2.0], [5.0, 5.0, 9.0]]
+    np.testing.assert_allclose(mean_of(values, weights), [np.mean(d) for d in drawn])
+    np.testing.assert_allclose(median_of(values, weights), [np.median(d) for d in drawn])
+
+
+def test_the_map_shown_is_the_mean_of_the_draws_maps() -> None:
+    one, other = model_of(bumps(as_the_paper_says())), model_of(bumps(((0.1, 1.0), (0.5, -1.5), MIRRORED[0])))
+    np.testing.assert_allclose(averaged([one, other]).mean, 0.5 * (one.mean + other.mean))
 
 
 def test_neighbouring_pushes_are_drawn_together() -> None:
@@ -178,10 +232,13 @@ def test_a_model_that_is_the_truth_agrees_and_one_without_shape_does_not() -> No
     cells = [replace(c, outcomes=c.mean + (1.0 + c.fraction) * (c.outcomes - c.mean)) for c in grid.seen]
     mean, sd = (np.array([getattr(c, name) for c in cells]) for name in ("mean", "sd"))
     known = np.ones(len(cells), dtype=bool)
-    answers = {"VHGP": Answer(mean, sd, sd, known), "GP": Answer(mean, 0.0 * sd + 0.01, 0.0 * sd + 0.01, known)}
+    flat = 0.0 * sd + 0.01
+    answers = {"VHGP": [Answer(mean, sd, sd, known)] * 2, "GP": [Answer(mean, flat, flat, known)]}
     found = likenesses(cells, answers)
     assert found["sd", "VHGP"][0].error.value == pytest.approx(0.0, abs=1e-12)
     assert np.isnan(found["sd", "GP"][0].correlation.value)
+    wide = likenesses(cells, {"VHGP": [Answer(mean, sd, sd, known), Answer(mean, 3.0 * sd, sd, known)]})
+    assert wide["sd", "VHGP"][0].size == pytest.approx(2.0)  # of each draw by itself, then the mean
     assert [finding.verdict for finding in agreement_findings(found, len(cells))] == ["holds", "holds"]
 
 
@@ -205,7 +262,8 @@ def test_the_verdict_on_alike_maps_follows_from_the_intervals(
 
 def test_the_pushes_drawn_are_those_of_the_largest_outputs() -> None:
     grid = grid_of(bumps(as_the_paper_says()))
-    answer = Answer(*[np.array([cell.mean for cell in grid.seen])] * 3, np.ones(len(grid.seen), dtype=bool))
+    means = np.array([cell.mean for cell in grid.seen])
+    answer = Answer(means, means, means, np.ones(len(grid.seen), dtype=bool))
     chosen = [(push.fraction, push.angle) for push, _ in examples(grid, answer, "mean")]
     assert chosen[0] == (0.5, 0.0)
     assert chosen[1] == pytest.approx((0.7, -0.75))

@@ -11,19 +11,22 @@ import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
 
 from push_predictor.evaluation.figures.canvas import Picture
+from push_predictor.models.mechanisms import Push
 from push_predictor.paper.claims import modality
-from push_predictor.paper.claims.modality import (
+from push_predictor.paper.claims.modality import section
+from push_predictor.paper.claims.modality_rules import (
     good_gaussian,
     mean_over_pushes,
     model_loss,
     not_gaussian,
-    section,
     some_modes,
 )
 from push_predictor.paper.corpus import PushSet
 from push_predictor.paper.densities import LogDensities, found_at, held_out, log_densities, shape
 from push_predictor.paper.estimate import Estimate
+from push_predictor.paper.figures.histograms import moments
 from push_predictor.paper.fits import Fit, trained
+from push_predictor.paper.grid_maps import told
 from push_predictor.paper.repetitions import RepeatedGrid, Repetitions
 from push_predictor.paper.section import Section
 
@@ -56,8 +59,7 @@ def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
     assert with_modes.findings[0].verdict == "holds"
     assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
     cell = grid_with_modes().cells[SPLIT]
-    first = with_modes.tables[2].rows[0][0].replace("−", "-")
-    assert first == f"contact {cell.fraction:.2f}, angle {cell.angle:+.1f}: dθ"
+    assert with_modes.tables[2].rows[0][0] == f"{told((cell.fraction, cell.angle))}: rotation"
 
 
 def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +128,7 @@ def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -
     variance = np.diagonal(prediction.covariance, axis1=1, axis2=2)
     expected = -0.5 * (np.log(2.0 * np.pi * variance) + (rows - prediction.mean) ** 2 / variance)
     np.testing.assert_allclose(found.gaussian, expected, atol=1e-9)
-    exact = model.body.exact_log_density(inputs, rows)
+    exact = model.body.exact_log_density(Push(inputs, np.full(len(rows), 0.2), {}), rows)
     assert exact is not None
     np.testing.assert_allclose(found.exact, exact)
     with pytest.raises(TypeError, match="analytical"):
@@ -134,7 +136,17 @@ def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -
 
 
 def test_a_mean_over_pushes_leaves_out_what_is_not_known() -> None:
-    assert mean_over_pushes(np.array([[1.0, np.nan], [3.0, 5.0]])).value == 3.0
+    weights = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 2.0]])
+    found = mean_over_pushes(np.array([[1.0, np.nan], [3.0, 5.0]]), weights)
+    assert found.value == 3.0 and 1.0 <= found.low < found.high <= 4.0
+    known = mean_over_pushes(np.array([[np.nan, np.nan], [3.0, 5.0]]), weights)
+    assert (known.value, known.low, known.high) == (4.0, 4.0, 4.0)  # the draw without it tells nothing
+
+
+def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> None:
+    values = np.linspace(0.9, 1.1, 50)
+    mean, sd = moments(values, -0.5 * ((values - 3.0) / 2.0) ** 2 - np.log(2.0))
+    assert (mean, sd) == (pytest.approx(3.0), pytest.approx(2.0))
 
 
 def test_one_of_many_tests_finds_less_than_one_alone() -> None:

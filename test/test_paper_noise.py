@@ -13,7 +13,7 @@ from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
 from push_predictor.paper.claims.noise import section
 from push_predictor.paper.claims.noise_learnt import learnt_figures
 from push_predictor.paper.claims.noise_shape import shape_finding
-from push_predictor.paper.claims.noise_size import size_finding, span_finding
+from push_predictor.paper.claims.noise_size import size_finding, sized, span_finding
 from push_predictor.paper.estimate import Estimate
 from push_predictor.paper.map_models import ModelMap
 from push_predictor.paper.noise_figures import Ratios, Span, noise_ratios, radius_of_gyration, span_of, spans
@@ -106,7 +106,8 @@ def test_surfaces_without_common_pushes_are_not_compared() -> None:
 def test_the_verdict_on_the_shape_follows_from_all_pairs(ends: list[tuple[float, float]], verdict: str) -> None:
     found = [shape(*pair) for pair in ends]
     assert shape_finding(found, found, shape(0.9, 1.0), found).verdict == verdict
-    assert shape_finding(found, found, shape(0.9, 1.0), []).verdict == verdict
+    alone = {"holds": "holds in part", "does not hold": "not decided"}  # the VHGPs cannot say anything
+    assert shape_finding(found, found, shape(0.9, 1.0), []).verdict == alone.get(verdict, verdict)
 
 
 def test_repetitions_and_models_that_disagree_on_the_shape_make_it_hold_in_part() -> None:
@@ -120,6 +121,8 @@ def test_repetitions_and_models_that_disagree_on_the_shape_make_it_hold_in_part(
         ((0.2, 0.3), 0.9, "holds"),
         ((0.2, 0.3), 0.7, "holds in part"),
         ((0.05, 0.3), 0.4, "not decided"),
+        ((0.05, 0.3), 0.6, "holds in part"),
+        ((0.5, 0.6), 0.5, "not decided"),
         ((0.5, 0.6), 0.4, "does not hold"),
         ((0.01, 0.02), 0.1, "does not hold"),
     ],
@@ -128,12 +131,30 @@ def test_the_verdict_on_the_size(overall: tuple[float, float], within: float, ve
     assert size_finding((ratio(*overall, within),) * 4, made_up_grid()).verdict == verdict
 
 
+def test_a_share_of_pushes_that_is_uncertain_does_not_make_the_size_hold() -> None:
+    inside = [Estimate(0.25, 0.2, 0.3)] * 3
+    assert sized(inside, Estimate(0.85, 0.75, 0.95)) == "holds in part"
+    assert sized([Estimate(0.25, 0.05, 0.5)] * 3, Estimate(0.55, 0.4, 0.7)) == "not decided"
+    assert sized([Estimate(0.5, 0.45, 0.6)] * 3, Estimate(0.45, 0.4, 0.55)) == "not decided"
+
+
 @pytest.mark.parametrize(
     "everywhere, near, verdict",
-    [(20.0, 12.0, "holds"), (20.0, 4.0, "holds in part"), (5.0, 4.0, "holds in part"), (2.0, 1.5, "does not hold")],
+    [
+        ((8.0, 12.0), (4.0, 6.0), "holds"),
+        ((8.0, 12.0), (2.0, 4.0), "holds in part"),
+        ((30.0, 40.0), (4.0, 6.0), "holds in part"),
+        ((2.0, 4.0), (1.5, 2.0), "not decided"),
+        ((2.0, 3.0), (1.5, 2.0), "does not hold"),
+        ((50.0, 90.0), (40.0, 60.0), "does not hold"),
+    ],
 )
-def test_the_verdict_on_the_span(everywhere: float, near: float, verdict: str) -> None:
-    reach = {name: (Span(sure(v), sure(v)),) * 3 for name, v in (("all", everywhere), ("near", near))}
+def test_the_verdict_on_the_span(everywhere: tuple[float, float], near: tuple[float, float], verdict: str) -> None:
+    small = Span(sure(1.5), sure(1.5))
+    reach = {
+        name: (small, Span(Estimate(sum(ends) / 2.0, *ends), sure(9.0)), small)
+        for name, ends in (("all", everywhere), ("near", near))
+    }
     assert span_finding(reach, {"all": 30, "near": 20}).verdict == verdict
 
 

@@ -50,6 +50,21 @@ def test_the_page_stands_alone_and_warns_that_it_is_quick(made: Path) -> None:
     assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
     assert page.count("<img") >= len(CLAIMS)
     assert "Made with --quick" in page
+
+
+def test_what_the_paper_does_not_claim_is_listed_apart(made: Path) -> None:
+    page = (made / "paper.html").read_text()
+    paper, ours = re.findall(r'<table class="verdicts">.*?</table>', page, re.DOTALL)
+    assert "claim of the paper" in paper and "asked beyond the paper" in ours
+    for section in ("calibration", "variants"):
+        assert f'href="#{section}"' in ours and f'href="#{section}"' not in paper
+    findings = [f for s in json.loads((made / "paper.json").read_text())["sections"].values() for f in s["findings"]]
+    assert paper.count("<tr><td>") == sum(finding["origin"] == "paper" for finding in findings) > 0
+    assert ours.count("<tr><td>") == sum(finding["origin"] == "beyond the paper" for finding in findings) > 0
+
+
+def test_no_word_of_the_page_is_not_a_number(made: Path) -> None:
+    page = (made / "paper.html").read_text()
     assert "nan" not in re.sub(r"base64,[^\"]+", "", page).lower().split()
 
 

@@ -116,7 +116,35 @@ def test_another_default_is_earned_by_the_rule(gains, noise: float, verdict: str
 def test_the_rule_names_what_it_accepts_and_what_the_random_split_would() -> None:
     sentence = rule_finding(made_up(on_both(NUGGET, 0.05) | {(500, "random", MATERN): 0.05})).sentence
     assert f"Accepted: {NUGGET}." in sentence
-    assert f"would also accept {MATERN}." in sentence
+    assert f"The random split alone would accept {MATERN} too." in sentence
+
+
+@pytest.mark.parametrize(
+    ("gains", "told"),
+    [
+        ({}, "would accept none either."),
+        (on_both(NUGGET, 0.05), "would accept no other."),
+        ({(500, "random", MATERN): 0.05}, f"would accept {MATERN} instead."),
+    ],
+)
+def test_what_the_random_split_alone_accepts_is_told_in_plain_words(gains, told: str) -> None:
+    assert told in rule_finding(made_up(gains)).sentence
+
+
+def test_a_gain_must_be_sure_enough_for_three_that_try() -> None:
+    """An interval that ends just below zero by itself, and not once it is widened."""
+    gain = made_up(on_both(MATERN, 0.002), noise=0.01).gain(500, "push", MATERN)
+    half = (gain.high - gain.low) / 2.0
+    for factor, chosen in ((1.1, []), (1.4, [MATERN])):  # Bonferroni of three: 1.22
+        sure = made_up(on_both(MATERN, 0.002), noise=0.01 * abs(gain.value) / (factor * half))
+        assert sure.gain(500, "push", MATERN).high < 0.0
+        assert accepted(sure) == chosen
+
+
+def test_fewer_folds_at_the_largest_size_are_told() -> None:
+    found = made_up(on_both(MATERN, 0.05) | {(1000, "push", MATERN): 0.05})
+    fewer = replace(found, fits={cell: 3 if cell[0] == 1000 else 5 for cell in found.fits})
+    assert "3 folds at 1000 windows (of 5 at smaller sizes)" in rule_finding(fewer).sentence
 
 
 @pytest.mark.parametrize(
@@ -133,7 +161,7 @@ def test_the_gain_that_others_report_must_survive_at_every_size(
 ) -> None:
     found = made_up({(100, "push", REPORTED): small, (500, "push", REPORTED): large}, noise)
     finding = gain_finding(found)
-    assert finding.verdict == verdict
+    assert finding.verdict == verdict and finding.origin == "beyond the paper"
     assert found.gain(100, "push", REPORTED).text("+.3f") in finding.sentence
 
 

@@ -206,7 +206,9 @@ def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
 def test_a_newer_file_says_what_to_do(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     _rewrite_header(tmp_path / "m", {"format_version": FORMAT_VERSION + 1, "written_by": "9.9"})
-    with pytest.raises(ModelFileError, match=r"format version 3, written by push_predictor '9.9'.*update"):
+    with pytest.raises(
+        ModelFileError, match=rf"format version {FORMAT_VERSION + 1}, written by push_predictor '9.9'.*update"
+    ):
         load_model(tmp_path / "m")
 
 

@@ -101,6 +101,18 @@ def test_p_values_are_uniform_for_the_uniform_and_small_for_two_modes() -> None:
     assert p_values(two, 30, 2000)[0] == 1.0 / 2001.0
 
 
+def test_all_draws_are_asked_only_where_the_p_value_is_small() -> None:
+    rng = np.random.default_rng(6)
+    dips = dip(
+        np.concatenate([rng.standard_normal((5, 33)), rng.standard_normal((1, 33)) + 20.0 * (np.arange(33) % 2)])
+    )
+    every = p_values(dips, 33, 8000)
+    np.testing.assert_allclose(every[:5], p_values(dips[:5], 33, 2000))
+    assert every[:5].min() > 0.2
+    assert every[5] == 1.0 / 8001.0
+    assert every[5] == p_values(dips[5:], 33, 8000)[0]
+
+
 def test_holm_by_hand() -> None:
     np.testing.assert_allclose(holm(np.array([0.04, 0.01, 0.03, 0.5])), [0.09, 0.04, 0.09, 0.5])
     assert holm(np.array([0.6, 0.7])).max() == 1.0

@@ -82,6 +82,8 @@ def assert_same_as_offline(folder: Path, model: Path, recording: Path = HEXAGON,
     covariance = np.array([w["covariance"] for w in online]).reshape(-1, 3, 3)
     assert np.max(np.abs(covariance - comparison.covariance)) < 1e-9
     result = json.loads((folder / f"validation{suffix}.json").read_text())
+    if not suffix:
+        assert "fired" in result.pop("alarm")
     assert_same_figures(result, metrics_json(comparison))
 
 

@@ -22,7 +22,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--contact", required=True, type=float, metavar="C", help="fraction of the perimeter")
     parser.add_argument("--angle", required=True, type=float, metavar="A", help="rad from the inward normal")
     parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="s (default %(default)s)")
-    parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help="may be repeated")
+    meaning = "what an extended model needs besides; may be repeated"
+    parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help=meaning)
     parser.set_defaults(run=run)
 
 
@@ -37,7 +38,8 @@ def run(options: argparse.Namespace) -> None:
     covariates = dict(_covariate(text) for text in options.covariate)
     check_request(model, options.velocity, options.contact, options.angle, options.duration, covariates)
     inputs = np.array([[options.velocity, options.contact, options.angle]])
-    prediction = model.predict(inputs, np.array([options.duration]))
+    brought = {name: np.array([value]) for name, value in covariates.items()}
+    prediction = model.predict(inputs, np.array([options.duration]), brought)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
     result = {
         "model": model.name,

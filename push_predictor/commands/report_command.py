@@ -72,7 +72,8 @@ def _paper(options: argparse.Namespace) -> None:
     plan = QUICK if options.quick else FULL
     with _spread(options.cluster), ProgressBar() as bar:
         work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
-        page, content = report_paper(plan, work, options.out, options.data, options.recordings, bar)
+        keep = None if options.recordings is None else options.recordings.resolve()
+        page, content = report_paper(plan, work, options.out, options.data, keep, bar)
     if not write_json(options, {"report": str(page), **content}):
         print(page)
 

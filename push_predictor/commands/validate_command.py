@@ -19,6 +19,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a rosbag2 folder or an .mcap file")
+    parser.add_argument("--false-alarm-rate", type=float, default=0.01, metavar="R", help="of the alarm (%(default)s)")
     parser.add_argument("--windows", type=Path, metavar="FILE.json", help="every window: predicted and observed")
     add_rig(parser)
     parser.set_defaults(run=run)
@@ -26,6 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Validate and print; warn where the model is of another rig, or a push was trained on."""
+    from push_predictor.evaluation.alarm_scores import alarm_about
     from push_predictor.evaluation.offline import recording_rig, rig_difference, validate_recording
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.evaluation.window_log import write_window_log
@@ -37,7 +39,8 @@ def run(options: argparse.Namespace) -> None:
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
         windows, comparison = validate_recording(model, options.recording, rig)
-        metrics = metrics_json(comparison)
+        alarm = alarm_about(model, windows_to_table(windows), comparison, options.false_alarm_rate)
+        metrics = {**metrics_json(comparison), "alarm": alarm}
     if difference := rig_difference(model, rig):
         warn(difference)
     if seen := trained_on(model, windows_to_table(windows)):
@@ -46,3 +49,5 @@ def run(options: argparse.Namespace) -> None:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):
         print_metrics(metrics)
+        if alarm["fired"]:
+            print(f"alarm at push {alarm['push_id']}, the {alarm['pushes']}th: {alarm['score']}")

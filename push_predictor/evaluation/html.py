@@ -71,14 +71,14 @@ def finding(claim: str, verdict: str, sentence: str) -> str:
     )
 
 
-def verdicts(rows: Sequence[tuple[str, str, str, str]]) -> str:
-    """A table of (anchor, section, claim, verdict) that leads to the sections."""
+def verdicts(claims: str, rows: Sequence[tuple[str, str, str, str]]) -> str:
+    """A table of (anchor, section, claim, verdict) that leads to the sections; claims: whose, heads their column."""
     body = "\n".join(
         f'<tr><td><a href="#{escape(anchor)}">{escape(section)}</a></td><td>{escape(claim)}</td>'
         f'<td class="{_mark(verdict)}"><span class="verdict">{escape(verdict)}</span></td></tr>'
         for anchor, section, claim, verdict in rows
     )
-    head = "<thead><tr><th>section</th><th>claim of the paper</th><th>here</th></tr></thead>"
+    head = f"<thead><tr><th>section</th><th>{escape(claims)}</th><th>here</th></tr></thead>"
     return f'<div class="table"><table class="verdicts">{head}\n<tbody>\n{body}\n</tbody></table></div>'
 
 

@@ -58,13 +58,15 @@ def validate_recording(model: PushModel, path: Path, rig: Rig | None = None) -> 
     """Predict every window of a recording, as a server of the model would."""
     windows, table = recorded_windows(model, path, rig)
     check_table(model, table)
-    prediction = serve(model).predict(table.inputs, table.duration)
+    prediction = serve(model).predict(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 
 def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
     """Write the HTML report of several models, the first the main one, on one recording; returns page and metrics."""
     windows, table = recorded_windows(models[0], path)
+    for model in models:
+        check_table(model, table)
     comparisons = [compare(model, table) for model in models]
     page = report_windows(models, windows, comparisons, out, path.name)
     return page, [metrics_json(comparison) for comparison in comparisons]

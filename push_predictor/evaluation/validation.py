@@ -39,8 +39,8 @@ class Comparison:
 
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
-    """Predict every row of a table."""
-    prediction = model.predict(table.inputs, table.duration)
+    """Predict every row of a table; the caller has checked it with `check_table`."""
+    prediction = model.predict(table.inputs, table.duration, table.covariates)
     return comparison_of(model, table, prediction.mean, prediction.covariance)
 
 

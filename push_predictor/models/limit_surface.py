@@ -90,7 +90,8 @@ def body_twist(
     nx, ny = inward_normal[:, 0], inward_normal[:, 1]
     along = pusher_velocity[:, 0] * nx + pusher_velocity[:, 1] * ny
     across = pusher_velocity[:, 1] * nx - pusher_velocity[:, 0] * ny
-    normal_force, tangent_force, slip = _contact_force(normal_arm, tangent_arm, along, across, friction)
+    p, q = normal_arm, tangent_arm
+    normal_force, tangent_force, slip = contact_force(1.0 + p * p, p * q, 1.0 + q * q, along, across, friction)
     spin = (normal_arm * normal_force + tangent_arm * tangent_force) / support.length
     x, y = support.centre
     vx = nx * normal_force - ny * tangent_force + spin * y
@@ -106,19 +107,20 @@ def _moment_arms(contact_point: Array, inward_normal: Array, support: Support) -
     return rx * ny - ry * nx, rx * nx + ry * ny
 
 
-def _contact_force(p: Array, q: Array, along: Array, across: Array, friction: float) -> tuple[Array, Array, IntArray]:
-    """Force (scaled to k = 1) along the normal and its left, and slip, each (n,), from moment arms p, q.
+def contact_force(
+    pp: Array, pq: Array, qq: Array, along: Array, across: Array, friction: float | Array
+) -> tuple[Array, Array, IntArray]:
+    """Force (scaled to k = 1) along the inward normal and its left, and slip, each (n,).
 
-    A has the elements 1 + p^2, p q, 1 + q^2 in the basis of normal and left. Where an edge's image has no
-    component along the normal, slipping that way would let the slider run from the pusher: the motion cone
-    covers that side.
+    pp, pq, qq (n,): elements of the contact's mobility A in the basis of normal and left, 1 + p^2, p q, 1 + q^2 for the
+    moment arms p, q; along, across (n,): the pusher's velocity in that basis. Where an edge's image has no component
+    along the normal, slipping that way would let the slider run from the pusher: the motion cone covers that side.
     """
-    pp, pq, qq = 1.0 + p * p, p * q, 1.0 + q * q
     left_n, left_t = pp + friction * pq, pq + friction * qq
     right_n, right_t = pp - friction * pq, pq - friction * qq
     left = (left_n > 0.0) & (across * left_n > along * left_t)
     right = (right_n > 0.0) & (across * right_n < along * right_t)
-    determinant = pp + q * q
+    determinant = pp * qq - pq * pq
     slip = left.astype(np.int64) - right.astype(np.int64)
     edge = along / np.where(left, left_n, np.where(right, right_n, 1.0))
     normal = np.where(slip == 0, (qq * along - pq * across) / determinant, edge)

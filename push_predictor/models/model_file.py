@@ -12,6 +12,7 @@ import os
 import tempfile
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,14 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.effects_record import effects_of, effects_record
 from push_predictor.models.gp import GaussianProcess, GpParameters
 from push_predictor.models.kernels import DEFAULT_CHOICE, FAMILIES
 from push_predictor.models.limit_surface import Support
 from push_predictor.models.push_model import (
     KINDS,
     AnalyticalBody,
+    ExtendedBody,
     LearnedBody,
     Provenance,
     PushModel,
@@ -39,7 +42,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
-FORMAT_VERSION = 2  # 2: other kernels than the squared exponential, and a nugget; a file without them stays at 1
+FORMAT_VERSION = 3  # 2: other kernels than the squared exponential, and a nugget; 3: effects; without any it stays at 1
 LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
 HEADER = "header"
 
@@ -131,6 +134,8 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 def _version(body: dict[str, Any]) -> int:
     """The lowest version whose readers understand a body."""
+    if "effects" in body:
+        return 3
     return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in body.get("regressions", ())) else 1
 
 
@@ -141,11 +146,7 @@ def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -
     training = _table(header, arrays)
     found = header["provenance"]
     provenance = Provenance(tuple(found["sources"]), int(found["pushes"]), int(found["seed"]), str(found["version"]))
-    body: LearnedBody | AnalyticalBody
-    if header["kind"] == "analytical":
-        body = _analytical_body(header["body"], rig)
-    else:
-        body = _learned_body(header["body"], header["kind"], rig, training, arrays)
+    body = _body(header["body"], header["kind"], rig, training, arrays)
     return PushModel(str(header["name"]), str(header["kind"]), rig, body, training, provenance)
 
 
@@ -185,20 +186,32 @@ def _finite(arrays: dict[str, np.ndarray], name: str) -> Array:
 # --- the bodies -----------------------------------------------------------------------------------------------------
 
 
-def _body_header(body: LearnedBody | AnalyticalBody, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    if isinstance(body, AnalyticalBody):
-        support = body.physics.support
+def _body_header(body: LearnedBody | AnalyticalBody | ExtendedBody, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    if isinstance(body, ExtendedBody):
+        if isinstance(body.base, LearnedBody):
+            arrays["base_outcomes"] = body.base.outcomes  # those of the training rows less the effects
         return {
-            "contact_friction": body.physics.contact_friction,
-            "centre": list(support.centre),
-            "length": support.length,
-            "covariance": body.covariance.tolist(),
+            "base": _body_header(body.base, arrays),
+            "physics": _physics_header(body.physics),
+            "effects": effects_record(body.effects, arrays),
+            "scale": body.scale.tolist(),
         }
+    if isinstance(body, AnalyticalBody):
+        return {**_physics_header(body.physics), "covariance": body.covariance.tolist()}
     for k, regression in enumerate(body.regressions):
         if isinstance(regression, VHGP):
             arrays[f"site_precisions_{k}"] = regression.site_precisions
     scaling = {key: np.asarray(value).tolist() for key, value in vars(body.scaling).items()}
     return {"scaling": scaling, "regressions": [_parameters_header(r) for r in body.regressions]}
+
+
+def _physics_header(physics: AnalyticalPush) -> dict[str, Any]:
+    support = physics.support
+    return {
+        "contact_friction": physics.contact_friction,
+        "centre": list(support.centre),
+        "length": support.length,
+    }
 
 
 def _parameters_header(regression: GaussianProcess | VHGP) -> dict[str, Any]:
@@ -210,10 +223,44 @@ def _parameters_header(regression: GaussianProcess | VHGP) -> dict[str, Any]:
     return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
 
 
-def _analytical_body(header: dict[str, Any], rig: Rig) -> AnalyticalBody:
+def _body(
+    header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
+) -> LearnedBody | AnalyticalBody | ExtendedBody:
+    if "effects" in header:
+        return _extended_body(header, kind, rig, training, arrays)
+    return _base_body(header, kind, rig, training, arrays)
+
+
+def _base_body(
+    header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
+) -> LearnedBody | AnalyticalBody:
+    if kind == "analytical":
+        return _analytical_body(header, rig)
+    return _learned_body(header, kind, rig, training, arrays)
+
+
+def _extended_body(
+    header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
+) -> ExtendedBody:
+    effects, scale = effects_of(header["effects"], arrays), np.array(header["scale"], dtype=np.float64)
+    if scale.shape != (3,) or not np.all(np.isfinite(scale)) or np.any(scale <= 0.0):
+        raise ValueError(f"scale {header['scale']!r}, three finite numbers above 0 are needed")
+    rows = training if kind == "analytical" else replace(training, outcomes=_finite(arrays, "base_outcomes"))
+    base = _base_body(header["base"], kind, rig, rows, arrays)
+    body = ExtendedBody(base, _physics(header["physics"], rig), effects, scale)
+    if missing := [name for name in body.needs if name not in training.covariates]:
+        raise ValueError(f"an effect needs the covariate {missing[0]}, which the training rows do not hold")
+    return body
+
+
+def _physics(header: dict[str, Any], rig: Rig) -> AnalyticalPush:
     x, y = header["centre"]
     support = Support((float(x), float(y)), float(header["length"]))
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius, float(header["contact_friction"]), support)
+    return AnalyticalPush(rig.outline, rig.pusher_radius, float(header["contact_friction"]), support)
+
+
+def _analytical_body(header: dict[str, Any], rig: Rig) -> AnalyticalBody:
+    physics = _physics(header, rig)
     covariance = np.array(header["covariance"], dtype=np.float64)
     np.linalg.cholesky(covariance)  # a damaged covariance must not be served
     return AnalyticalBody(physics, covariance)

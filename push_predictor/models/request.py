@@ -12,6 +12,22 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
+UNITS = {
+    "elapsed_time": "s",
+    "slid_distance": "m",
+    "slider_x": "m",
+    "slider_y": "m",
+    "slider_heading": "rad",
+    "push_heading": "rad",
+    "velocity": "m/s",
+    "angle": "rad",
+    "dwell_time": "s",
+    "time_since_contact": "s",
+    "contact_gap": "m",
+    "normal_force": "N",
+    "tangential_force": "N",
+}  # of the covariates that windows have; a recorded topic's is its sender's
+
 
 def check_request(
     model: PushModel, velocity: float, contact: float, angle: float, duration: float, covariates: Mapping[str, float]
@@ -25,6 +41,7 @@ def check_request(
         and 0.0 < duration < inf
         and low <= duration <= high
         and all(map(isfinite, covariates.values()))
+        and all(name in covariates for name in model.needs)
     ):
         return  # in a microsecond; the rest is for saying what is wrong
     _check(model, np.array([[velocity, contact, angle]]), duration, {k: np.array([v]) for k, v in covariates.items()})
@@ -43,14 +60,21 @@ def _check(
         ("velocity", velocity, velocity > 0.0, "a finite number above 0, in m/s"),
         ("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)"),
         ("angle", angle, np.abs(angle) < np.pi / 2.0, "an angle in (-pi/2, pi/2), in rad"),
-        *((f"covariate {name}", column, np.isfinite(column), "a finite number") for name, column in covariates.items()),
+        *((f"covariate {name}", column, np.isfinite(column), _meaning(name)) for name, column in covariates.items()),
     ]
     for field, column, accepted, meaning in rules:
         bad = np.flatnonzero(~(accepted & np.isfinite(column)))
         if bad.size:
             place = f"{field}[{bad[0]}]" if indexed else field
             raise RequestError(place, float(column[bad[0]]), meaning)
+    for name in model.needs:
+        if name not in covariates:
+            raise RequestError(f"covariate {name}", "missing", f"{_meaning(name)}: {model.name} needs it")
     _check_duration(model, duration)
+
+
+def _meaning(covariate: str) -> str:
+    return f"a finite number, in {UNITS[covariate]}" if covariate in UNITS else "a finite number"
 
 
 def _check_duration(model: PushModel, duration: float) -> None:
@@ -62,6 +86,11 @@ def _check_duration(model: PushModel, duration: float) -> None:
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
-    """The same for the rows of a table, each with its own duration. Raises RequestError."""
+    """The same for the rows of a table, each with its own duration, and the covariates that the model needs of it.
+
+    Raises RequestError.
+    """
     for duration in np.unique(table.duration):
-        check_requests(model, table.inputs[table.duration == duration], float(duration), {})
+        rows = table.take(table.duration == duration)
+        needed = {name: column for name, column in rows.covariates.items() if name in model.needs}
+        check_requests(model, rows.inputs, float(duration), needed)

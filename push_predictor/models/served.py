@@ -7,12 +7,14 @@ every other model is answered by the model itself.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction_table import TooFineError
-from push_predictor.models.push_model import LearnedBody, Prediction, PushModel
+from push_predictor.models.push_model import ExtendedBody, LearnedBody, Prediction, PushModel
 from push_predictor.models.tabulated_domain import TabulatedDomain, tabulated_domain
 from push_predictor.types import Array, BoolArray
 
@@ -57,30 +59,44 @@ class ServedModel:
         """Whether pushes in the domain are answered from a table."""
         return self.domain is not None
 
-    def predict(self, inputs: Array, duration: Array) -> Prediction:
-        """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same."""
+    def predict(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
+        """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same.
+
+        Of an extended model the base is tabulated; the effects are computed and added.
+        """
         if self.domain is None:
-            return self.model.predict(inputs, duration)
+            return self.model.predict(inputs, duration, covariates)
+        prediction, body = self._of_base(self.domain, inputs, duration), self.model.body
+        if not isinstance(body, ExtendedBody):
+            return prediction
+        moments = prediction.mean, prediction.covariance, prediction.process_covariance
+        return Prediction(*body.extended(moments, Push(inputs, duration, covariates or {})), prediction.in_domain)
+
+    def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
+        base = self.model.base
         if len(inputs) == 1:
-            return self.domain.predict_one(inputs[0].tolist()) or self.model.predict(inputs, duration)
-        inside, prediction = self.domain.predict(inputs)
+            return domain.predict_one(inputs[0].tolist()) or base.predict(inputs, duration)
+        inside, prediction = domain.predict(inputs)
         if prediction is not None:
             return prediction
-        exact = self.model.predict(inputs[~inside], duration[~inside])
-        return _merged(inside, self.predict(inputs[inside], duration[inside]), exact) if inside.any() else exact
+        exact = base.predict(inputs[~inside], duration[~inside])
+        if not inside.any():
+            return exact
+        return _merged(inside, self._of_base(domain, inputs[inside], duration[inside]), exact)
 
 
 def serve(model: PushModel) -> ServedModel:
     """A model with a table, where there can be one; takes about a second for a VHGP of 1000 rows."""
-    if not isinstance(model.body, LearnedBody):
+    base = model.base
+    if not isinstance(base.body, LearnedBody):
         return ServedModel(model, "exact: only learnt models have a table")
     how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(model, model.body, refinement)
+            domain = tabulated_domain(base, base.body, refinement)
         except TooFineError as too_fine:
             return ServedModel(model, f"exact: {how}{too_fine}")
-        error = _error(model, domain)
+        error = _error(base, domain)
         if error.accepted:
             return ServedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "

@@ -29,7 +29,7 @@ def answer_push(shelf: ModelShelf, request: Any, response: Any) -> None:
     served = shelf.get(query.model)
     covariates = {name: float(column[0]) for name, column in query.covariates.items()}
     check_request(served.model, request.velocity, request.contact, request.angle, query.duration, covariates)
-    fill_response(response, served.predict(query.inputs, np.array([query.duration])))
+    fill_response(response, served.predict(query.inputs, np.array([query.duration]), query.covariates))
 
 
 def answer_batch(shelf: ModelShelf, request: Any, response: Any) -> None:
@@ -38,8 +38,9 @@ def answer_batch(shelf: ModelShelf, request: Any, response: Any) -> None:
     served = shelf.get(query.model)
     check_requests(served.model, query.inputs, query.duration, query.covariates)
     for start in range(0, len(query.inputs), ROWS_AT_ONCE):
-        inputs = query.inputs[start : start + ROWS_AT_ONCE]
-        extend_batch_response(response, served.predict(inputs, np.full(len(inputs), query.duration)))
+        rows = slice(start, start + ROWS_AT_ONCE)
+        inputs, covariates = query.inputs[rows], {name: column[rows] for name, column in query.covariates.items()}
+        extend_batch_response(response, served.predict(inputs, np.full(len(inputs), query.duration), covariates))
     response.success = True
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
 from push_predictor.models.model_file import is_model_file, load_model
 from push_predictor.models.served import ServedModel, serve
@@ -59,8 +61,8 @@ class ModelShelf:
         path = path.expanduser().resolve()
         served = serve(load_model(path))
         # The first prediction fills what is left of caches; no request should wait for that.
-        training = served.model.training
-        served.predict(training.inputs[:1], training.duration[:1])
+        first = served.model.training.take(np.arange(1))
+        served.predict(first.inputs, first.duration, first.covariates)
         name = name or served.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
@@ -93,7 +95,7 @@ class ModelShelf:
             "surface": model.rig.surface,
             "pushes": len(model.training.pushes),
             "windows": len(model.training),
-            "covariates": "-",  # what a request must bring besides; none of the kinds that exist asks for any
+            "covariates": ",".join(model.needs) or "-",  # what a request must bring besides
             "duration": f"{low:g}" if high - low < 1e-6 else f"{low:g}..{high:g}",
             "file": self._files[name],
         }

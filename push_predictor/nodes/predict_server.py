@@ -1,4 +1,4 @@
-"""The node that serves push models: predict_push, predict_push_batch, list_models, load_model (docs/services.md)."""
+"""The node that serves push models: four services and the action trace_residual (docs/services.md)."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ from rclpy.service_introspection import ServiceIntrospectionState
 from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
 from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.request_log import RequestLog
+from push_predictor.nodes.residual_tracer import ResidualTracer
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server_status import NO_MODEL, server_status
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
@@ -51,6 +53,14 @@ PARAMETERS = (
         read_only=False,
     ),
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
+    Param(
+        "trace_alpha",
+        0.01,
+        "Probability, at most, that trace_residual finds an effect where there is none.",
+        low=1e-6,
+        high=0.5,
+        read_only=False,
+    ),
 )
 Answer: TypeAlias = Callable[[ModelShelf, Any, Any], None]  # fills the response, or raises
 
@@ -69,6 +79,7 @@ class PredictServer(LifecycleNode):
         self._problems: list[str] = []
         self._offered: list[Service] = []
         self._state = "unconfigured"
+        self._tracer = ResidualTracer(self, self._deployed, lambda: float(self.value("trace_alpha")))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(self.value("diagnostics_period"), self._publish_diagnostics, clock=steady)
@@ -81,7 +92,8 @@ class PredictServer(LifecycleNode):
             self.trigger_activate()
 
     def close(self) -> None:
-        """Publish the last counts."""
+        """End a trace, publish the last counts."""
+        self._tracer.close()
         self._publish_diagnostics()
 
     # --- transitions ----------------------------------------------------------------------------------------
@@ -134,6 +146,7 @@ class PredictServer(LifecycleNode):
         return super().on_shutdown(state)
 
     def _give_up(self, state: str) -> None:
+        self._tracer.end(f"the node is {state} now")
         while self._offered:
             self.destroy_service(self._offered.pop())
         self._shelf, self._problems, self._state = ModelShelf(), [], state
@@ -172,6 +185,12 @@ class PredictServer(LifecycleNode):
 
     def _inactive(self, shelf: ModelShelf, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")
+
+    def _deployed(self, name: str) -> PushModel:
+        """The model that a trace is about. Raises RequestError, or InactiveError."""
+        if self._state != "active":
+            self._inactive(self._shelf, None, None)
+        return self._shelf.get(name).model
 
     def _guarded(self, answer: Answer, request: Any, response: Any) -> Any:
         """A callback that raises would end the node, so every failure becomes an answer."""

@@ -15,29 +15,32 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from msg_adapters.alarms import alarm_to_message
 from msg_adapters.diagnostics import diagnostic_array
 from push_predictor.errors import PushPredictorError, RequestError, RigError
+from push_predictor.evaluation.alarm import DEFAULT_RATE, AlarmState, checked_rate
 from push_predictor.models.push_model import Prediction
 from push_predictor.nodes.model_source import ModelSource
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.polled import DeferredTrigger
 from push_predictor.nodes.prediction_client import PredictionClient
+from push_predictor.nodes.push_alarm import PushAlarm as AlarmProcess
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.report_writer import ReportWriter
-from push_predictor.nodes.residual_recorder import write_residuals
 from push_predictor.nodes.runtime import Stop, one_line, run
 from push_predictor.nodes.sensor_inlet import SensorInlet
 from push_predictor.nodes.validation_run import ValidationRun
-from push_predictor.nodes.validator_status import validator_status
+from push_predictor.nodes.validator_status import fired_text, validator_status
 from push_predictor.nodes.window_markers import window_markers
 from push_predictor.recordings.rig import Rig, load_rig, rig_from_json
 from push_predictor.recordings.windows import PushWindow
-from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.msg import PushAlarm, PushResidual
 
 PERIOD = 0.02  # s between two looks at what has arrived
 QUIET = 0.3  # s without samples after which a finished replay has delivered all it will
 CALLER_PATIENCE = 5.0  # s that a caller of ~/finish waits for answers that are missing
 LAST_PATIENCE = 2.0  # s that the end of the process waits for them
+ALARM_PATIENCE = 15.0  # s that the end of a score waits for the alarm about the pushes that were answered
 PARAMETERS = (
     Param("model", "", "The model judged: a model file, or a name that predict_server knows; empty: its default."),
     Param("compare", [""], "Further models judged on the same windows: files or names."),
@@ -53,6 +56,7 @@ PARAMETERS = (
         low=0.0,
         high=3600.0,
     ),
+    Param("false_alarm_rate", DEFAULT_RATE, "Probability, at most, that push_alarm ever comes without a change."),
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )
 
@@ -76,6 +80,7 @@ class PushValidator(Node):
         declare(self, PARAMETERS)
         self._values = values_of(self, PARAMETERS)
         self._stop = stop
+        self._alarm = AlarmProcess(checked_rate(self._values["false_alarm_rate"]), self._on_alarm)
         self._source = ModelSource(self, [self._values["model"], *self._values["compare"]])
         self._rig: Rig | None = load_rig(Path(self._values["rig"]).expanduser()) if self._values["rig"] else None
         self._rig_problem = "" if self._rig else "waiting for the topic rig; or give the parameter rig"
@@ -102,6 +107,7 @@ class PushValidator(Node):
 
     def _speak(self) -> None:
         self._residuals = self.create_publisher(PushResidual, "push_residual", 1000)
+        self._alarms = self.create_publisher(PushAlarm, "push_alarm", LATCHED)
         self._markers = self.create_publisher(MarkerArray, "push_markers", 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
@@ -114,6 +120,7 @@ class PushValidator(Node):
         while not self._closed.wait(0.1) and self._stop.error is None:
             pass
         self._report.stop()
+        self._alarm.stop()
         self._inlet.close()
         if self._failure:
             raise PushPredictorError(self._failure)
@@ -138,6 +145,9 @@ class PushValidator(Node):
     def _work(self) -> None:
         self._inlet.drain()
         self._source.work()
+        if (models := self._source.models()) is not None:
+            self._alarm.prepare(next(iter(models.values())))
+        self._alarm.work()
         if self._ending is None:
             self._collect()
             self._ending = self._due()
@@ -160,7 +170,7 @@ class PushValidator(Node):
             # Reading a recording gives the finder every stream from its beginning, so a score begins with all of them.
             if not (complete or self._closing.is_set() or self._finish.asked()):
                 return
-            self._run = ValidationRun(self._rig, models, self._client, self._show)
+            self._run = ValidationRun(self._rig, models, self._client, self._show, self._alarm, self._output)
             self._open, self._failure = True, ""
         samples = self._inlet.take()
         if self._run is not None and len(samples):
@@ -193,6 +203,10 @@ class PushValidator(Node):
             ending = self._ending = _Ending(min(ending.deadline, monotonic() + LAST_PATIENCE), with_report=False)
         if self._run is None or (self._client.open and monotonic() < ending.deadline):
             return
+        self._run.no_more_answers()
+        patience = 0.0 if self._closing.is_set() else ALARM_PATIENCE
+        if self._alarm.busy and monotonic() < ending.deadline + patience:
+            return
         self._client.forget()
         self._ending, self._finished, self._open = None, False, False
         try:
@@ -209,7 +223,7 @@ class PushValidator(Node):
                 self.get_logger().warning(f"{name}: {missing} windows were never answered by predict_push")
         if self._output is None or (self._written and not len(validation.windows)):
             return  # samples without a push after an earlier end are no reason to replace its result
-        written = [*validation.write(self._output), write_residuals(validation, self._output)]
+        written = finished.write(self._output)
         self._written, self._failure = True, ""
         self.get_logger().info(f"validation written: {', '.join(map(str, written))}")
         if with_report and len(validation.predicted()):
@@ -240,6 +254,10 @@ class PushValidator(Node):
         self._residuals.publish(residual)
         if model == 0 and self._rig is not None and self._markers.get_subscription_count():
             self._markers.publish(window_markers(self._rig, window, prediction, self._values["frame_id"] or "world"))
+
+    def _on_alarm(self, state: AlarmState, end: int) -> None:
+        self.get_logger().warning(fired_text(state))
+        self._alarms.publish(alarm_to_message(state, end, self._values["frame_id"] or "world"))
 
     def _publish_diagnostics(self) -> None:
         problems = [*filter(None, dict.fromkeys([*self._source.problems, self._hindrance(), self._rig_problem]))]

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
+from pathlib import Path
 from time import monotonic
 
 import numpy as np
 
 from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
-from push_predictor.evaluation.live_validation import LiveValidation
+from push_predictor.evaluation.alarm import with_alarm
+from push_predictor.evaluation.live_validation import MAIN_RESULT, LiveValidation
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.push_model import Prediction, PushModel
 from push_predictor.nodes.prediction_client import PredictionClient
-from push_predictor.nodes.residual_recorder import residual_message
+from push_predictor.nodes.push_alarm import PushAlarm
+from push_predictor.nodes.push_gate import PushGate
+from push_predictor.nodes.residual_recorder import residual_message, write_residuals
 from push_predictor.nodes.sensor_inlet import Samples
+from push_predictor.nodes.window_table import WindowTable
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.window_finder import HOLD, WindowFinder
 from push_predictor.recordings.windows import PushWindow
@@ -28,6 +34,7 @@ class ValidationRun:
     """Feed it samples; it asks the client about every window and keeps the score.
 
     models: by the name to ask for, the main one first. show: called for every prediction, with the number of the model.
+    alarm: about the main model. output: where the windows are kept while they come; None: nowhere.
     """
 
     def __init__(
@@ -36,8 +43,14 @@ class ValidationRun:
         models: Mapping[str, PushModel],
         client: PredictionClient,
         show: Callable[[int, PushWindow, Prediction, PushResidual], None],
+        alarm: PushAlarm | None = None,
+        output: Path | None = None,
     ) -> None:
         self.rig = rig
+        self.alarm = alarm
+        self.table = WindowTable(output, rig) if output else None
+        self.table_failure = ""
+        self._gate = PushGate()
         self.validation = LiveValidation(models)
         self.refused = 0
         self.last_refusal = ""
@@ -46,6 +59,8 @@ class ValidationRun:
         self._show = show
         self._newest: dict[str, int] = {}  # stamp (ns) by stream
         self._together = monotonic()
+        if alarm is not None:
+            alarm.begin()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -64,6 +79,25 @@ class ValidationRun:
         """No more samples will come."""
         self._ask_about(self._finder.finish())
 
+    def no_more_answers(self) -> None:
+        """What was not answered will not be: the last pushes go to the alarm."""
+        self._judge(last=True)
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write the JSON, the main model's with the alarm, and the residuals. Raises OSError or RecordingError."""
+        written = [*self.validation.write(folder), write_residuals(self.validation, folder)]
+        if self.alarm is not None:
+            path = folder / MAIN_RESULT
+            temporary = path.with_name(f".{path.name}.part")
+            temporary.write_text(with_alarm(path.read_text(), self.alarm.json))
+            temporary.replace(path)
+        return written
+
+    def _judge(self, last: bool = False) -> None:
+        for push in self._gate.passed(last):
+            if self.alarm is not None:
+                self.alarm.add(push)
+
     def _in_step(self, samples: Samples) -> bool:
         """Are the streams together, or is one of them silent rather than late?
 
@@ -76,12 +110,24 @@ class ValidationRun:
         return monotonic() - self._together > SILENCE
 
     def _ask_about(self, windows: Sequence[PushWindow]) -> None:
+        self._keep(windows)
         for window in windows:
             number = self.validation.add(window)
+            self._gate.found(number, window)
             push = np.array([window.velocity, window.contact, window.angle])
+            known = {name: value for name, value in window.covariates.items() if isfinite(value)}
             for model, name in enumerate(self.validation.names):
-                request = query_to_request(name, push, window.duration)
+                request = query_to_request(name, push, window.duration, known)
                 self._client.ask(request, self._taking(model, number))
+
+    def _keep(self, windows: Sequence[PushWindow]) -> None:
+        """Put the windows on disk; that this fails does not end the measurement."""
+        if self.table is None or self.table_failure:
+            return
+        try:
+            self.table.add(windows, self.validation.windows)
+        except OSError as error:
+            self.table_failure = f"windows are not kept: {error}"
 
     def _taking(self, model: int, number: int) -> Callable[[PredictPush.Response], None]:
         return lambda response: self._take(model, number, response)
@@ -95,9 +141,16 @@ class ValidationRun:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
             self.validation.refuse(model, number, str(error))
+            self._settle(model, number, window, None)
             return
         self.validation.record(model, number, prediction)
+        self._settle(model, number, window, prediction)
         self._show(model, window, prediction, residual)
+
+    def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
+        if model == 0:
+            self._gate.answered(number, window, prediction)
+            self._judge()
 
 
 def _usable(prediction: Prediction) -> Prediction:

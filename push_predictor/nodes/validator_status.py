@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from msg_adapters.diagnostics import Level, diagnostic_status
+from push_predictor.evaluation.alarm import AlarmState
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.prediction_client import PredictionClient
+from push_predictor.nodes.push_alarm import PushAlarm
 from push_predictor.nodes.sensor_inlet import SensorInlet
 from push_predictor.nodes.validation_run import ValidationRun
 
@@ -31,6 +33,7 @@ def validator_status(
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
         values |= {f"streams {kind}": count for kind, count in run.counts.items()} | _scores(run)
+        values |= _alarm(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     return diagnostic_status(name, level, "; ".join(filter(None, [failure, *warnings])) or state, values)
 
 
@@ -38,7 +41,38 @@ def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
     if run.refused:
         found.append(f"{run.refused} predictions refused, the last one: {run.last_refusal}")
+    if run.table_failure:
+        found.append(run.table_failure)
+    if run.alarm is not None:
+        found += _alarm_problems(run.alarm)
     return found
+
+
+def _alarm_problems(alarm: PushAlarm) -> list[str]:
+    found = []
+    if alarm.state is not None and alarm.state.fired:
+        found.append(fired_text(alarm.state))
+    if alarm.left_out:
+        found.append(f"{len(alarm.left_out)} pushes are unknown to the alarm, the last one: {alarm.left_out[-1]}")
+    return found
+
+
+def fired_text(state: AlarmState) -> str:
+    """In words, when the alarm fired and why."""
+    return (
+        f"the model no longer fits what is seen: alarm at push {state.fired_at}, the {state.fired_after}th, evidence "
+        f"10^{state.fired_evidence:.2f} of {state.fired_by}, false at most once in {1.0 / state.false_alarm_rate:g}"
+    )
+
+
+def _alarm(alarm: PushAlarm | None) -> dict[str, object]:
+    if alarm is None or alarm.state is None:
+        return {"alarm": alarm.off or "no push was judged"} if alarm else {}
+    state = alarm.state
+    values: dict[str, object] = {"alarm": "fired" if state.fired else "quiet", "alarm pushes": state.pushes}
+    values |= {"alarm log10 evidence": state.log10_evidence, "alarm strongest": state.strongest}
+    fired = {"alarm push": state.fired_at, "alarm fired log10 evidence": state.fired_evidence}
+    return values | (fired if state.fired else {})
 
 
 def _scores(run: ValidationRun) -> dict[str, object]:

@@ -46,11 +46,19 @@ class Corpus:
     reference: Pair
     notes: tuple[str, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """Short, for a sentence: "simulated", "measured: mit_square/pushes_a"."""
+        return self.origin if self.origin == "simulated" else self.title.partition(",")[0]
+
 
 def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus:
     """Make the training recordings of a plan and cut their windows. keep: a folder that receives the recordings."""
     calls = [(plan, shape, surface, keep) for shape, surface in plan.pairs]
     sets = work.run("training recordings", learning_set, calls)
+    for call in calls:
+        if keep is not None and not (keep / learning_spec(*call[:3]).name).exists():
+            learning_set(*call)  # its windows were read from disk, but the recording has gone since
     speeds = f"{plan.speeds[0] * 1e3:.0f} to {plan.speeds[-1] * 1e3:.0f} mm/s"
     pushes = f"{plan.pushes} pushes ({plan.reference_pushes} of {' on '.join(plan.pairs[0])})"
     title = f"simulated: {len(calls)} recordings of {pushes} at {len(plan.speeds)} speeds, {speeds}"

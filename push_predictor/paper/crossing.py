@@ -1,4 +1,4 @@
-"""The training size at which a learning curve first passes below another."""
+"""The training size from which on a learning curve stays below another."""
 
 from __future__ import annotations
 
@@ -43,28 +43,31 @@ class Crossing:
 
 
 def crossing(sizes: Sequence[int], learnt: Sequence[Sequence[Tally]], baseline: Sequence[Sequence[Tally]]) -> Crossing:
-    """Where the learnt model's total NMSE first passes below the baseline's.
+    """From where on the learnt model's total NMSE stays below the baseline's, up to the last size.
 
     By size, by seed (fold) the tallies of both on the same windows. The interval draws pushes anew, the same for both
     and for all sizes and seeds, and the seeds as well.
     """
     gaps = [_gap(first, second) for first, second in zip(learnt, baseline, strict=True)]
-    value = first_below_zero(sizes, np.array([[gap[0] for gap in gaps]]))[0]
-    draws = first_below_zero(sizes, np.column_stack([gap[1:] for gap in gaps]))
+    value = below_zero_from(sizes, np.array([[gap[0] for gap in gaps]]))[0]
+    draws = below_zero_from(sizes, np.column_stack([gap[1:] for gap in gaps]))
     low, high = np.quantile(draws, [0.025, 0.975], method="inverted_cdf")  # no mean of a size and infinity
     return Crossing(float(value), float(low), float(high), sizes[0], sizes[-1])
 
 
-def first_below_zero(sizes: Sequence[int], gaps: Array) -> Array:
-    """Sizes (d,) at which gaps (d, sizes) first pass below 0, by straight lines in log n; inf where none does."""
+def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
+    """Sizes (d,) from which on gaps (d, sizes) stay below 0, by straight lines in log n.
+
+    The first size where all gaps lie below 0, inf where the last does not.
+    """
     place = np.log(np.asarray(sizes, dtype=np.float64))
-    below = gaps < 0.0
-    k = np.argmax(below, axis=1)
+    after = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1).sum(axis=1)  # how many sizes, from the last back
+    k = np.minimum(len(sizes) - after, len(sizes) - 1)
     rows, before = np.arange(len(gaps)), np.maximum(k - 1, 0)
     ahead, at = gaps[rows, before], gaps[rows, k]
-    share = np.divide(ahead, ahead - at, out=np.ones(len(gaps)), where=k > 0)
+    share = np.divide(ahead, ahead - at, out=np.ones(len(gaps)), where=(k > 0) & (after > 0))
     size = np.exp(place[before] + share * (place[k] - place[before]))
-    return np.where(below.any(axis=1), np.where(k == 0, float(sizes[0]), size), np.inf)
+    return np.where(after > 0, np.where(k == 0, float(sizes[0]), size), np.inf)
 
 
 def _gap(learnt: Sequence[Tally], baseline: Sequence[Tally]) -> Array:

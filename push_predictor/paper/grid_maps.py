@@ -16,6 +16,17 @@ BLOCK = (0.2, 0.4)  # of the side, rad: pushes of one block are drawn together, 
 DRAWS = 400
 ROUNDING = 1e-9
 Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
+Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m): (d,)
+
+
+def told(place: Place) -> str:
+    """A push, for the reader: contact as a fraction of the side, angle in degrees."""
+    return f"c = {place[0]:.2f}, {in_degrees(place[1])}"
+
+
+def in_degrees(angle: float) -> str:
+    """An angle (rad), for the reader."""
+    return f"{np.round(np.degrees(angle)) + 0.0:.0f}°".replace("-", "−")
 
 
 def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:
@@ -53,6 +64,21 @@ def by_blocks(figure: Callable[[Array], Array], weights: Array) -> Estimate:
     """A figure of pushes, a function of weights (d, m) that answers (d,), with the interval of those weights."""
     every = figure(np.ones((1, weights.shape[1])))
     return of_draws(float(every[0]), figure(weights))
+
+
+def mean_of(values: Array, weights: Array) -> Array:
+    """Means (d,) of values (m,), each as often as a row of weights (d, m) says."""
+    return np.asarray(weights @ values / weights.sum(axis=1))
+
+
+def median_of(values: Array, weights: Array) -> Array:
+    """Medians (d,) of values (m,), each as often as a row of whole weights (d, m) says."""
+    order = np.argsort(values)
+    held = np.cumsum(weights[:, order], axis=1)
+    half = 0.5 * held[:, -1:]
+    return np.asarray(
+        0.5 * (values[order][(held >= half).argmax(axis=1)] + values[order][(held > half).argmax(axis=1)])
+    )
 
 
 def unbiased(value: float, draws: Array) -> Estimate:

@@ -63,6 +63,22 @@ def model_maps(work: Work, questions: Sequence[Question]) -> list[ModelMap]:
     return [_map(answer) for answer in work.run("models asked for maps", ask, calls)]
 
 
+def averaged(models: Sequence[ModelMap]) -> ModelMap:
+    """The mean of the maps of models of several draws of training windows; known where all of them are."""
+    mean, sd, process_sd = (
+        np.mean([getattr(m, what) for m in models], axis=0) for what in ("mean", "sd", "process_sd")
+    )
+    return ModelMap(mean, sd, process_sd, None)
+
+
+def together(answers: Sequence[Answer]) -> Answer:
+    """The mean of the answers of such models to the same questions."""
+    mean, sd, process_sd = (
+        np.mean([getattr(a, what) for a in answers], axis=0) for what in ("mean", "sd", "process_sd")
+    )
+    return Answer(mean, sd, process_sd, np.all([a.in_domain for a in answers], axis=0))
+
+
 def _all_rows(study: Study, corpus: Corpus, pair: Pair, kind: str, seed: int) -> Fit:
     whole = Fit(kind, study.plan.size, "none", seed)
     return Fit(kind, min(study.plan.size, trainable(corpus.sets[pair], whole)), "none", seed)

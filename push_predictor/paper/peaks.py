@@ -26,13 +26,15 @@ class Peak:
     places: tuple[Place, ...]
     reach: Estimate
 
-    def near(self, named: Sequence[Place], step: Place) -> bool:
-        """Whether it falls within one step (of the side, rad) of a named place in some of those draws."""
-        return any(
-            abs(c - contact) <= step[0] + ROUNDING and abs(a - angle) <= step[1] + ROUNDING
+    def near(self, named: Sequence[Place], step: Place) -> list[bool]:
+        """Of each place of those draws whether it lies within one step (of the side, rad) of a named one."""
+        return [
+            any(
+                abs(c - contact) <= step[0] + ROUNDING and abs(a - angle) <= step[1] + ROUNDING
+                for contact, angle in named
+            )
             for c, a in self.places
-            for contact, angle in named
-        )
+        ]
 
 
 def peak(

@@ -128,6 +128,9 @@ def repeated_grid(
     places = [(f, a) for f in plan.grid_fractions.tolist() for a in plan.grid_angles.tolist()]
     calls = [(plan, shape, surface, k, f, a, again, keep) for k, (f, a) in enumerate(places)]
     cells = work.run(f"repeated pushes on {surface}", repeat_push, calls)
+    for call in calls:
+        if keep is not None and not (keep / grid_spec(*call[:-1]).name).exists():
+            repeat_push(*call)  # its windows were read from disk, but the recording has gone since
     rig = simulated_rig(grid_spec(plan, shape, surface, 0, 0.5, 0.0, 1))
     return RepeatedGrid(shape, surface, rig, plan.grid_fractions, plan.grid_angles, tuple(cells))
 

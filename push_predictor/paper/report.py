@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -34,7 +34,7 @@ from push_predictor.paper.corpus import simulated_corpus
 from push_predictor.paper.measured import measured_corpora
 from push_predictor.paper.plan import Plan
 from push_predictor.paper.repetitions import repeated_grid
-from push_predictor.paper.section import Section, Table
+from push_predictor.paper.section import Origin, Section, Table
 from push_predictor.paper.study import Study
 from push_predictor.paper.work import Work, fingerprint
 
@@ -135,13 +135,23 @@ def _page(plan: Plan, study: Study, sections: list[Section], made: Mapping[str, 
         *([html.paragraph(QUICK_WARNING, "warning")] if plan.name == "quick" else []),
         *map(html.paragraph, HOW_TO_READ),
         html.heading("What holds here"),
-        html.verdicts([(s.key, s.title, f.claim, f.verdict) for s in sections for f in s.findings]),
+        *_summary(sections),
     ]
     for section in sections:
         parts += _section_html(section)
     facts = {name: str(value) for name, value in made.items()} | {"plan": plan.name, "seed": str(plan.seed)}
     parts += [html.heading("How this was made"), html.definitions(facts)]
     return html.page("Planar pushing: the paper, claim by claim", parts)
+
+
+def _summary(sections: Sequence[Section]) -> list[str]:
+    """What the paper claims, and what is asked beyond it, in a table each."""
+    heads: dict[Origin, str] = {"paper": "claim of the paper", "beyond the paper": "asked beyond the paper"}
+    tables = []
+    for origin, head in heads.items():
+        rows = [(s.key, s.title, f.claim, f.verdict) for s in sections for f in s.findings if f.origin == origin]
+        tables += [html.verdicts(head, rows)] if rows else []
+    return tables
 
 
 QUICK_WARNING = (
@@ -151,7 +161,7 @@ QUICK_WARNING = (
 
 
 def _origin(study: Study) -> str:
-    measured = "; ".join(corpus.title for corpus in study.measured)
+    measured = "; ".join(corpus.name for corpus in study.measured)
     return study.simulated.title + (
         f"; and {measured}" if measured else "; no measured data were given (--data FOLDER)"
     )

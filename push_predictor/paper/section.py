@@ -9,18 +9,21 @@ from typing import Any, Literal
 from push_predictor.evaluation.figures.canvas import Picture
 
 Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
+Origin = Literal["paper", "beyond the paper"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim of the paper in our words, whether it holds here, and the sentence with number and interval for it.
+    """A claim in our words, whether it holds here, and the sentence with number and interval for it.
 
-    The verdict follows from the numbers by a rule that the sentence lets the reader see.
+    The verdict follows from the numbers by a rule that the sentence lets the reader see. origin: who claims it; what
+    the paper does not say is ours to ask.
     """
 
     claim: str
     verdict: Verdict
     sentence: str
+    origin: Origin = "paper"
 
 
 @dataclass(frozen=True)

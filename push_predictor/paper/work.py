@@ -12,11 +12,21 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+import scipy
+
 import push_predictor
 from push_predictor.errors import PushPredictorError
 
 Result = TypeVar("Result")
-LOOKS = ("html.py", "report.py", "section.py", "report_tables.py")  # they change how results look, not what they are
+# They change how results look, not what they are.
+LOOKS = (
+    "evaluation/html.py",
+    "evaluation/report.py",
+    "evaluation/report_tables.py",
+    "paper/report.py",
+    "paper/section.py",
+)
 NO_RESULTS = ("figures", "nodes", "commands", "claims", "residuals")
 
 
@@ -64,12 +74,12 @@ class Work:
 
 @cache
 def fingerprint() -> str:
-    """A digest of the sources on which results depend."""
+    """A digest of the sources on which results depend, and of the versions of numpy and scipy."""
     root = Path(push_predictor.__file__).parent
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(f"numpy {np.__version__}, scipy {scipy.__version__}".encode())
     for path in sorted(root.rglob("*.py")):
         inside = path.relative_to(root)
-        if path.name not in LOOKS and not set(inside.parts) & set(NO_RESULTS):
+        if inside.as_posix() not in LOOKS and not set(inside.parts) & set(NO_RESULTS):
             digest.update(inside.as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

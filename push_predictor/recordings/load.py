@@ -28,7 +28,8 @@ def load_data(paths: Sequence[Path], rig: Rig | None = None, options: WindowOpti
     tables = [_load(Path(path), rig, options) for path in paths]
     if paths and not any(map(len, tables)):
         raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
-    return concatenate([table for table in _distinct(paths, tables) if len(table)])
+    names = [Path(path).name for path in paths]
+    return concatenate([table for table in distinct_pushes(names, tables) if len(table)])
 
 
 def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
@@ -47,6 +48,16 @@ def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
         if _bodies(rig) != _bodies(first[1]):
             raise RigError(f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})")
     return first[1]
+
+
+def distinct_pushes(names: Sequence[str], tables: Sequence[PushTable]) -> list[PushTable]:
+    """The tables, with their names before every push_id if one means different pushes in two of them."""
+    seen: dict[str, bytes] = {}
+    for table in tables:
+        for push, rows in _rows_by_push(table).items():
+            if seen.setdefault(push, rows) != rows:
+                return [_prefixed(table, name) for name, table in zip(names, tables, strict=True)]
+    return list(tables)
 
 
 def _load(path: Path, rig: Rig | None, options: WindowOptions) -> PushTable:
@@ -71,16 +82,6 @@ def _rig_of(path: Path) -> Rig:
 def _bodies(rig: Rig) -> tuple[str | None, ...]:
     record = rig.to_record()
     return tuple(record.get(key) for key in ("outline", "shape_parameters", "pusher_radius"))
-
-
-def _distinct(paths: Sequence[Path], tables: list[PushTable]) -> list[PushTable]:
-    """The tables, renamed by path where a push_id means different pushes."""
-    seen: dict[str, bytes] = {}
-    for table in tables:
-        for push, rows in _rows_by_push(table).items():
-            if seen.setdefault(push, rows) != rows:
-                return [_prefixed(table, Path(path).name) for path, table in zip(paths, tables, strict=True)]
-    return tables
 
 
 def _rows_by_push(table: PushTable) -> dict[str, bytes]:

@@ -5,14 +5,16 @@ other.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.simulation.changes import Conditions
 from push_predictor.simulation.dynamics import Motion, run, steps_of
 from push_predictor.simulation.physics import GRAVITY
-from push_predictor.simulation.pushes import PusherPath, pusher_path
+from push_predictor.simulation.pushes import HOLD, PusherPath, pusher_path
 from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, physics_of, start_poses
+from push_predictor.simulation.timeline import LOWER_TIME, RESET_TIME
 from push_predictor.types import Array, IntArray
 
 LOCKSTEP = 256  # pushes; their arrays stay in the cache
@@ -33,14 +35,41 @@ def run_pushes(spec: SimulationSpec) -> Iterator[Batch]:
     """Simulate all pushes of a spec. Raises RigError for an unknown shape or surface."""
     start = start_poses(spec)
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, start, spec.acceleration)
-    physics = physics_of(spec, float(np.max(path.length)))
-    end = _end_times(path, spec.table.friction)
+    end = end_times(path, spec.table.friction)
+    conditions = conditions_of(spec, start, path, end)
+    physics = replace(physics_of(spec, float(np.max(path.length))), conditions=conditions)
     order = np.argsort(end / steps_of(path), kind="stable")
     for rows in np.split(order, range(LOCKSTEP, len(order), LOCKSTEP)):
         lines = path.take(rows)
         yield Batch(rows, run(physics.take(rows), lines, start[rows], end[rows]), lines, end[rows])
 
 
-def _end_times(path: PusherPath, friction: float) -> Array:
+def end_times(path: PusherPath, friction: float) -> Array:
     """When pushes (n,) are over, s: the tip is back and a slider that flew off has come to rest."""
     return np.asarray(path.total_time + SETTLE + path.speed / (0.7 * friction * GRAVITY))
+
+
+def conditions_of(spec: SimulationSpec, start: Array, path: PusherPath, end: Array) -> Conditions:
+    """Under which conditions the pushes of a spec begin: starts (n, 3), tips' paths, ends (n,) s of each."""
+    plan, n = spec.pushes, len(spec.pushes)
+    pause = np.zeros(n) if spec.pauses is None else spec.pauses
+    between = pause + RESET_TIME + 2.0 * LOWER_TIME
+    begin = np.cumsum(between) + np.concatenate([[0.0], np.cumsum(end)[:-1]]) - LOWER_TIME
+    approach = path.length - plan.travel
+    after_contact = np.concatenate([[0.0], (end - path.push_time - HOLD)[:-1]])
+    values = {
+        "push_index": np.arange(n, dtype=np.float64),
+        "elapsed_time": begin,
+        "slid_distance": np.cumsum(plan.travel) - plan.travel,
+        "dwell_time": np.where(np.arange(n) > 0, after_contact + between + approach / plan.speed, 0.0),
+        "approach": approach,
+        "velocity": plan.speed,
+        "contact": plan.contact,
+        "angle": plan.angle,
+        "slider_x": start[:, 0],
+        "slider_y": start[:, 1],
+        "slider_heading": start[:, 2],
+        "push_heading": np.arctan2(path.direction[:, 1], path.direction[:, 0]),
+    }
+    topics = {name: topic.at(begin) for name, topic in spec.topics.items()}
+    return Conditions(np.arange(n), {**values, **topics})

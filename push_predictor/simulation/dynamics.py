@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.simulation.physics import Physics
+from push_predictor.simulation.physics import Acting, Physics
 from push_predictor.simulation.pushes import PusherPath
 from push_predictor.types import Array
 
@@ -56,11 +56,22 @@ class _Drag:
 
 
 @dataclass(frozen=True, eq=False)
+class _DirectedDrag:
+    """A as it is where friction depends on direction: matrix (n, 3, 3)."""
+
+    matrix: Array
+
+    def solve(self, b: Array) -> Array:
+        """A^-1 b for b (n, 3)."""
+        return np.asarray(np.linalg.solve(self.matrix, b[:, :, None])[:, :, 0])
+
+
+@dataclass(frozen=True, eq=False)
 class _Contact:
     """Contact geometry of a step.
 
     normal, tangent (n, 3): rows of the Jacobian; gap (n,) m; drive_normal, drive_tangent (n,) m/s: the tip's velocity
-    along the two; outward (n, 2): the outward normal in the world.
+    along the two; outward (n, 2): the outward normal in the world; place (n,): fraction of the perimeter.
     """
 
     normal: Array
@@ -69,6 +80,7 @@ class _Contact:
     drive_normal: Array
     drive_tangent: Array
     outward: Array
+    place: Array
 
 
 def steps_of(path: PusherPath) -> Array:
@@ -110,12 +122,16 @@ def _advance(
     """New velocities (n, 3) and the wrench on the tip (n, 3) after a step with the tip at velocity drive (n, 2)."""
     contact = _contact(physics, pose, tip, drive)
     arms = _arms(physics.support, pose[:, 2])
-    grip, friction = physics.grip(pose[:, :1] + arms[0], pose[:, 1:2] + arms[1], way), physics.friction_at_rod(way)
+    points = pose[:, :1] + arms[0], pose[:, 1:2] + arms[1]
+    acting = physics.acting(pose, velocity, contact.place, way, points)
     momentum = velocity * np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
+    if acting.pull is not None:
+        momentum = momentum + dt[:, None] * acting.pull
+    drag_of = _drag if acting.grain is None and acting.viscosity is None else _directed_drag
     new = velocity
     for _ in range(DRAG_ITERATIONS):
-        drag = _drag(physics, grip, arms, new, dt)
-        new, push, rub = _with_contact(drag, momentum, contact, friction, dt)
+        drag = drag_of(physics, acting, arms, new, dt)
+        new, push, rub = _with_contact(drag, momentum, contact, acting.friction, dt)
     across = np.stack([-contact.outward[:, 1], contact.outward[:, 0]], axis=1)
     force = (push[:, None] * contact.outward - rub[:, None] * across) / dt[:, None]
     return new, np.column_stack([force, physics.radius * rub / dt])
@@ -126,11 +142,11 @@ def _arms(support: Array, heading: Array) -> tuple[Array, Array]:
     return cos * support[:, 0] - sin * support[:, 1], sin * support[:, 0] + cos * support[:, 1]
 
 
-def _drag(physics: Physics, grip: Array, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
+def _drag(physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
     x, y = arms
     vx = velocity[:, :1] - velocity[:, 2:] * y
     vy = velocity[:, 1:2] + velocity[:, 2:] * x
-    rate = grip / np.sqrt(vx * vx + vy * vy + REST_SPEED**2)
+    rate = acting.grip / np.sqrt(vx * vx + vy * vy + REST_SPEED**2)
     along_x, along_y = rate * x, rate * y
     turn = np.sum(along_x * x + along_y * y, axis=1)
     return _Drag(
@@ -139,6 +155,34 @@ def _drag(physics: Physics, grip: Array, arms: tuple[Array, Array], velocity: Ar
         dt * np.sum(along_x, axis=1),
         physics.inertia + dt * turn,
     )
+
+
+def _directed_drag(
+    physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity: Array, dt: Array
+) -> _DirectedDrag:
+    """The same with a grain and with viscosity: a point at velocity v resists with W^-1 v grip / sqrt(v' W^-1 v)."""
+    x, y = arms
+    vx = velocity[:, :1] - velocity[:, 2:] * y
+    vy = velocity[:, 1:2] + velocity[:, 2:] * x
+    xx, xy, yy = (element[:, None] for element in _inverse(acting.grain, len(x)))
+    rate = acting.grip / np.sqrt(xx * vx * vx + 2.0 * xy * vx * vy + yy * vy * vy + REST_SPEED**2)
+    share = np.zeros_like(rate) if acting.viscosity is None else acting.grip / acting.grip.sum(axis=1, keepdims=True)
+    viscous = share if acting.viscosity is None else share * acting.viscosity[:, None]
+    pxx, pxy, pyy = rate * xx + viscous, rate * xy, rate * yy + viscous
+    ex, ey = pxy * x - pxx * y, pyy * x - pxy * y
+    upper = [pxx, pxy, ex, pxy, pyy, ey, ex, ey, ey * x - ex * y]
+    resistance = np.stack([np.sum(element, axis=1) for element in upper], axis=1).reshape(-1, 3, 3)
+    inertia = np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
+    return _DirectedDrag(dt[:, None, None] * resistance + inertia[:, :, None] * np.eye(3))
+
+
+def _inverse(grain: Array | None, n: int) -> tuple[Array, Array, Array]:
+    """Elements xx, xy, yy (n,) of W^-1."""
+    if grain is None:
+        return np.ones(n), np.zeros(n), np.ones(n)
+    a, b = grain.T
+    determinant = 1.0 - a * a - b * b
+    return (1.0 - a) / determinant, -b / determinant, (1.0 + a) / determinant
 
 
 def _contact(physics: Physics, pose: Array, tip: Array, drive: Array) -> _Contact:
@@ -152,11 +196,12 @@ def _contact(physics: Physics, pose: Array, tip: Array, drive: Array) -> _Contac
         drive_normal=drive[:, 0] * nx + drive[:, 1] * ny,
         drive_tangent=drive[:, 1] * nx - drive[:, 0] * ny,
         outward=outward,
+        place=nearest.contact,
     )
 
 
 def _with_contact(
-    drag: _Drag, momentum: Array, contact: _Contact, friction: Array, dt: Array
+    drag: _Drag | _DirectedDrag, momentum: Array, contact: _Contact, friction: Array, dt: Array
 ) -> tuple[Array, Array, Array]:
     """Velocities (n, 3) with the contact's impulses: push (n,) >= 0 along -normal and rub (n,) along the tangent.
 

@@ -6,19 +6,20 @@ import hashlib
 
 import numpy as np
 
-from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.simulation.batches import Batch, run_pushes
 from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import PushPlan, grid_pushes, random_pushes
 from push_predictor.simulation.sensors import (
     Sensors,
     feel_wrench,
+    record_topic,
     surface_temperature,
     track_pusher,
     track_slider,
 )
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
-from push_predictor.simulation.timeline import PushMotion, run_in_turn
+from push_predictor.simulation.timeline import PushMotion, Truth, run_in_turn
 
 __all__ = ["PushPlan", "Sensors", "SimulationSpec", "grid_pushes", "push_outcomes", "random_pushes", "simulate"]
 
@@ -29,16 +30,23 @@ FIRST_STAMP, STAMP_RANGE = 1_500_000_000, 10**8  # s since 1970
 def simulate(spec: SimulationSpec) -> Recording:
     """Make the pushes of a spec and record them. Raises RigError for an unknown shape or surface."""
     motions = {row: _motion(batch, i) for batch in run_pushes(spec) for i, row in enumerate(batch.rows.tolist())}
-    truth = run_in_turn([motions[row] for row in range(len(spec.pushes))])
+    truth = run_in_turn([motions[row] for row in range(len(spec.pushes))], spec.pauses)
     epoch = _epoch(spec)
     return Recording(
         name=spec.name,
         rig=simulated_rig(spec),
-        slider=track_slider(truth, spec.sensors, epoch, spec.rng(10)),
-        pusher=track_pusher(truth, spec.sensors, epoch, spec.rng(11)),
-        wrench=feel_wrench(truth, spec.sensors, epoch, spec.rng(12)),
-        scalars={TEMPERATURE_TOPIC: surface_temperature(truth, epoch, spec.rng(13))},
+        slider=track_slider(truth, spec.sensors, epoch, spec.rng(10), spec.faults),
+        pusher=track_pusher(truth, spec.sensors, epoch, spec.rng(11), spec.faults),
+        wrench=feel_wrench(truth, spec.sensors, epoch, spec.rng(12), spec.faults),
+        scalars=_scalars(spec, truth, epoch),
     )
+
+
+def _scalars(spec: SimulationSpec, truth: Truth, epoch: int) -> dict[str, ScalarStream]:
+    """The scalar topics; the temperature comes by itself where the spec does not give one."""
+    own = {TEMPERATURE_TOPIC: surface_temperature(truth, epoch, spec.rng(13))}
+    given = [(name, spec.topics[name], spec.rng(14 + k)) for k, name in enumerate(sorted(spec.topics))]
+    return own | {name: record_topic(topic, truth, epoch, rng) for name, topic, rng in given}
 
 
 def _motion(batch: Batch, i: int) -> PushMotion:

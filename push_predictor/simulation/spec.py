@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from push_predictor.recordings.rig import Rig
+from push_predictor.simulation.changes import PLAIN, Changes, Topic
 from push_predictor.simulation.physics import Physics
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.scatter import Scatter, knots_for, mixed
-from push_predictor.simulation.sensors import Sensors
+from push_predictor.simulation.sensors import FAULTLESS, Faults, Sensors
 from push_predictor.simulation.slider import (
     Slider,
     built_shares,
@@ -36,6 +38,8 @@ class SimulationSpec:
     them.
     contact_friction: mean coefficient. acceleration: the robot's, m/s^2. place_spread (m), turn_spread (rad):
     standard deviations of where the slider is put before a push.
+    changes: what acts beside the plain rig; faults: of the measurement. topics: scalars recorded beside the pushes, by
+    name; pauses (n,): s that the rig waits before each push, none if None.
     """
 
     shape: str | Slider
@@ -50,6 +54,10 @@ class SimulationSpec:
     place_spread: float = PLACE_SPREAD
     turn_spread: float = TURN_SPREAD
     sensors: Sensors = field(default_factory=Sensors)
+    changes: Changes = PLAIN
+    faults: Faults = FAULTLESS
+    topics: Mapping[str, Topic] = field(default_factory=dict)
+    pauses: Array | None = None
 
     @property
     def slider(self) -> Slider:
@@ -90,7 +98,7 @@ def physics_of(spec: SimulationSpec, length: float) -> Physics:
     return Physics(
         outline=slider.outline,
         radius=PUSHER_RADIUS,
-        mass=np.full(n, slider.mass),
+        mass=np.full(n, slider.mass + spec.changes.added_mass),
         inertia=np.full(n, slider.inertia),
         support=points,
         shares=np.tile(built_shares(points, spec.slider_seed), (n, 1)),
@@ -98,6 +106,7 @@ def physics_of(spec: SimulationSpec, length: float) -> Physics:
         surface=friction_field(spec.table, spec.surface_seed),
         pressure=_pressure(spec, points, knots_for(length)),
         rubbing=_rubbing(spec, knots_for(length)),
+        changes=spec.changes,
     )
 
 

@@ -46,13 +46,13 @@ class Truth:
         return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
 
 
-def run_in_turn(pushes: Sequence[PushMotion]) -> Truth:
-    """String pushes together with the phases between them."""
+def run_in_turn(pushes: Sequence[PushMotion], pauses: Array | None = None) -> Truth:
+    """String pushes together with the phases between them; pauses (n,): s that the resets take longer."""
     parts: list[tuple[Array, Array, Array, Array]] = []
     clock, before = 0.0, pushes[0]
-    for push in pushes:
+    for i, push in enumerate(pushes):
         for phase in (
-            _reset(before, push),
+            _reset(before, push, RESET_TIME if pauses is None else RESET_TIME + float(pauses[i])),
             _vertical(push, 0, LIFTED, DOWN),
             _contact_phase(push),
             _vertical(push, -1, DOWN, LIFTED),
@@ -63,13 +63,13 @@ def run_in_turn(pushes: Sequence[PushMotion]) -> Truth:
     return Truth(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _reset(before: PushMotion, push: PushMotion) -> tuple[Array, Array, Array, Array]:
+def _reset(before: PushMotion, push: PushMotion, lasts: float) -> tuple[Array, Array, Array, Array]:
     share = np.linspace(0.0, 1.0, 31)
     tip = before.pusher[-1] + _eased(share)[:, None] * (push.pusher[0] - before.pusher[-1])
     turn = np.concatenate([[0.0, 0.0], [_shorter_turn(push.slider[0, 2] - before.slider[-1, 2])]])
     way = np.concatenate([push.slider[0, :2] - before.slider[-1, :2], [0.0]]) + turn
     slider = push.slider[0] - way + _eased(np.clip(3.0 * share - 1.0, 0.0, 1.0))[:, None] * way
-    return share * RESET_TIME, slider, _with_height(tip, np.full(len(share), LIFTED)), np.zeros((len(share), 3))
+    return share * lasts, slider, _with_height(tip, np.full(len(share), LIFTED)), np.zeros((len(share), 3))
 
 
 def _vertical(push: PushMotion, end: int, low: float, high: float) -> tuple[Array, Array, Array, Array]:

@@ -34,7 +34,7 @@ class Calibrated:
     @property
     def name(self) -> str:
         """Short, for a claim."""
-        return f"{self.corpus.origin}, {' on '.join(self.corpus.reference)}"
+        return f"{self.corpus.name}, {' on '.join(self.corpus.reference)}"
 
     def windows(self, split: SplitName) -> str:
         """How much was judged, in words."""

@@ -53,7 +53,7 @@ def _part(study: Study, number: int, corpus: Corpus) -> Section:
     """All of one corpus; title names it in the JSON."""
     found, title = calibrated(study, corpus), f"{number}: {corpus.title}"
     if found is None:
-        note = f"{corpus.title}: the reference set has too few windows for any size of the plan; no calibration."
+        note = f"{corpus.name}: the reference set has too few windows for any size of the plan; no calibration."
         return Section("", title, (), notes=(note,))
     groups: tuple[GroupCoverage, ...] = ()
     if corpus.origin == "simulated":
@@ -122,7 +122,7 @@ def _what(found: Calibrated) -> str:
     """What every caption tells: set, size, splits, how much was judged."""
     splits = "; ".join(f"{s}: {SPLIT_WORDS[s]}, {found.windows(s)}" for s in SPLITS)
     where = " on ".join(found.corpus.reference)
-    return f"{found.corpus.title}; reference set {where}, {found.size} training windows. {splits}."
+    return f"Pushes: {found.corpus.name}; reference set {where}, {found.size} training windows. {splits}."
 
 
 def _pit_picture(study: Study, number: int, found: Calibrated) -> Picture:
@@ -139,7 +139,7 @@ def _pit_picture(study: Study, number: int, found: Calibrated) -> Picture:
 
 def _speed_picture(study: Study, found: Calibrated, groups: tuple[GroupCoverage, ...]) -> Picture:
     models = {model: [group.models[model] for group in groups] for model in groups[0].models}
-    names = [f"{group.name}\n{group.span}" for group in groups]
+    names = [f"{group.name}\n{group.span.removesuffix(' mm/s')}" for group in groups]
     path = draw(study.out / "coverage_by_speed.png", (9.0, 3.6), lambda figure: paint_by_speed(figure, names, models))
     counts = ", ".join(f"{group.windows} {group.name} windows of {group.pushes} pushes" for group in groups)
     return Picture(

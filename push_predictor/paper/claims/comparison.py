@@ -64,7 +64,7 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
     found = curves(study, corpus, [corpus.reference], KINDS)
     sizes = {split: common_sizes(found, corpus, split) for split in SPLITS}
     if not all(sizes.values()):
-        return Section("", "", (), notes=(f"{corpus.title}: too few windows to compare models.",))
+        return Section("", "", (), notes=(f"{corpus.name}: too few windows to compare models.",))
     last = {split: max([n for n in sizes[split] if n <= study.plan.size]) for split in SPLITS}
     where = crossings_of(corpus, found, sizes)
     findings = (
@@ -103,7 +103,7 @@ def _table(corpus: Corpus, found: Curves, split: SplitName, n: int) -> Table:
             gaps = [difference_by_push(tallies[a], tallies[b], figure).cell(form) for a, b in PAIRS_OF_KINDS]
             rows.append((f"{label}, {name}", *cells, *gaps))
     caption = (
-        f"{_pair(corpus)}, n = {n}, {SPLIT_WORDS[split]}. {corpus.title}; {len(tallies['gp'].windows)} pushes judged, "
+        f"{_pair(corpus)}, n = {n}, {SPLIT_WORDS[split]}. Pushes: {corpus.name}; {len(tallies['gp'].windows)} judged, "
         "interval by drawing whole pushes anew, differences of the same pushes. NLPD in SI units; the analytical "
         "model's is that of a Gaussian with the covariance of its training residuals."
     )
@@ -119,7 +119,7 @@ def _beside_paper(corpus: Corpus, found: Curves, n: int) -> Table:
         ours = [_shifted(by_push(tallies[kind], output_figure(measure, None)), shift).cell() for kind in KINDS]
         rows.append((label, *PAPER[label[:4]], *ours))
     caption = (
-        f"The paper's table, and the same from: {corpus.title}; {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
+        f"The paper's table, and the same from: {corpus.name}; {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
         f"{len(tallies['gp'].windows)} pushes, interval by push. What differs: the paper learns from the MIT push data "
         "set, and names neither test set, split, size nor units of its table; its NLPD are in the range that mm and "
         "rad give, so ours are told in these here (SI + 13.8155)."
@@ -135,8 +135,8 @@ def _shifted(estimate: Estimate, shift: float) -> Estimate:
 def _crossing_table(corpus: Corpus, where: Mapping[SplitName, Crossings]) -> Table:
     rows = tuple((NAMES[kind], *(where[split][kind].cell() for split in SPLITS)) for kind in KINDS[1:])
     caption = (
-        f"Training windows at which the total NMSE first passes below the analytical model's, linear in log n; "
-        f"interval by drawing pushes and seeds anew. {corpus.title}, {_pair(corpus)}. The paper: about 100."
+        f"Training windows from which on the total NMSE stays below the analytical model's, linear in log n; "
+        f"interval by drawing pushes and seeds anew. Pushes: {corpus.name}, {_pair(corpus)}. The paper: about 100."
     )
     return Table(caption, ("", *(SPLIT_WORDS[split] for split in SPLITS)), rows)
 
@@ -144,13 +144,18 @@ def _crossing_table(corpus: Corpus, where: Mapping[SplitName, Crossings]) -> Tab
 def _cost(corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ...]]) -> Table:
     rows = []
     for n in sizes["push"]:
-        cpu = [over_seeds([s.cpu for s in found.cells[corpus.reference, kind, "push", n]]) for kind in KINDS]
-        rows.append((str(n), *(c.cell(".3g") for c in cpu), f"{cpu[2].value / cpu[1].value:.1f}"))
+        cpu = [np.array([s.cpu for s in found.cells[corpus.reference, kind, "push", n]]) for kind in KINDS]
+        ratio = np.median(cpu[2]) / max(np.median(cpu[1]), 1e-9)
+        rows.append((str(n), *(_median_and_range(seconds) for seconds in cpu), f"{ratio:.1f}"))
     caption = (
-        f"CPU time of one training, three outputs, s: mean over folds with its interval. {corpus.title}. Other fits "
-        "ran beside these; the VHGP starts from a GP, whose fit is counted."
+        f"CPU time of one training, three outputs, s: median over folds, beneath it the range. Pushes: {corpus.name}. "
+        "Other fits ran beside these; the VHGP starts from a GP, whose fit is counted."
     )
     return Table(caption, ("n", *(NAMES[kind] for kind in KINDS), "VHGP / GP"), tuple(rows))
+
+
+def _median_and_range(seconds: Array) -> str:
+    return f"{np.median(seconds):.3g}\n{seconds.min():.3g} to {seconds.max():.3g}"
 
 
 def _picture(
@@ -173,8 +178,9 @@ def _picture(
     draw(path, (7.4, 6.4), lambda figure: paint_panels(figure, rows))
     caption = (
         f"Three models over the training size, {_pair(corpus)}. Bands: 95 % intervals by push. Marks at the foot: "
-        "where GP and VHGP first beat the analytical model, with interval. Above: whole pushes left out; below: random "
-        f"split. {corpus.title}."
+        "from where on GP and VHGP beat the analytical model, with interval (pointing right: beyond the last size); a "
+        "triangle at the top marks a value beyond the axis. Above: whole pushes left out; below: random split. "
+        f"Pushes: {corpus.name}."
     )
     return Picture(path, "NMSE and NLPD of analytical model, GP and VHGP over training size", caption)
 
@@ -201,7 +207,7 @@ def _pair(corpus: Corpus) -> str:
 def _notes(study: Study, corpus: Corpus, sizes: Mapping[SplitName, tuple[int, ...]]) -> tuple[str, ...]:
     planned = {*study.plan.sizes, *((study.plan.largest,) if study.plan.largest else ())}
     notes = [
-        f"{corpus.title}, {SPLIT_WORDS[split]}: n = {', '.join(map(str, missing))} is more than {_pair(corpus)} holds."
+        f"{corpus.name}, {SPLIT_WORDS[split]}: n = {', '.join(map(str, missing))} is more than {_pair(corpus)} holds."
         for split in SPLITS
         if (missing := sorted(planned - set(sizes[split])))
     ]

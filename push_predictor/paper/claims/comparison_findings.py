@@ -22,7 +22,8 @@ from push_predictor.paper.fits import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor.paper.section import Finding, Verdict
 
 Crossings = Mapping[str, Crossing]  # by kind
-PAPER_SIZE = 100  # training windows from which the paper sees both learnt models ahead
+PAPER_SIZE = 100  # training windows from about which on the paper sees both learnt models ahead
+ABOUT = 150  # what "about" may mean
 SIMILAR = 0.10  # of the GP's NMSE
 SI_TO_MM = float(2.0 * np.log(1000.0))  # NLPD of two lengths in mm less that in m
 LEARNT = {"gp": "GP", "vhgp": "VHGP"}
@@ -31,7 +32,7 @@ LEARNT = {"gp": "GP", "vhgp": "VHGP"}
 def crossings_of(
     corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ...]]
 ) -> Mapping[SplitName, Crossings]:
-    """Where GP and VHGP first beat the analytical model, on each split."""
+    """From where on GP and VHGP beat the analytical model, on each split."""
 
     def tallies(kind: str, split: SplitName) -> list[list[Tally]]:
         cells = [found.cells[corpus.reference, kind, split, n] for n in sizes[split]]
@@ -47,12 +48,13 @@ def early(corpus: Corpus, where: Crossings) -> Finding:
     """Both learnt models beat the analytical one from about 100 windows."""
     told = "; ".join(f"{LEARNT[kind]} {at.text()}" for kind, at in where.items())
     sentence = (
-        f"Training windows at which the NMSE first passes below the analytical model's: {told}; {SPLIT_WORDS['push']}, "
-        f"{_set(corpus)}, interval by drawing pushes and folds anew. Holds if both intervals end at or before "
-        f"{PAPER_SIZE}, does not hold if both begin after it, in part if one of the two ends in time."
+        f"Training windows from which on the NMSE stays below the analytical model's: {told}; {SPLIT_WORDS['push']}, "
+        f"{_set(corpus)}, interval by drawing pushes and folds anew. About {PAPER_SIZE} means up to {ABOUT}: holds if "
+        "both intervals end there or before, does not hold if both begin after it, in part if one of the two ends in "
+        "time."
     )
     return Finding(
-        f"GP and VHGP beat the analytical model from about 100 samples ({corpus.origin})", _in_time(where), sentence
+        f"GP and VHGP beat the analytical model from about 100 samples ({corpus.name})", _in_time(where), sentence
     )
 
 
@@ -64,9 +66,7 @@ def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"NMSE less the analytical model's at n = {n}: {told} (paper: −0.34; −0.35); {_how(corpus, found, n)}. Holds "
         "if both intervals lie below 0, does not hold if both lie above, in part if one lies below."
     )
-    return Finding(
-        f"The learnt models predict better than the analytical one ({corpus.origin})", _below(gaps), sentence
-    )
+    return Finding(f"The learnt models predict better than the analytical one ({corpus.name})", _below(gaps), sentence)
 
 
 def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
@@ -79,7 +79,7 @@ def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"Similar means within {SIMILAR:.0%}: holds if the interval lies there, in part if only the figure does, does "
         "not hold if the interval lies outside."
     )
-    return Finding(f"GP and VHGP have a similar NMSE ({corpus.origin})", _alike(ratio), sentence)
+    return Finding(f"GP and VHGP have a similar NMSE ({corpus.name})", _alike(ratio), sentence)
 
 
 def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
@@ -91,7 +91,7 @@ def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"(paper: −0.91); {_how(corpus, found, n)}. Holds if the first interval lies below 0, does not hold if it lies "
         "above, in part if only the exact density's lies below."
     )
-    return Finding(f"The VHGP beats the GP in NLPD ({corpus.origin})", _denser(gaussian, exact), sentence)
+    return Finding(f"The VHGP beats the GP in NLPD ({corpus.name})", _denser(gaussian, exact), sentence)
 
 
 def _gap(corpus: Corpus, found: Curves, first: str, second: str, n: int) -> Estimate:
@@ -105,17 +105,17 @@ def _how(corpus: Corpus, found: Curves, n: int) -> str:
 
 
 def _set(corpus: Corpus) -> str:
-    return f"{corpus.reference[0]} on {corpus.reference[1]}, {corpus.title}"
+    return f"{corpus.reference[0]} on {corpus.reference[1]}, {corpus.name}"
 
 
 def _in_time(where: Crossings) -> Verdict:
-    reached = [at for at in where.values() if at.last >= PAPER_SIZE]
-    in_time = [at for at in where.values() if at.high <= PAPER_SIZE]
+    reached = [at for at in where.values() if at.last >= ABOUT]
+    in_time = [at for at in where.values() if at.high <= ABOUT]
     if len(in_time) == len(where):
         return "holds"
     if in_time:
         return "holds in part"
-    late = len(reached) == len(where) and all(at.low > PAPER_SIZE for at in where.values())
+    late = len(reached) == len(where) and all(at.low > ABOUT for at in where.values())
     return "does not hold" if late else "not decided"
 
 

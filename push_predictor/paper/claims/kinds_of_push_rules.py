@@ -1,4 +1,4 @@
-"""Which repeated pushes are the convergent, the divergent and the most bimodal one, and by which rule they are it."""
+"""Which repeated pushes are the most convergent, the most divergent and the most bimodal one, by which rule."""
 
 from __future__ import annotations
 
@@ -17,17 +17,23 @@ from push_predictor.types import Array
 
 LEVEL = 0.05
 FAR, POWER = 6.0, 0.8  # two equal modes so many of their sd apart should be found so often
+EDGE = 0.05  # of the side from its ends: there the tip starts on the corner, which is another kind of contact
+LAST = round(0.1 / (STEP * 1e-9))  # points of a path: its last 0.1 s
+STILL = 0.1 * LAST * GRID_SPEED * STEP * 1e-9  # m: a tenth of the tip's way in that time
+STILL_TURN = float(np.radians(0.3))  # the tracker's noise, several times over
+STOPPED = 0.05  # of the repetitions: pushes of which more stop early are of tips that slid off
 LEAST_TRAVEL = 0.002  # m: below it the tip grazes, and a spread relative to the way says little
 LARGEST_STEP = 3.0 * GRID_SPEED * STEP * 1e-9  # m between points of a path: the tip cannot have pushed so far
 Figure = Callable[[Array], float]  # of paths (r, t, 3)
-APART = 2.0  # how much further apart, relative to the way, divergent pushes should end than convergent ones
+APART = 2.0  # how much further apart divergent pushes should end than convergent ones
 
 
 @dataclass(frozen=True, eq=False)
 class Kinds:
-    """A grid's pushes that move the slider, with their whole paths.
+    """A grid's pushes that move the slider to their end, with their whole paths.
 
-    Places of the three chosen ones; p (p, 3): family-wise p values of the dip of final x, y and heading.
+    Places of the three chosen ones; p (p, 3): family-wise p values of the dip of final x, y and heading. dropped: how
+    many pushes of the grid are not among them.
     """
 
     cells: tuple[Repetitions, ...]
@@ -36,20 +42,29 @@ class Kinds:
     divergent: int
     modal: int
     p: Array
+    dropped: int
 
 
 def kinds_of(grid: RepeatedGrid) -> Kinds | None:
     """Choose the three pushes; None if there are not two that move the slider."""
     whole = [(cell, whole_paths(cell.paths)) for cell in grid.seen]
-    seen = [(cell, paths) for cell, paths in whole if len(paths) >= FEWEST]
-    moved = [(cell, paths) for cell, paths in seen if travel(paths[:, -1]) >= LEAST_TRAVEL]
-    if len(moved) < 2:
+    kept = [(cell, paths) for cell, paths in whole if EDGE < cell.fraction < 1.0 - EDGE and to_the_end(paths)]
+    if len(kept) < 2:
         return None
-    paths = tuple(paths for _, paths in moved)
-    order = sorted(range(len(paths)), key=lambda k: relative_spread(paths[k][::2]))
+    cells, paths = zip(*kept, strict=True)
+    order = np.argsort([growth(one[::2]) for one in paths])
     p = _modes(paths)
-    modal = int(np.argmin(p.min(axis=1)))
-    return Kinds(tuple(cell for cell, _ in moved), paths, order[0], order[-1], modal, holm(p.ravel()).reshape(p.shape))
+    modal, several = int(np.argmin(p.min(axis=1))), holm(p.ravel()).reshape(p.shape)
+    return Kinds(cells, paths, int(order[0]), int(order[-1]), modal, several, len(grid.cells) - len(kept))
+
+
+def to_the_end(paths: Array) -> bool:
+    """Whether paths (r, t, 3) are of a push that moves the slider, and up to the push's end in nearly all of them."""
+    if len(paths) < FEWEST or travel(paths[:, -1]) < LEAST_TRAVEL:
+        return False
+    last = paths[:, -1] - paths[:, -1 - LAST]
+    still = (np.hypot(last[:, 0], last[:, 1]) < STILL) & (np.abs(last[:, 2]) < STILL_TURN)
+    return bool(still.mean() <= STOPPED)
 
 
 def whole_paths(paths: Array) -> Array:
@@ -64,6 +79,11 @@ def relative_spread(paths: Array, place: int = -1) -> float:
     return float(spread(ends) / travel(ends))
 
 
+def final_spread(paths: Array) -> float:
+    """Spread (m) of the ends of paths (r, t, 3)."""
+    return spread(paths[:, -1, :2])
+
+
 def growth(paths: Array) -> float:
     """Relative spread at the end over that half-way: above 1 paths fan out."""
     return relative_spread(paths) / relative_spread(paths, paths.shape[1] // 2)
@@ -75,11 +95,13 @@ def resampled(paths: Array, figure: Figure, seed: int = 0) -> tuple[float, Array
     return float(figure(paths)), np.array([figure(paths[drawn]) for drawn in rows])
 
 
-def apart(ratio: Estimate) -> Verdict:
-    """ratio: relative spread of the divergent push over that of the convergent one."""
-    if ratio.low > 1.0:
-        return "holds" if ratio.low > APART else "holds in part"
-    return "does not hold" if ratio.high < APART else "not decided"
+def apart(ratios: Sequence[Estimate]) -> Verdict:
+    """ratios: spread of the divergent push at the end over that of the convergent one, absolute and of the way."""
+    if all(ratio.low > APART for ratio in ratios):
+        return "holds"
+    if all(ratio.low > 1.0 for ratio in ratios):
+        return "holds in part"
+    return "does not hold" if any(r.low <= 1.0 and r.high < APART for r in ratios) else "not decided"
 
 
 def draws_together_fans_out(convergent: Estimate, divergent: Estimate) -> Verdict:

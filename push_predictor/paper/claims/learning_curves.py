@@ -5,18 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from push_predictor.evaluation.figures.canvas import Picture, draw
 from push_predictor.paper.claims.learning_findings import KIND, MEASURES, circle, pushes_of, saturation, surface, word
 from push_predictor.paper.corpus import Corpus, Pair
 from push_predictor.paper.curves import Curves, Measure, curves, sizes_tried
+from push_predictor.paper.estimate import Estimate, over_seeds
 from push_predictor.paper.figures.curves import Line, Panel, look_of, paint_panels
 from push_predictor.paper.fits import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor.paper.section import Section, Table
 from push_predictor.paper.study import Study
 
+FEWEST_FOR_BAND = 3  # folds
 AXES = (("surface", 1), ("shape", 0))  # what a figure tells apart, and its place in a pair
 
 
+LEFT_OUT = (
+    "Folds share training windows, and all draws of the random split are judged on one set of test windows: what "
+    "another recording, or other test windows, would change is not in the interval."
+)
 AXIS_NAMES = {"NMSE": "NMSE, sum of 3", "NLPD": "NLPD, sum of 3 (SI)"}
 SIMULATOR = (
     "The simulated surfaces differ in the level of their friction, in how it scatters over the table and in how badly "
@@ -44,7 +52,7 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
     found = curves(study, corpus, list(corpus.sets), [KIND])
     pairs = tuple(pair for pair in corpus.sets if all(found.sizes([pair], KIND, split) for split in SPLITS))
     if not pairs:
-        return Section("", "", (), notes=(f"{corpus.title}: too few windows for a learning curve.",))
+        return Section("", "", (), notes=(f"{corpus.name}: too few windows for a learning curve.",))
     findings = (circle(corpus, found, pairs), surface(corpus, found, pairs), saturation(corpus, found, pairs))
     pictures = [_picture(study, corpus, found, pairs, number, axis) for axis in AXES]
     tables = (_table(corpus, found, pairs), _group_table(corpus, found, pairs))
@@ -72,9 +80,11 @@ def _picture(
     draw(path, (7.4, 6.4), lambda figure: paint_panels(figure, rows))
     other = "shape" if name == "surface" else "surface"
     caption = (
-        f"VHGP against training size, per {name} (thick: mean over {other}s, band: 95 % interval over folds or draws; "
-        f"thin: each {other}). Above: {SPLIT_WORDS['push']}; below: {SPLIT_WORDS['random']}. Sums over the three "
-        f"outputs, NLPD in SI units, cut off above. {corpus.title}, {pushes_of(corpus, pairs)} pushes in all."
+        f"VHGP against training size, per {name} (thick: mean over {other}s, band: 95 % interval over folds or draws, "
+        f"of fewer than {FEWEST_FOR_BAND} whiskers from the least to the largest; thin: each {other}). Above: "
+        f"{SPLIT_WORDS['push']}; below: {SPLIT_WORDS['random']}. Sums over the three outputs, NLPD in SI units; a "
+        f"triangle at the top marks a mean beyond the axis. {LEFT_OUT} Pushes: {corpus.name}, "
+        f"{pushes_of(corpus, pairs)} in all."
     )
     return Picture(path, f"Learning curves of the VHGP per {name}: NMSE and NLPD over training size", caption)
 
@@ -87,9 +97,18 @@ def _lines(found: Curves, pairs: Sequence[Pair], split: SplitName, measure: Meas
         members = [[pair] for pair in group] if len(group) > 1 else []
         for part, thin in [(member, True) for member in members] + [(group, False)]:
             sizes = found.sizes(part, KIND, split)
-            points = tuple(found.over_seeds(part, KIND, split, n, measure) for n in sizes)
-            lines.append(Line(word(name), look_of(k), sizes, points, thin))
+            values = [found.values(part, KIND, split, n, measure) for n in sizes]
+            points = tuple(map(band_or_range, values))
+            banded = all(len(of_size) >= FEWEST_FOR_BAND for of_size in values)
+            lines.append(Line(word(name), look_of(k), sizes, points, thin, banded))
     return tuple(lines)
+
+
+def band_or_range(values: Sequence[float]) -> Estimate:
+    """The mean over folds with Student's interval; of few folds the least and the largest."""
+    if len(values) >= FEWEST_FOR_BAND:
+        return over_seeds(values)
+    return Estimate(float(np.mean(values)), min(values), max(values))
 
 
 def _table(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Table:
@@ -120,9 +139,9 @@ def _scores_table(
         for name, group in groups
     )
     caption = (
-        f"{what}. {corpus.title}, {pushes_of(corpus, pairs)} pushes in all. By push: {SPLIT_WORDS['push']}. Interval "
-        "of the mean over folds (by push) or draws of the training windows (random), Student. The paper gives these "
-        "curves as figures, without numbers."
+        f"{what}. Pushes: {corpus.name}, {pushes_of(corpus, pairs)} in all. By push: {SPLIT_WORDS['push']}. Interval "
+        f"of the mean over folds (by push) or draws of the training windows (random), Student. {LEFT_OUT} The paper "
+        "gives these curves as figures, without numbers."
     )
     return Table(caption, ("", *head), rows)
 
@@ -133,7 +152,7 @@ def _short(split: SplitName) -> str:
 
 def _notes(study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> tuple[str, ...]:
     notes = [
-        f"{corpus.title}: {_short(split)}, n = {', '.join(map(str, missing))} was planned and is not shown in the "
+        f"{corpus.name}: {_short(split)}, n = {', '.join(map(str, missing))} was planned and is not shown in the "
         "means: a set is too small for it."
         for split in SPLITS
         if (missing := sorted(set(sizes_tried(study.plan, False)) - set(found.sizes(pairs, KIND, split))))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -34,14 +33,17 @@ Likenesses = Mapping[tuple[str, str], tuple[Likeness, ...]]  # (quantity, model)
 QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the process noise alone"}
 
 
-def likenesses(cells: list[Repetitions], answers: Mapping[str, Answer]) -> Likenesses:
-    """For mean, sd of an outcome, sd of the noise alone, of each model, asked at these pushes."""
+def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]) -> Likenesses:
+    """For mean, sd of an outcome, sd of the noise alone, of each model, asked at these pushes; answers: one for each
+    draw of its training windows, over which figures are averaged."""
     truth = {"mean": np.array([cell.mean for cell in cells]), "sd": np.array([cell.sd for cell in cells])}
     truth["process_sd"], weights = truth["sd"], block_weights(cells)
     return {
-        (quantity, model): tuple(_likeness(getattr(answer, quantity)[:, k], known[:, k], weights) for k in range(3))
+        (quantity, model): tuple(
+            _likeness([getattr(answer, quantity)[:, k] for answer in draws], known[:, k], weights) for k in range(3)
+        )
         for quantity, known in truth.items()
-        for model, answer in answers.items()
+        for model, draws in answers.items()
     }
 
 
@@ -51,12 +53,14 @@ def agreement_findings(found: Likenesses, pushes: int) -> tuple[Finding, Finding
     first = Finding(
         "The model's map of the mean is much like that of the repetitions",
         _verdict(mean, MEAN_ALIKE),
-        f"Correlation over {pushes} pushes, VHGP with repetitions: {_told(mean)}; {_errors(mean)}. {_rule(MEAN_ALIKE)}",
+        f"Correlation over {pushes} pushes, VHGP with repetitions, mean over draws of training windows: {_told(mean)}; "
+        f"{_errors(mean)}. {_rule(MEAN_ALIKE)}",
     )
     second = Finding(
         "The model's map of the standard deviation is to a certain degree that of the repetitions",
         _verdict(sd, SD_ALIKE),
-        f"Correlation over {pushes} pushes, VHGP with repetitions: {_told(sd)}; {_errors(sd)}. The GP, whose noise is "
+        f"Correlation over {pushes} pushes, VHGP with repetitions, mean over draws of training windows: {_told(sd)}; "
+        f"{_errors(sd)}. The GP, whose noise is "
         f"one for all pushes: {_told(plain)}. {_rule(SD_ALIKE)}",
     )
     return first, second
@@ -83,10 +87,13 @@ def agreement_json(found: Likenesses) -> dict[str, dict[str, dict[str, float | N
     }
 
 
-def _likeness(model: Array, truth: Array, weights: Array) -> Likeness:
-    size = float(np.sqrt(np.mean(model**2) / np.mean(truth**2)))
-    alike, error = (by_blocks(partial(figure, model, truth), weights) for figure in (correlation, relative_error))
-    return Likeness(alike, error, size)
+def _likeness(models: Sequence[Array], truth: Array, weights: Array) -> Likeness:
+    size = float(np.mean([np.sqrt(np.mean(model**2) / np.mean(truth**2)) for model in models]))
+
+    def over_draws(figure: Callable[[Array, Array, Array], Array]) -> Estimate:
+        return by_blocks(lambda w: np.mean([figure(model, truth, w) for model in models], axis=0), weights)
+
+    return Likeness(over_draws(correlation), over_draws(relative_error), size)
 
 
 def _verdict(outputs: tuple[Likeness, ...], asked: float) -> Verdict:

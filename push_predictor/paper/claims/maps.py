@@ -26,8 +26,8 @@ from push_predictor.paper.claims.map_peaks import (
 )
 from push_predictor.paper.figures.repetition_maps import paint_differences, paint_map_figure
 from push_predictor.paper.fits import Answer
-from push_predictor.paper.grid_maps import BLOCK, DRAWS, at_places, on_grid, redrawn
-from push_predictor.paper.map_models import ANGLES, FRACTIONS, ModelMap, reference_maps, square_maps
+from push_predictor.paper.grid_maps import BLOCK, DRAWS, at_places, in_degrees, on_grid, redrawn
+from push_predictor.paper.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps, square_maps, together
 from push_predictor.paper.repetitions import RepeatedGrid, Repetitions
 from push_predictor.paper.section import Finding, Section
 from push_predictor.paper.study import Study
@@ -46,19 +46,21 @@ def section(study: Study) -> Section:
         few = f"{len(grid.seen)} pushes of the grid were seen often enough; {FEWEST_PUSHES} are asked for."
         return Section("maps", TITLE, (Finding("The model's maps are those of the repetitions", "not decided", few),))
     models = reference_maps(study, "vhgp", study.plan.seeds)
-    plain = reference_maps(study, "gp")[0]
-    answers = {name: m.at_pushes for name, m in (("VHGP", models[0]), ("GP", plain)) if m.at_pushes is not None}
+    plain = reference_maps(study, "gp", study.plan.seeds)
+    answers = {
+        name: [m.at_pushes for m in maps if m.at_pushes is not None] for name, maps in (("VHGP", models), ("GP", plain))
+    }
     alike, peaks = likenesses(grid.seen, answers), peaks_of(grid, models)
-    differences = _differences(grid, answers["VHGP"])
+    shown, answer = averaged(models), together(answers["VHGP"])
     return Section(
         key="maps",
         title=TITLE,
         findings=(*peak_findings(peaks, len(grid.seen)), *agreement_findings(alike, len(grid.seen))),
         tables=(peak_table(peaks, _peak_caption(study)), agreement_table(alike, _agreement_caption(study))),
         pictures=(
-            _map_picture(study, models[0], answers["VHGP"], "mean"),
-            _map_picture(study, models[0], answers["VHGP"], "sd"),
-            _difference_picture(study, differences),
+            _map_picture(study, shown, answer, "mean"),
+            _map_picture(study, shown, answer, "sd"),
+            _difference_picture(study, _differences(grid, answer)),
         ),
         notes=(*NOTES, _other_sign(grid), *_measured_notes(study)),
         data={
@@ -90,14 +92,14 @@ def examples(grid: RepeatedGrid, answer: Answer, quantity: str) -> list[tuple[Re
     return [(grid.seen[k], answer.mean[k]) for k in known.argmax(axis=0)]
 
 
-def _differences(grid: RepeatedGrid, answer: Answer) -> list[tuple[str, Array]]:
-    """Model less repetitions in standard errors of the repetitions, as maps."""
+def _differences(grid: RepeatedGrid, answer: Answer) -> list[tuple[str, Array, Array]]:
+    """Of mean and sd: model less repetitions, as maps, SI; the same in standard errors of the repetitions."""
     means, sds = redrawn(grid.seen)
-    known = (("mean", answer.mean, means), ("sd", answer.sd, sds))
-    return [
-        (name, on_grid(grid, (told - np.array([getattr(c, name) for c in grid.seen])) / drawn.std(axis=0)))
-        for name, told, drawn in known
-    ]
+    found = []
+    for name, model, drawn in (("mean", answer.mean, means), ("sd", answer.sd, sds)):
+        less = model - np.array([getattr(cell, name) for cell in grid.seen])
+        found.append((name, on_grid(grid, less), on_grid(grid, less / drawn.std(axis=0))))
+    return found
 
 
 def _other_sign(grid: RepeatedGrid) -> str:
@@ -125,24 +127,28 @@ def _map_picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -
         path,
         f"Maps of the {what} of dx, dy and rotation over contact and angle: VHGP, drawn pushes, repetitions",
         f"The {what} of the outcome of a push of 0.2 s at 20 mm/s, square on {grid.surface}, simulated. Above: VHGP of "
-        f"{_windows(study)} training windows. Below: {len(grid.seen)} pushes, {grid.cells[0].commanded} times each. "
+        f"{_windows(study)} training windows, mean of the maps of {study.plan.seeds} draws of these. Below: "
+        f"{len(grid.seen)} pushes, {grid.cells[0].commanded} times each. "
         "One colour scale per column; hatched: slid off too early, or beyond the training data. Between: the push of "
-        f"the column's largest {what} (circle in the maps), from above, pushed to the right; grey the slider's start, "
+        f"the column's largest {what} by repetitions (circle, at the same place in both maps), from above, pushed to "
+        "the right; grey the slider's start, "
         "thin red the repetitions, red their mean, dashed blue the VHGP's mean.",
     )
 
 
-def _difference_picture(study: Study, differences: list[tuple[str, Array]]) -> Picture:
+def _difference_picture(study: Study, differences: list[tuple[str, Array, Array]]) -> Picture:
     path = draw(
         study.out / "maps_difference.png",
-        (9.0, 5.2),
+        (9.0, 9.2),
         lambda figure: paint_differences(figure, study.reference_grid, differences),
     )
-    shares = "; ".join(f"{name}: {_close_shares(values)}" for name, values in differences)
+    shares = "; ".join(f"{name}: {_close_shares(errors)}" for name, _, errors in differences)
     return Picture(
         path,
-        "Maps of the VHGP less the repetitions in standard errors of the repetitions, for mean and standard deviation",
-        "VHGP less repetitions, in standard errors of the repetitions (bootstrap). If the model were true, 95 % of the "
+        "Maps of the VHGP less the repetitions, in mm and degrees and in standard errors, for mean and standard "
+        "deviation",
+        f"VHGP (mean of the maps of {study.plan.seeds} draws of training windows) less repetitions: in mm and degrees, "
+        "and in standard errors of the repetitions (bootstrap). If the model were true, 95 % of the "
         f"pushes would lie within two. Within {CLOSE:g} are, of dx, dy, rotation: {shares}.",
     )
 
@@ -158,7 +164,8 @@ def _peak_caption(study: Study) -> str:
         f"Where the absolute mean is largest; simulated square on {grid.surface}, 20 mm/s, 0.2 s. Repetitions: "
         f"{len(grid.seen)} pushes of the grid, {grid.cells[0].commanded} times each, {DRAWS} draws of these. VHGP: "
         f"{study.plan.seeds} draws of {_windows(study)} training windows (no window held back; judged against the "
-        "repetitions, which no model has seen); interval of the mean over draws. By repetitions, what picking the "
+        "repetitions, which no model has seen); place of the mean map, interval of the mean over draws. By "
+        "repetitions, what picking the "
         "largest of noisy means adds is taken off (basic bootstrap). It reaches: the mean at the paper's push over the "
         "largest."
     )
@@ -167,9 +174,11 @@ def _peak_caption(study: Study) -> str:
 def _agreement_caption(study: Study) -> str:
     return (
         f"Maps of models against those of the repetitions, simulated square on {study.reference_grid.surface}: "
-        f"{len(study.reference_grid.seen)} pushes, models of {_windows(study)} training windows of another recording. "
+        f"{len(study.reference_grid.seen)} pushes, models of {_windows(study)} training windows of another recording, "
+        f"figures averaged over {study.plan.seeds} draws of these. "
         "Correlation, squared error over the map's variance (NMSE), ratio of root mean squares (model over "
-        f"repetitions). Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {BLOCK[1]:g} rad) "
+        f"repetitions). Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × "
+        f"{in_degrees(BLOCK[1])}) "
         "anew. The paper shows the maps and calls the means remarkably similar, the deviations well matched to a "
         "certain degree; it gives no number."
     )

@@ -18,6 +18,7 @@ from push_predictor.paper.claims.noise_size import (
     span_table,
 )
 from push_predictor.paper.figures.noise_maps import paint_noise_maps, paint_ratios, paint_scatter
+from push_predictor.paper.grid_maps import in_degrees
 from push_predictor.paper.map_models import surface_maps
 from push_predictor.paper.noise_figures import Ratios, noise_ratios, radius_of_gyration, spans
 from push_predictor.paper.noise_shapes import FEWEST_PUSHES, ceiling, learnt_shapes, shapes
@@ -32,7 +33,7 @@ def section(study: Study) -> Section:
     grid = study.reference_grid
     near = [cell for cell in grid.seen if abs(cell.angle) <= WIDE]
     if len(near) < FEWEST_PUSHES:
-        few = f"{len(near)} pushes within {WIDE:g} rad were seen often enough; {FEWEST_PUSHES} are asked for."
+        few = f"{len(near)} pushes within {in_degrees(WIDE)} were seen often enough; {FEWEST_PUSHES} are asked for."
         return Section("noise", TITLE, (Finding("The noise depends on the push", "not decided", few),))
     arm = radius_of_gyration(grid)
     ratios = {"all": noise_ratios(grid.seen, arm), "near": noise_ratios(near, arm)}

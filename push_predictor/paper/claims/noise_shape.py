@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.paper.claims.map_peaks import agreed
 from push_predictor.paper.claims.noise_size import WIDE
-from push_predictor.paper.grid_maps import BLOCK
+from push_predictor.paper.grid_maps import BLOCK, in_degrees
 from push_predictor.paper.noise_shapes import Shape, ceiling
 from push_predictor.paper.section import Finding, Table, Verdict
 from push_predictor.paper.study import Study
@@ -25,21 +25,26 @@ def shape_finding(
     """Over all pairs of surfaces, by repetitions and by VHGPs; near: over the pushes that are not steeply aslant."""
     if not found or most is None:
         return Finding(CLAIM, "not decided", "Fewer than two surfaces have repetitions of the same pushes.")
-    verdict = agreed(_verdict(found), _verdict(learnt)) if learnt else _verdict(found)
+    verdict = agreed(_verdict(found), _verdict(learnt))
     halves = ", ".join(f"{name} {e.text()}" for name, e in zip(OUTPUT_NAMES, most.pearson, strict=True))
     return Finding(
         CLAIM,
         verdict,
         f"Correlation of log sd over the pushes, pairs of surfaces: {len(found)}. By repetitions: {_told(found)}; over "
-        f"the pushes within {WIDE:g} rad: {_told(near)}. Two halves of one surface's repetitions reach {halves}. Of "
-        f"the VHGPs' process noise, of which the paper speaks: {_told(learnt)}. Rule, for repetitions and for VHGPs, "
-        f"all pushes: holds if the intervals of all pairs and outputs lie above {ALIKE:g}, does not hold if all lie "
-        f"below {UNLIKE:g}, in part if some lie above that or if the two disagree. The simulator's surfaces share one "
+        f"the pushes within {in_degrees(WIDE)}: {_told(near)}. Two halves of one surface's repetitions reach {halves}. "
+        "Of "
+        "the VHGPs' process noise, of which the paper speaks, one draw of training windows a surface: "
+        f"{_told(learnt)}. "
+        f"Rule, for repetitions and for VHGPs, all pushes: holds if the intervals of all pairs and outputs lie above "
+        f"{ALIKE:g}, does not hold if all lie below {UNLIKE:g}, in part if some lie above that; together in part if "
+        "it holds, or holds in part, by one of them only. The simulator's surfaces share one "
         "mechanism of noise, so this holds partly by construction.",
     )
 
 
 def _verdict(found: Sequence[Shape]) -> Verdict:
+    if not found:
+        return "not decided"
     low, high = (np.array([[getattr(e, end) for e in pair.pearson] for pair in found]) for end in ("low", "high"))
     if np.all(low > ALIKE):
         return "holds"
@@ -52,7 +57,7 @@ def shape_tables(
     study: Study, found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
 ) -> tuple[Table, ...]:
     """By repetitions, over the pushes near the normal, and by the VHGPs."""
-    block = f"Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {BLOCK[1]:g} rad) anew."
+    block = f"Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}) anew."
     halved = "Halves of the repetitions of one surface: what too few repetitions leave of a correlation of one."
     nearest = ceiling(study.reference_grid, WIDE)
     size = f"{study.plan.size} training windows or all"
@@ -64,11 +69,13 @@ def shape_tables(
                 _with(found, most),
             ),
             (
-                f"The same, pushes within {WIDE:g} rad: what is left without the pushes that hardly move the slider.",
+                f"The same, pushes within {in_degrees(WIDE)}: what is left without the pushes that hardly move the "
+                "slider.",
                 _with(near, nearest),
             ),
             (
-                f"Correlation of the log sd of the VHGPs' process noise, {size} on each surface, simulated.",
+                f"Correlation of the log sd of the VHGPs' process noise, {size} on each surface, the first of "
+                f"{study.plan.seeds} draws of these; simulated.",
                 list(learnt),
             ),
         )

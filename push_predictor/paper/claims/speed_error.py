@@ -48,12 +48,10 @@ def section(study: Study) -> Section:
 def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
     windows = held_out(study, corpus)
     if windows is None:
-        return Section("", "", (), notes=(f"{corpus.title}: too few windows to train a model.",))
+        return Section("", "", (), notes=(f"{corpus.name}: too few windows to train a model.",))
     groups = list(range(len(windows.speeds)))
     if len(groups) < 2:
-        note = (
-            f"{corpus.title}: one speed only ({_speed(windows.speeds[0])}), so nothing about the error against speed."
-        )
+        note = f"{corpus.name}: one speed only ({_speed(windows.speeds[0])}), so nothing about the error against speed."
         return Section("", "", (), notes=(note,))
     found = {kind: _curve(windows, groups, kind) for kind in KINDS}
     findings = (unreliable(corpus, windows, found["analytical"]), captured(corpus, windows, groups))
@@ -74,15 +72,15 @@ def unreliable(corpus: Corpus, windows: HeldOut, curve: SpeedCurve) -> Finding:
         f"{_speed(curve.speeds[0])} to {curve.nmse[-1].text()} at {_speed(curve.speeds[-1])}. Holds if both intervals "
         f"lie above {NOTABLE}, in part if one does, does not hold if both end below {NOTABLE}."
     )
-    return Finding(f"The analytical model is more unreliable at high speed ({corpus.origin})", _grows(ranks), sentence)
+    return Finding(f"The analytical model is more unreliable at high speed ({corpus.name})", _grows(ranks), sentence)
 
 
 def captured(corpus: Corpus, windows: HeldOut, groups: list[int]) -> Finding:
     """Do the learnt models, told the speed, do better where it is high: speed by speed from FAST on."""
-    claim = f"Models that are told the speed capture the dynamic effects ({corpus.origin})"
+    claim = f"Models that are told the speed capture the dynamic effects ({corpus.name})"
     fast = [k for k in groups if windows.speeds[k] >= 0.99 * FAST]
     if not fast:
-        return Finding(claim, "not decided", f"{corpus.title}: no pushes of {_speed(FAST)} or faster.")
+        return Finding(claim, "not decided", f"{corpus.name}: no pushes of {_speed(FAST)} or faster.")
     gaps = {k: within_nmse(windows.at(k), ("analytical", "vhgp")) for k in fast}
     told = "; ".join(f"{_speed(windows.speeds[k])} {gap.text()}" for k, gap in gaps.items())
     sentence = (
@@ -150,7 +148,7 @@ def _table(corpus: Corpus, windows: HeldOut, groups: list[int], found: dict[str,
         rows.append((at.speed_range, f"{at.pushes}", f"{len(at.push_id)}", *nmse, along, across))
     caption = (
         f"By speed (neighbouring speeds of fewer than {FEWEST_PUSHES} pushes joined), {corpus.reference[0]} on "
-        f"{corpus.reference[1]}, n = {windows.size}, {SPLIT_WORDS['push']}. {corpus.title}. NMSE "
+        f"{corpus.reference[1]}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}. NMSE "
         "(sum of 3) over the spread of outcomes at that speed; bias, of the analytical model: mean of observed less "
         "predicted, per cent of the pusher's travel; across: towards the side to which the model says the slider goes. "
         "Interval by push. The paper tells this without numbers."
@@ -165,7 +163,7 @@ def _picture(study: Study, corpus: Corpus, windows: HeldOut, found: dict[str, Sp
     caption = (
         f"NMSE within each speed, and mean of observed less predicted along and across the push as a share of the "
         f"pusher's travel. {corpus.reference[0]} on {corpus.reference[1]}, {windows.pushes} pushes, n = "
-        f"{windows.size}, {SPLIT_WORDS['push']}, bands: 95 % by push. {corpus.title}."
+        f"{windows.size}, {SPLIT_WORDS['push']}, bands: 95 % by push. Pushes: {corpus.name}."
     )
     return Picture(path, "Error of analytical model, GP and VHGP against the pusher's speed", caption)
 
@@ -179,7 +177,7 @@ def _speed(speed: float) -> str:
 
 
 def _set(corpus: Corpus) -> str:
-    return f"{corpus.reference[0]} on {corpus.reference[1]}, {corpus.title}"
+    return f"{corpus.reference[0]} on {corpus.reference[1]}, {corpus.name}"
 
 
 def _curve_data(curve: SpeedCurve) -> list[dict[str, Any]]:

@@ -27,13 +27,17 @@ TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 @dataclass(frozen=True)
 class Line:
-    """A curve; thin ones are single members of a thick one's group, without band and name."""
+    """A curve; thin ones are single members of a thick one's group, without interval and name.
+
+    banded: its intervals are a band, else whiskers.
+    """
 
     label: str
     look: tuple[str, object, str]  # colour, dashes, marker
     sizes: tuple[int, ...]
     points: tuple[Estimate, ...]
     thin: bool = False
+    banded: bool = True
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,9 @@ def paint_panels(figure: Figure, rows: Sequence[Sequence[Panel]]) -> None:
             _paint(ax, panel)
     for ax, panels in zip(axes.T, zip(*rows, strict=True), strict=True):
         _limit(ax[0], panels)
+    for row, panels in zip(axes, rows, strict=True):
+        for ax, panel in zip(row, panels, strict=True):
+            _mark_cut(ax, panel.lines)
     sizes = sorted({n for panels in rows for panel in panels for line in panel.lines for n in line.sizes})
     for ax in axes[-1]:
         ax.set_xlabel("training windows n")
@@ -99,7 +106,10 @@ def _paint_line(ax: Axes, line: Line) -> None:
         ax.plot(line.sizes, values, color=colour, linestyle=dashes, linewidth=0.6, alpha=0.55)
         return
     low, high = ([getattr(point, end) for point in line.points] for end in ("low", "high"))
-    ax.fill_between(line.sizes, low, high, color=colour, alpha=0.15, linewidth=0.0)
+    if line.banded:
+        ax.fill_between(line.sizes, low, high, color=colour, alpha=0.15, linewidth=0.0)
+    else:
+        ax.vlines(line.sizes, low, high, color=colour, linewidth=1.0, alpha=0.7)
     ax.plot(
         line.sizes, values, color=colour, linestyle=dashes, linewidth=1.7, marker=marker, markersize=4, label=line.label
     )
@@ -110,17 +120,31 @@ def _paint_crossing(ax: Axes, colour: str, where: Crossing, height: float) -> No
     ends = np.clip([where.low, where.high], where.first, where.last)
     foot = ax.get_xaxis_transform()
     ax.plot(ends, [height] * 2, color=colour, linewidth=3.0, alpha=0.6, transform=foot, solid_capstyle="butt")
-    if np.isfinite(where.value):
-        ax.plot([where.value], [height], "v", color=colour, markersize=6, transform=foot)
+    place, mark = (where.value, "v") if np.isfinite(where.value) else (where.last, ">")
+    ax.plot([place], [height], mark, color=colour, markersize=6, transform=foot, clip_on=False)
 
 
 def _limit(ax: Axes, panels: Sequence[Panel]) -> None:
-    """Keep to what the thick lines' values span, so that a wide band or a wild curve does not flatten the rest."""
+    """Keep about to what the values span, so that a wide band or a wild curve does not flatten the rest."""
     lines = [line for panel in panels for line in panel.lines]
     values = np.array([p.value for line in lines for p in line.points if np.isfinite(p.value)])
     if not values.size or panels[0].zero:
         return
+    lows = [p.low for line in lines for p in line.points if not line.thin and np.isfinite(p.low)]
+    least = min(lows, default=values.min())
     if panels[0].ratio:
-        ax.set_ylim(values.min() / 1.35, min(values.max(), MOST_NMSE) * 1.25)
+        ax.set_ylim(np.clip(least, values.min() / 2.0, values.min()) / 1.2, min(values.max(), MOST_NMSE) * 1.25)
     else:
-        ax.set_ylim(values.min() - 0.6, min(values.max() + 0.6, values.min() + MOST_NLPD))
+        ax.set_ylim(
+            np.clip(least, values.min() - 2.0, values.min()) - 0.4, min(values.max() + 0.6, values.min() + MOST_NLPD)
+        )
+
+
+def _mark_cut(ax: Axes, lines: Sequence[Line]) -> None:
+    """A triangle at the top where a thick line leaves the axes."""
+    top, foot = ax.get_ylim()[1], ax.get_xaxis_transform()
+    for k, line in enumerate(line for line in lines if not line.thin):
+        cut = [n for n, point in zip(line.sizes, line.points, strict=True) if point.value > top]
+        if cut:
+            place = [1.0 - 0.045 * k] * len(cut)  # one beneath the other where several leave at one size
+            ax.plot(cut, place, "^", color=line.look[0], markersize=5.0, transform=foot, clip_on=False)

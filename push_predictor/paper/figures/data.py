@@ -9,8 +9,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from push_predictor.evaluation.figures.canvas import COLOURS, grid
-from push_predictor.evaluation.maps import way_along
+from push_predictor.evaluation.maps import sector_length, way_along
 from push_predictor.paper.corpus import PushSet
+from push_predictor.paper.figures.speed_error import speed_axis
 from push_predictor.paper.repetitions import RepeatedGrid
 
 if TYPE_CHECKING:
@@ -33,10 +34,10 @@ def paint_data(figure: Figure, counts: list[SpeedCount], pushes: PushSet, repeat
     """Three panels: windows by speed, inputs of a set, repetitions seen."""
     speeds, inputs, seen = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     _paint_speeds(speeds, counts)
-    fraction = way_along(pushes.rig.outline, pushes.table.inputs[:, 1]) * 1e3
+    outline = pushes.rig.outline
+    fraction = way_along(outline, pushes.table.inputs[:, 1]) / sector_length(outline)
     inputs.plot(fraction, np.degrees(pushes.table.inputs[:, 2]), ".", color=COLOURS[0], markersize=2.0, alpha=0.6)
-    inputs.set_xlabel("contact along the side (mm)")
-    inputs.set_ylabel("push angle (deg)")
+    _frame_of_pushes(inputs)
     inputs.set_title(f"windows of {pushes.rig.shape} on {pushes.rig.surface}")
     _paint_seen(figure, seen, repeated)
 
@@ -47,9 +48,7 @@ def _paint_speeds(ax: Axes, counts: list[SpeedCount]) -> None:
         ends = binomtest(count.with_window, count.pushes).proportion_ci(method="wilson")
         ax.plot([count.speed * 1e3] * 2, [100 * ends.low, 100 * ends.high], color=COLOURS[0], linewidth=1.2)
         ax.plot(count.speed * 1e3, 100 * count.with_window / count.pushes, "o", color=COLOURS[0], markersize=4)
-    ax.set_xscale("log")
-    ax.set_xticks([10, 20, 50, 100, 200, 500], ["10", "20", "50", "100", "200", "500"])
-    ax.minorticks_off()
+    speed_axis(ax, [count.speed for count in counts])
     ax.set_ylim(0, 103)
     ax.set_xlabel("commanded speed (mm/s)")
     ax.set_ylabel("pushes with a window (%)")
@@ -59,12 +58,17 @@ def _paint_speeds(ax: Axes, counts: list[SpeedCount]) -> None:
 def _paint_seen(figure: Figure, ax: Axes, repeated: RepeatedGrid) -> None:
     shape = (len(repeated.fractions), len(repeated.angles))
     share = np.reshape([100.0 * len(cell.outcomes) / cell.commanded for cell in repeated.cells], shape).T
-    edges = [_edges(repeated.fractions), np.degrees(_edges(repeated.angles))]
+    edges = [np.clip(_edges(repeated.fractions), 0.0, 1.0), np.degrees(_edges(repeated.angles)).clip(-90.0, 90.0)]
     image = ax.pcolormesh(*edges, share, cmap="viridis", vmin=0.0, vmax=100.0, edgecolors="white", linewidth=0.3)
     figure.colorbar(image, ax=ax, label="repetitions with a first window (%)")
-    ax.set_xlabel("contact, fraction of the side")
-    ax.set_ylabel("push angle (deg)")
+    _frame_of_pushes(ax)
     ax.set_title(f"repeated pushes on {repeated.surface}")
+
+
+def _frame_of_pushes(ax: Axes) -> None:
+    """Axes that hold every push of a side."""
+    ax.set(xlim=(0.0, 1.0), ylim=(-90.0, 90.0), yticks=range(-90, 91, 30))
+    ax.set(xlabel="contact, fraction of the side", ylabel="push angle (deg)")
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:

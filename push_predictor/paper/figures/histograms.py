@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 POINTS = 200
 BESIDE = 0.75  # of the range of the outcomes, to both sides of it
+WIDTHS = 2.0  # of the predicted sd to both sides of its mean, so that a model that is too wide is seen to be
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +48,30 @@ def shown_values(outcomes: Array) -> Array:
     return np.linspace(low - BESIDE * (high - low), high + BESIDE * (high - low), POINTS)
 
 
+def moments(values: Array, logs: Array) -> tuple[float, float]:
+    """Mean and sd of the Gaussian whose log densities at values (v,) are logs (v,)."""
+    middle, half = 0.5 * (values[0] + values[-1]), 0.5 * (values[-1] - values[0])
+    square, slope, _ = np.polyfit((values - middle) / half, logs, 2)
+    return float(middle - 0.5 * half * slope / square), float(half * np.sqrt(-0.5 / square))
+
+
 def _paint(ax: Axes, histogram: Histogram) -> None:
     unit = UNITS[histogram.output]
     bins = int(np.clip(1.6 * np.sqrt(len(histogram.outcomes)), 8, 24))
     ax.hist(histogram.outcomes * unit, bins, density=True, color=NEARBY, alpha=0.4, label="repetitions")
-    curves = (
-        (histogram.gaussian, "-", COLOURS[0], "VHGP, Gaussian"),
-        (histogram.exact, "--", COLOURS[1], "VHGP, exact"),
-    )
-    for logs, line, colour, label in curves:
-        ax.plot(histogram.values * unit, np.exp(logs) / unit, line, color=colour, linewidth=1.5, label=label)
-    ax.set_xlim(histogram.values[0] * unit, histogram.values[-1] * unit)
+    mean, sd = moments(histogram.values, histogram.gaussian)
+    ends = np.array([mean - WIDTHS * sd, mean + WIDTHS * sd])
+    low, high = min(ends[0], histogram.values[0]), max(ends[1], histogram.values[-1])
+    wide = np.linspace(low, high, POINTS)
+    gaussian = np.exp(-0.5 * ((wide - mean) / sd) ** 2) / (np.sqrt(2.0 * np.pi) * sd)
+    exact = np.exp(histogram.exact)
+    for x, y, line, colour, label in (
+        (wide, gaussian, "-", COLOURS[0], "VHGP, Gaussian"),
+        (histogram.values, exact, "--", COLOURS[1], "VHGP, exact"),
+    ):
+        ax.plot(x * unit, y / unit, line, color=colour, linewidth=1.5, label=label)
+    ax.set_xlim(low * unit, high * unit)
+    ax.locator_params(axis="x", nbins=6)
     ax.set_title(histogram.title)
     ax.set_xlabel(output_label(histogram.output))
     ax.set_ylabel(f"density (1/{UNIT_NAMES[histogram.output]})")

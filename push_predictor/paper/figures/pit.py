@@ -51,6 +51,7 @@ def paint_by_speed(figure: Figure, groups: Sequence[str], models: Mapping[str, S
         ax.set(
             title=SYMBOLS[k], xticks=np.arange(len(groups)), xticklabels=list(groups), xlim=(-0.5, len(groups) - 0.5)
         )
+        ax.set_xlabel("speed of the push (mm/s)")
     axes[0].set_ylabel("share of outcomes in the 95 % interval")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))

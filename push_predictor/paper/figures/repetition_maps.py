@@ -11,6 +11,7 @@ from push_predictor.evaluation.figures.canvas import EMPTY, OBSERVED, SYMBOLS, U
 from push_predictor.evaluation.figures.push_maps import ColourScale, colour_scale
 from push_predictor.evaluation.figures.slider import magnification, paint_slider, start_pose
 from push_predictor.geometry.frames import to_world
+from push_predictor.paper.grid_maps import told
 from push_predictor.paper.repetitions import RepeatedGrid, Repetitions
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 MOST_DRAWN = 40  # repetitions of a push
 LIMIT = 10.0  # standard errors
+NAMED = {"mean": "largest |mean|", "sd": "largest sd"}
 
 
 def paint_map_figure(
@@ -53,20 +55,29 @@ def paint_map_figure(
     axes[2, 0].set_ylabel("repetitions\npush angle (deg)")
     for ax in axes[2]:
         ax.set_xlabel("contact, fraction of the side")
+    marked = figure.axes[0].plot([], [], "o", markersize=9, markerfacecolor="none", markeredgecolor=OBSERVED)
+    figure.legend(marked, [f"{NAMED[quantity]} by repetitions: the push drawn between"], loc="outside upper center")
 
 
-def paint_differences(figure: Figure, grid: RepeatedGrid, parts: Sequence[tuple[str, Array]]) -> None:
-    """A row per quantity: its name, and the model's less the repetitions' in standard errors (A, C, 3)."""
-    axes = figure.subplots(len(parts), 3, sharex=True, sharey=True, squeeze=False)
-    scale = ColourScale(-LIMIT, LIMIT, "PuOr", "both")
-    for row, (name, differences) in zip(axes, parts, strict=True):
-        for k, ax in enumerate(row):
-            image = paint_map(ax, grid.fractions, grid.angles, differences[..., k], scale)
-            ax.set_title(f"{name} of {SYMBOLS[k]}")
-        row[0].set_ylabel("push angle (deg)")
+def paint_differences(figure: Figure, grid: RepeatedGrid, parts: Sequence[tuple[str, Array, Array]]) -> None:
+    """Two rows per quantity: its name, the model's less the repetitions' (A, C, 3) in SI, and in standard errors."""
+    axes = figure.subplots(2 * len(parts), 3, sharex=True, sharey=True, squeeze=False)
+    errors = ColourScale(-LIMIT, LIMIT, "PuOr", "both")
+    for (plain, standard), (name, differences, of_error) in zip(axes.reshape(-1, 2, 3), parts, strict=True):
+        for k, ax in enumerate(plain):
+            values = differences[..., k] * UNITS[k]
+            most = float(np.nanpercentile(np.abs(values), 98.0))
+            image = paint_map(ax, grid.fractions, grid.angles, values, ColourScale(-most, most, "PuOr", "both"))
+            figure.colorbar(image, ax=ax, extend="both", label=UNIT_NAMES[k]).ax.locator_params(nbins=5)
+            ax.set_title(f"{name} of {SYMBOLS[k]}: VHGP less repetitions")
+        for k, ax in enumerate(standard):
+            image = paint_map(ax, grid.fractions, grid.angles, of_error[..., k], errors)
+            figure.colorbar(image, ax=ax, extend="both", label="standard errors")
+            ax.set_title("the same in standard errors")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("push angle (deg)")
     for ax in axes[-1]:
         ax.set_xlabel("contact, fraction of the side")
-    figure.colorbar(image, ax=axes, label="VHGP less repetitions (standard errors)", extend="both", aspect=30)
 
 
 def paint_map(ax: Axes, fractions: Array, angles: Array, values: Array, scale: ColourScale) -> ScalarMappable:
@@ -100,8 +111,8 @@ def _paint_repetitions(ax: Axes, rig: Rig, push: Repetitions, predicted: Array) 
         moved = to_world(outline, pose + enlarged * outcome).T * 1e3
         ax.plot(*moved, color=OBSERVED, linewidth=0.5, alpha=0.3)
     paint_slider(ax, rig, inputs, predicted, mean, enlarged)
-    told = f"c = {push.fraction:.2g}, {np.degrees(push.angle) + 0.0:.0f}°, motion {enlarged:g}×".replace("-", "−")
-    ax.set_title(told, fontsize=8.0)
+    told_push = f"{told((push.fraction, push.angle))}, motion {enlarged:g}×"
+    ax.set_title(told_push, fontsize=8.0)
 
 
 def _edges(centres: Array) -> Array:

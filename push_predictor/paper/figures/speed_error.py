@@ -36,9 +36,10 @@ def paint_speed_error(figure: Figure, curves: Sequence[SpeedCurve], names: Mappi
             _paint(ax, curve, points, unit, names[curve.kind])
     axes[0].set_yscale("log")
     axes[0].set_yticks(TICKS, [f"{tick:g}" for tick in TICKS])
-    _frame(axes[0], "NMSE within the speed", "NMSE, sum of 3")
-    _frame(axes[1], "bias along the push", "observed − predicted (% of travel)")
-    _frame(axes[2], "bias across the push", "observed − predicted (% of travel)")
+    speeds = [speed for curve in curves for speed in curve.speeds]
+    _frame(axes[0], speeds, "NMSE within the speed", "NMSE, sum of 3")
+    _frame(axes[1], speeds, "bias along the push", "observed − predicted (% of travel)")
+    _frame(axes[2], speeds, "bias across the push", "observed − predicted (% of travel)")
     values = [v for curve in curves for e in curve.nmse for v in (e.value, e.low, e.high) if np.isfinite(v) and v > 0]
     axes[0].set_ylim(min(values) / 1.2, max(values) * 1.2)
     axes[0].yaxis.minorticks_off()
@@ -56,10 +57,17 @@ def _paint(ax: Axes, curve: SpeedCurve, points: Sequence[Estimate], unit: float,
     ax.plot(speed, value, color=colour, linestyle=dashes, marker=marker or None, markersize=3.5, label=name)
 
 
-def _frame(ax: Axes, title: str, label: str) -> None:
-    grid(ax)
+def speed_axis(ax: Axes, speeds: Sequence[float]) -> None:
+    """A logarithmic horizontal axis for speeds in m/s, shown in mm/s, that ends a little beyond them."""
+    low, high = 1e3 * min(speeds) / 1.15, 1e3 * max(speeds) * 1.15
+    ticks = [tick for tick in (10, 20, 50, 100, 200, 500) if low <= tick <= high]
     ax.set_xscale("log")
-    ticks = [10, 20, 50, 100, 200, 500]
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
     ax.xaxis.minorticks_off()
+    ax.set_xlim(low, high)
+
+
+def _frame(ax: Axes, speeds: Sequence[float], title: str, label: str) -> None:
+    grid(ax)
+    speed_axis(ax, speeds)
     ax.set(title=title, xlabel="speed (mm/s)", ylabel=label)

@@ -33,18 +33,26 @@ class Trajectories:
 
 
 def paint_trajectories(figure: Figure, rig: Rig, shown: Sequence[Trajectories]) -> None:
-    """A column a push: above the slider and where it goes, below the trajectories enlarged."""
-    above, below = figure.subplots(2, len(shown), squeeze=False, height_ratios=(1.15, 1.0))
-    for number, (ax, near, push) in enumerate(zip(above, below, shown, strict=True)):
-        _paint_scene(ax, rig, push)
-        _paint_near(near, push)
-        if number == 0:
-            ax.set_ylabel("across (mm)")
-            near.set_ylabel("centre's displacement across (mm)")
-    named = {
-        name: mark for ax in (above[0], below[0]) for mark, name in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(list(named.values()), list(named), loc="outside upper center", ncols=len(named))
+    """A column a push: the slider and where it goes, the trajectories enlarged, their ends enlarged once more."""
+    rows = figure.subplots(3, len(shown), squeeze=False, height_ratios=(1.2, 1.0, 1.1))
+    for (scene, ways, ends), push in zip(rows.T, shown, strict=True):
+        _paint_scene(scene, rig, push)
+        _paint_ways(ways, push)
+        _paint_ends(ends, push)
+    for row, name in zip(rows, ("across (mm)", "centre's way across (mm)", "end, across (mm)"), strict=True):
+        _alike(row)
+        row[0].set_ylabel(name)
+    marks = {n: mark for ax in rows[:, 0] for mark, n in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(marks.values()), list(marks), loc="outside upper center", ncols=len(marks))
+
+
+def _alike(axes: Sequence[Axes]) -> None:
+    """One scale for panels of one row, each about its own middle."""
+    limits = np.array([[ax.get_xlim(), ax.get_ylim()] for ax in axes])
+    half = 0.5 * np.ptp(limits, axis=2).max(axis=0)
+    for ax, middle in zip(axes, limits.mean(axis=2), strict=True):
+        ax.set(xlim=(middle[0] - half[0], middle[0] + half[0]), ylim=(middle[1] - half[1], middle[1] + half[1]))
+        ax.set_aspect("equal")
 
 
 def _paint_scene(ax: Axes, rig: Rig, push: Trajectories) -> None:
@@ -61,25 +69,20 @@ def _paint_scene(ax: Axes, rig: Rig, push: Trajectories) -> None:
     ax.plot([], [], color=TIP, label="tip and its way")
     for path in push.paths:
         ax.plot(*(1e3 * (pose[:2] + path[:, :2]).T), color=GREEN, linewidth=0.5, alpha=0.5)
-    _ellipse(ax, push, 1e3 * pose[:2])
-    ax.set_aspect("equal")
     ax.set(title=push.title, xlabel="along the push (mm)")
 
 
-def _paint_near(ax: Axes, push: Trajectories) -> None:
+def _paint_ways(ax: Axes, push: Trajectories) -> None:
     grid(ax)
     for number, path in enumerate(push.paths):
         name = "slider's centre" if number == 0 else None
         ax.plot(*(1e3 * path[:, :2].T), color=GREEN, linewidth=0.5, alpha=0.5, label=name)
-    ax.plot(*(1e3 * push.paths[:, -1, :2].T), ".", color="0.15", markersize=2.0, label="final pose")
-    _ellipse(ax, push, np.zeros(2), "95 % ellipse of final poses")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.margins(0.08)
-    ax.locator_params(nbins=6)
-    ax.set_xlabel("centre's displacement along (mm)")
+    ax.set_xlabel("centre's way along (mm)")
 
 
-def _ellipse(ax: Axes, push: Trajectories, origin: Array, name: str | None = None) -> None:
-    ends = 1e3 * push.paths[:, -1, :2]
-    outline = origin + ends.mean(axis=0) + ellipse(np.cov(ends.T))
-    ax.plot(*outline.T, color=RED, linewidth=1.3, label=name)
+def _paint_ends(ax: Axes, push: Trajectories) -> None:
+    grid(ax)
+    ends = 1e3 * (push.paths[:, -1, :2] - push.paths[:, -1, :2].mean(axis=0))
+    ax.plot(*ends.T, ".", color="0.15", markersize=3.0, label="final pose")
+    ax.plot(*ellipse(np.cov(ends.T)).T, color=RED, linewidth=1.3, label="95 % ellipse of final poses")
+    ax.set_xlabel("end, along, from the mean (mm)")

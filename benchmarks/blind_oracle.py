@@ -1,0 +1,64 @@
+"""What a model gains that is given the truth: the true mechanism with its true driver and form, on the same split."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from push_predictor.models.forms import Form
+from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.model_file import load_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.drivers import standard_form, two_dimensional
+from push_predictor.residuals.extension import extend, gain, refit_base
+from push_predictor.residuals.loading import load_evidence
+from push_predictor.residuals.split import held_out_rows
+
+
+def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:
+    """NLPD after minus refit on the held-out pushes: value, low, high; None where the mean of the motion is unchanged.
+
+    A mechanism that the library does not hold is given as the driver with the generic response.
+    """
+    if truth["channel"] != "motion":
+        return None
+    model, table = load_model(model_path), load_evidence([recording]).table
+    held_out = held_out_rows(table)
+    analysis, rest = table.take(~held_out), table.take(held_out)
+    refit = refit_base(model, analysis)
+    nlpd = gain(refit, extend(refit, analysis, [true_term(truth, analysis)]), rest)[1]
+    return {"value": nlpd.value, "low": nlpd.low, "high": nlpd.high}
+
+
+def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, str, Form]:
+    """Mechanism (None: the generic one), covariate and form of the truth, on the windows of a table."""
+    known = {mechanism.name for mechanism in LIBRARY}
+    named = [name for name in truth["names"] if name in known]
+    mechanism = named[0] if named and None not in truth["names"] else None
+    return mechanism, truth["covariates"][0], true_form(truth, table)
+
+
+def true_form(truth: Mapping[str, Any], table: PushTable) -> Form:
+    """The form of the truth with centre and scale of the driver in these windows."""
+    driver, form = truth["covariates"][0], truth["form"]
+    if form == "constant" and (driver not in table.covariates or truth["names"][0] is not None):
+        return Form("constant")
+    if form == "map" or driver == "slider_x":
+        return two_dimensional(table)
+    values = table.covariates[driver]
+    if form == "category" or driver == "edge":
+        return Form("category", (driver,), levels=tuple(float(level) for level in np.unique(values)))
+    if form == "periodic":
+        return Form("periodic", (driver,))
+    if form == "step":
+        return Form("step", (driver,), place=float(truth["place"]))
+    return standard_form(_smooth(truth), driver, values)
+
+
+def _smooth(truth: Mapping[str, Any]) -> str:
+    if truth["course"] == "saturating":
+        return "logarithmic"
+    return "quadratic" if truth["form"] in ("constant", "quadratic") else "linear"

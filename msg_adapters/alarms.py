@@ -1,0 +1,18 @@
+"""An alarm that has fired -> push_predictor_interfaces/PushAlarm."""
+
+from __future__ import annotations
+
+from msg_adapters import MessageError
+from msg_adapters.stamps import ns_to_stamp
+from push_predictor.evaluation.alarm import AlarmState
+from push_predictor_interfaces.msg import PushAlarm
+
+
+def alarm_to_message(state: AlarmState, stamp_ns: int, frame_id: str = "world") -> PushAlarm:
+    """The message of an alarm; stamp_ns: end of the push at which it fired, ns. Raises MessageError if it has not."""
+    if state.fired_at is None or state.fired_after is None or state.fired_evidence is None:
+        raise MessageError("alarm", state, "an alarm that has fired")
+    message = PushAlarm(push_id=state.fired_at, pushes=state.fired_after)
+    message.header.stamp, message.header.frame_id = ns_to_stamp(stamp_ns), frame_id
+    message.log10_evidence, message.false_alarm_rate = state.fired_evidence, state.false_alarm_rate
+    return message

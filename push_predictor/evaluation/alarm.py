@@ -1,0 +1,204 @@
+"""An alarm that may be read after every push: it is ever false with at most a chosen probability.
+
+Each push gives scores. Under exchangeability with the calibration pushes the rank of a new score among all scores so
+far, ties broken at random, makes p values that are independent and uniform (Vovk, Gammerman and Shafer 2005, section
+7.1: conformal transducers). On each score bets are laid that these p values are too often near 0 (or near 1): a test
+martingale, a mixture over the bets and over the push at which the change began. A weighted union over the scores takes
+no account of how these depend on each other:
+
+    P(max over scores of weight * martingale ever reaches 1 / rate) <= sum of weights * rate = rate    (Ville)
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.errors import RequestError
+from push_predictor.types import Array
+
+DEFAULT_RATE = 0.01
+POWERS = (0.2, 0.4, 0.6, 0.8)  # of the bets e p^(e - 1)
+PATIENCE = 50.0  # pushes; a change is expected early, but never ruled out: P(not begun by t) = (1 + t / this)^-1/2
+SMALLEST = 1e-12  # p value; a bet on less would be lost in rounding
+MOST_KEPT = 20_000  # scores of each kind that a new one is ranked among; beyond that the oldest new ones are dropped
+
+
+@dataclass(frozen=True)
+class ScoreKind:
+    """What a score is called, its share of the false alarms (all sum to one), and whether low values count too."""
+
+    name: str
+    weight: float
+    two_sided: bool
+
+
+@dataclass(frozen=True)
+class AlarmState:
+    """What the alarm has seen.
+
+    log10_evidence: of the present; it fires at `threshold`. strongest: the score that has it. fired_at: the push
+    (None: not yet), fired_after: how many pushes had been seen then, fired_evidence: the evidence then, of which score.
+    """
+
+    false_alarm_rate: float
+    threshold: float
+    pushes: int
+    log10_evidence: float
+    strongest: str
+    calibration_pushes: int
+    fired_at: str | None = None
+    fired_after: int | None = None
+    fired_evidence: float | None = None
+    fired_by: str | None = None
+
+    @property
+    def fired(self) -> bool:
+        """Whether it has fired."""
+        return self.fired_at is not None
+
+
+class Alarm:
+    """Feed it the scores of one push after the other; it fires at most once, until it is reset.
+
+    kinds: the k scores of a push. calibration (n, k): scores of pushes that the model fits. seed: breaks ties.
+    Raises RequestError for a rate outside (0, 1), and for scores that are not finite.
+    """
+
+    def __init__(
+        self, kinds: Sequence[ScoreKind], calibration: Array, rate: float = DEFAULT_RATE, seed: int = 0
+    ) -> None:
+        self.rate = checked_rate(rate)
+        self.kinds = tuple(kinds)
+        for row in calibration:
+            self._check(row)
+        self._calibration, self._seed = np.asarray(calibration, dtype=np.float64), seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all pushes but those of the calibration: it may fire again."""
+        self._rng = np.random.default_rng(self._seed)
+        self._rank = [_Ranking(column) for column in self._calibration.T]
+        self._bets = [_Bets(kind.two_sided) for kind in self.kinds]
+        self._pushes = 0
+        self._fired: tuple[str, int, float, str] | None = None
+
+    def add(self, push_id: str, scores: Array) -> bool:
+        """Take the scores (k,) of a push; answers whether the alarm fires at this very push."""
+        self._check(scores)
+        chance = 1.0 - self._rng.random(len(self.kinds))
+        for ranking, bets, score, u in zip(self._rank, self._bets, scores.tolist(), chance.tolist(), strict=True):
+            bets.add(ranking.p_value(score, u))
+        self._pushes += 1
+        evidence, strongest = self._evidence()
+        if self._fired is not None or evidence < self.threshold:
+            return False
+        self._fired = (push_id, self._pushes, evidence, strongest)
+        return True
+
+    @property
+    def threshold(self) -> float:
+        """Log10 of the evidence at which it fires."""
+        return float(-np.log10(self.rate))
+
+    @property
+    def state(self) -> AlarmState:
+        """What it has seen so far."""
+        seen = (self.rate, self.threshold, self._pushes, *self._evidence(), len(self._calibration))
+        return AlarmState(*seen, *(self._fired or ()))
+
+    def _evidence(self) -> tuple[float, str]:
+        each = [np.log10(kind.weight) + bets.log10 for kind, bets in zip(self.kinds, self._bets, strict=True)]
+        best = int(np.argmax(each))
+        return float(each[best]), self.kinds[best].name
+
+    def _check(self, scores: Array) -> None:
+        for kind, score in zip(self.kinds, scores, strict=True):
+            if not np.isfinite(score):
+                raise RequestError(f"score {kind.name}", float(score), "a finite number")
+
+
+def checked_rate(rate: float) -> float:
+    """The rate, if it is one. Raises RequestError."""
+    if not 0.0 < rate < 1.0:
+        raise RequestError("false_alarm_rate", rate, "a number above 0 and below 1")
+    return float(rate)
+
+
+def alarm_json(state: AlarmState | None, off: str = "") -> dict[str, object]:
+    """The field `alarm` of the JSON of `validate`. state: None where no alarm could be kept, off: why."""
+    if state is None:
+        return {"fired": False, "off": off}
+    return {
+        "fired": state.fired,
+        "push_id": state.fired_at,
+        "pushes": state.fired_after if state.fired else state.pushes,
+        "log10_evidence": state.fired_evidence if state.fired else state.log10_evidence,
+        "score": state.fired_by if state.fired else state.strongest,
+        "false_alarm_rate": state.false_alarm_rate,
+        "threshold": state.threshold,
+        "calibration_pushes": state.calibration_pushes,
+    }
+
+
+def with_alarm(text: str, alarm: Mapping[str, object]) -> str:
+    """The JSON text of a validation with the field `alarm` in it."""
+    return json.dumps({**json.loads(text), "alarm": dict(alarm)}, indent=2, allow_nan=False) + "\n"
+
+
+class _Ranking:
+    """Scores so far, in order, so that a new one is ranked in no time."""
+
+    def __init__(self, calibration: Array) -> None:
+        self._sorted = np.sort(calibration)
+        self._new: list[float] = []
+
+    def p_value(self, score: float, chance: float) -> float:
+        """Share of the scores, the new one among them, that are above it; chance: of those equal to it, the share."""
+        low, high = np.searchsorted(self._sorted, score, "left"), np.searchsorted(self._sorted, score, "right")
+        above, equal = len(self._sorted) - high, high - low
+        p_value = (above + chance * (equal + 1)) / (len(self._sorted) + 1)
+        self._sorted = np.insert(self._sorted, low, score)
+        if len(self._sorted) > MOST_KEPT:
+            self._drop()
+        self._new.append(score)
+        return float(p_value)
+
+    def _drop(self) -> None:
+        if self._new:
+            self._sorted = np.delete(self._sorted, np.searchsorted(self._sorted, self._new.pop(0)))
+
+
+class _Bets:
+    """The martingale of one score: capital that waits, and capital that is on the bets, each since its own push."""
+
+    def __init__(self, two_sided: bool) -> None:
+        count = len(POWERS) * (2 if two_sided else 1)
+        self._two_sided, self._count, self._seen = two_sided, count, 0
+        self._log_running = np.full(count, -np.inf)
+
+    def add(self, p_value: float) -> None:
+        """Start bets with a part of what waits, and settle all by a p value."""
+        log_started = np.log((_waiting(self._seen) - _waiting(self._seen + 1)) / self._count)
+        self._seen += 1
+        tails = (p_value, 1.0 - p_value) if self._two_sided else (p_value,)
+        won = np.concatenate([_log_bets(max(tail, SMALLEST)) for tail in tails])
+        self._log_running = np.logaddexp(self._log_running, log_started) + won
+
+    @property
+    def log10(self) -> float:
+        """Log10 of all capital; it began with 1."""
+        everything = np.append(self._log_running, np.log(_waiting(self._seen)))
+        return float(np.logaddexp.reduce(everything) / np.log(10.0))
+
+
+def _waiting(pushes: int) -> float:
+    return float((1.0 + pushes / PATIENCE) ** -0.5)
+
+
+def _log_bets(p_value: float) -> Array:
+    power = np.array(POWERS)
+    return np.asarray(np.log(power) + (power - 1.0) * np.log(p_value))

@@ -1,0 +1,189 @@
+"""What the kinds of push models differ in: learnt, analytical, and either of them extended by effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.effects import Effect
+from push_predictor.models.features import push_features
+from push_predictor.models.gp import GaussianProcess
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.prediction import LatentPrediction
+from push_predictor.models.quadrature import exact_log_density
+from push_predictor.models.vhgp import VHGP
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.types import Array
+
+
+class Body(Protocol):
+    """What the kinds of models differ in."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the covariates that every push must bring."""
+
+    def moments(self, push: Push) -> tuple[Array, Array, Array]:
+        """Mean (n, 3), covariance (n, 3, 3) of an outcome, process covariance (n, 3, 3)."""
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """Log density (n, 3) of outcomes under the exact predictive, or None where it is the Gaussian."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Standardisation: the features that vary (columns), their mean and sd, and those of the three outcomes."""
+
+    columns: tuple[int, ...]
+    feature_mean: Array
+    feature_sd: Array
+    outcome_mean: Array
+    outcome_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedBody:
+    """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV)."""
+
+    rig: Rig
+    scaling: Scaling
+    regressions: tuple[GaussianProcess | VHGP, ...]
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Body: none."""
+        return ()
+
+    def moments(self, push: Push) -> tuple[Array, Array, Array]:
+        """See Body. Every outcome takes the duration of the training windows; the caller has checked it."""
+        latent = self.latent(push.inputs)
+        sd = self.scaling.outcome_sd
+        mean = np.column_stack([p.mean for p in latent]) * sd + self.scaling.outcome_mean
+        total = np.column_stack([p.outcome_variance for p in latent]) * sd**2
+        process = np.column_stack([p.process_variance for p in latent]) * sd**2
+        return mean, _diagonal(total), _diagonal(process)
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Body; None for the standard GP, whose predictive is Gaussian."""
+        return self.log_density(self.latent(push.inputs), outcomes) if self.exact else None
+
+    @property
+    def exact(self) -> bool:
+        """Whether the exact predictive is another than the Gaussian of its moments."""
+        return all(isinstance(regression, VHGP) for regression in self.regressions)
+
+    @property
+    def outcomes(self) -> Array:
+        """The outcomes (n, 3) that it was trained on, SI."""
+        scaled = np.column_stack([regression.outputs for regression in self.regressions])
+        return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
+
+    def latent(self, inputs: Array) -> list[LatentPrediction]:
+        """Per output, the latent predictions in standardised units."""
+        features = scaled_features(self.rig, self.scaling, inputs)
+        return [regression.predict(features) for regression in self.regressions]
+
+    def log_density(self, latent: Sequence[LatentPrediction], outcomes: Array) -> Array:
+        """Log density (n, 3) of outcomes (n, 3) under latent predictions in standardised units, one per output."""
+        scaled = (outcomes - self.scaling.outcome_mean) / self.scaling.outcome_sd
+        columns = [exact_log_density(p, scaled[:, k]) for k, p in enumerate(latent)]
+        return np.column_stack(columns) - np.log(self.scaling.outcome_sd)
+
+
+@dataclass(frozen=True, eq=False)
+class AnalyticalBody:
+    """The quasi-static model of Lynch et al. 1992 with one covariance for all pushes, (3, 3)."""
+
+    physics: AnalyticalPush
+    covariance: Array
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Body: none."""
+        return ()
+
+    def moments(self, push: Push) -> tuple[Array, Array, Array]:
+        """See Body."""
+        mean = self.physics.displacement(push.inputs, push.duration)
+        covariance = np.broadcast_to(self.covariance, (len(mean), 3, 3)).copy()
+        return mean, covariance, covariance.copy()
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Body: the predictive is Gaussian."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedBody:
+    """A base with effects that it lacks: each shifts the mean and adds its own uncertainty to the covariance.
+
+    physics: the analytical model from which the effects' responses are computed. scale (3,): what the base's standard
+    deviations of dx, dy, dtheta are multiplied by, found once the effects are in.
+    """
+
+    base: LearnedBody | AnalyticalBody
+    physics: AnalyticalPush
+    effects: tuple[Effect, ...]
+    scale: Array
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """See Body: what its effects take, each name once."""
+        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.needs))
+
+    def moments(self, push: Push) -> tuple[Array, Array, Array]:
+        """See Body."""
+        return self.extended(self.base.moments(push), push)
+
+    def extended(self, moments: tuple[Array, Array, Array], push: Push) -> tuple[Array, Array, Array]:
+        """The moments of the base, computed by whatever means, with the effects in them."""
+        mean, total, process = moments
+        shift, unsure = self.shift(push)
+        factor = np.outer(self.scale, self.scale)
+        return mean + shift, total * factor + unsure, process * factor
+
+    def shift(self, push: Push) -> tuple[Array, Array]:
+        """Sum of the effects' shifts (n, 3), and its covariance (n, 3, 3) as if they were found independently."""
+        shift, unsure = np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3))
+        for effect in self.effects:
+            each, covariance = effect.shift(self.physics, push)
+            shift, unsure = shift + each, unsure + covariance
+        return shift, unsure
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Body: the latent function of the base is shifted and less certain, its noise is scaled."""
+        base = self.base
+        if isinstance(base, AnalyticalBody) or not base.exact:
+            return None
+        shift, unsure = self.shift(push)
+        shift, sd = shift / base.scaling.outcome_sd, base.scaling.outcome_sd
+        variance = np.diagonal(unsure, axis1=1, axis2=2) / sd**2
+        latent = [
+            replace(
+                p,
+                mean=p.mean + shift[:, k],
+                variance=p.variance * self.scale[k] ** 2 + variance[:, k],
+                log_noise_mean=p.log_noise_mean + 2.0 * np.log(self.scale[k]),
+            )
+            for k, p in enumerate(base.latent(push.inputs))
+        ]
+        return base.log_density(latent, outcomes)
+
+
+def scaled_features(rig: Rig, scaling: Scaling, inputs: Array) -> Array:
+    """Standardised features (n, D) of inputs (n, 3)."""
+    features = push_features(rig.outline, inputs)[:, scaling.columns]
+    return np.asarray((features - scaling.feature_mean) / scaling.feature_sd)
+
+
+def _diagonal(variances: Array) -> Array:
+    matrices = np.zeros((len(variances), len(OUTPUTS), len(OUTPUTS)))
+    index = np.arange(len(OUTPUTS))
+    matrices[:, index, index] = variances
+    return matrices

@@ -1,0 +1,34 @@
+"""An underside that slides more easily along one direction of the body: runners, brushed metal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.models.mechanisms.perturbed import Change, State, no_change, response_to
+from push_predictor.types import Array
+
+STEP = 0.05
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit of cos and sin part of the anisotropy in the body, (n, 3, 2)."""
+    n = len(push.inputs)
+
+    def straight(state: State, amount: float) -> Change:
+        return replace(no_change(n), stretch=np.tile([amount, 0.0], (n, 1)))
+
+    def diagonal(state: State, amount: float) -> Change:
+        return replace(no_change(n), stretch=np.tile([0.0, amount], (n, 1)))
+
+    return response_to([straight, diagonal], STEP, physics, push)
+
+
+BODY_ANISOTROPY = Mechanism(
+    "body_anisotropy",
+    (Parameter("anisotropy along the body's x", "1", 0.8), Parameter("anisotropy along its diagonal", "1", 0.8)),
+    response,
+)

@@ -1,0 +1,32 @@
+"""The centre of friction away from where the base model has it: an uneven load, a part that has shifted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.types import Array
+
+STEP = 0.002  # m
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per metre along the body's x and y, (n, 3, 2)."""
+
+    def displaced(x: float, y: float) -> Array:
+        centre = (physics.support.centre[0] + x, physics.support.centre[1] + y)
+        moved = replace(physics, support=replace(physics.support, centre=centre))
+        return moved.displacement(push.inputs, push.duration)
+
+    columns = [displaced(x, y) - displaced(-x, -y) for x, y in ((STEP, 0.0), (0.0, STEP))]
+    return np.stack(columns, axis=2) / (2.0 * STEP)
+
+
+CENTRE_OF_FRICTION = Mechanism(
+    "centre_of_friction",
+    (Parameter("shift along the body's x", "m", 0.05), Parameter("shift along the body's y", "m", 0.05)),
+    response,
+)

@@ -1,0 +1,28 @@
+"""A pusher or a side that rubs more one way than the other: machining marks, a tip that leans or is turned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.models.mechanisms.perturbed import Change, State, no_change, response_to
+from push_predictor.types import Array
+
+STEP = 0.05
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit by which the friction is larger in slip to the left and smaller to the right, (n, 3, 1)."""
+
+    def change(state: State, amount: float) -> Change:
+        return replace(no_change(len(state.turn)), friction=amount * state.slip.astype(np.float64))
+
+    return response_to([change], STEP, physics, push)
+
+
+CONTACT_ASYMMETRY = Mechanism(
+    "contact_asymmetry", (Parameter("contact friction in slip to the left less the mean", "1", 1.0),), response
+)

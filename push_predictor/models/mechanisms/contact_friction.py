@@ -1,0 +1,22 @@
+"""Friction between pusher and slider, other than the base model has it (Coulomb; Mason 1986)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.types import Array
+
+STEP = 0.1  # wide enough to feel pushes that are about to slip
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit of the coefficient, (n, 3, 1): zero where the contact sticks anyway."""
+    low = max(physics.contact_friction - STEP, 0.0)
+    high = physics.contact_friction + STEP
+    more, less = (replace(physics, contact_friction=mu).displacement(push.inputs, push.duration) for mu in (high, low))
+    return ((more - less) / (high - low))[:, :, None]
+
+
+CONTACT_FRICTION = Mechanism("contact_friction", (Parameter("change of the contact friction", "1", 1.5),), response)

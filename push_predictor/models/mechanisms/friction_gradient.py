@@ -1,0 +1,47 @@
+"""A table that rubs more on one side of the slider than on the other: the centre of friction goes to the rougher side.
+
+With friction that rises by the share s per metre along a direction, the centre of friction moves along it by s times
+the mean square of the pressure's distance from the centre in that direction. For an even disc that is 9 / 16 of c^2;
+a square has it within 1 percent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.models.mechanisms.perturbed import Change, ChangeOf, State, no_change, response_to
+from push_predictor.types import Array
+
+STEP = 2.0  # 1 / m
+SQUARE_OF_SPREAD = 9.0 / 16.0  # mean square along one direction, in units of c^2
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit of the gradient along the world's x and y, (n, 3, 2)."""
+    heading = push.covariates["slider_heading"]
+    square = SQUARE_OF_SPREAD * physics.support.length**2
+
+    def along(direction: tuple[float, float]) -> ChangeOf:
+        def change(state: State, amount: float) -> Change:
+            in_world = np.tile(amount * square * np.array(direction), (len(heading), 1))
+            return replace(no_change(len(heading)), centre=rotate(in_world, -(heading + state.turn)))
+
+        return change
+
+    return response_to([along((1.0, 0.0)), along((0.0, 1.0))], STEP, physics, push)
+
+
+FRICTION_GRADIENT = Mechanism(
+    "friction_gradient",
+    (
+        Parameter("relative rise of friction along the world's x", "1/m", 50.0),
+        Parameter("the same along y", "1/m", 50.0),
+    ),
+    response,
+    needs=("slider_heading",),
+)

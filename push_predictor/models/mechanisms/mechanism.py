@@ -1,0 +1,51 @@
+"""What a mechanism is: physical parameters and the response of an outcome to each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A physical quantity with its unit; the base model has it at zero.
+
+    largest: absolute value beyond which no rig would have it. A fit that needs more mimics something else.
+    """
+
+    name: str
+    unit: str
+    largest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """n pushes: inputs (n, 3: velocity m/s, contact, angle rad), duration (n,) s, covariates (n,) each by name."""
+
+    inputs: Array
+    duration: Array
+    covariates: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism that the base model lacks, or has at another value.
+
+    response(physics, push) -> (n, 3, p): derivative of the outcome (dx, dy in m, dtheta in rad, push frame) with
+    respect to each of the p parameters, at the physics given. needs: covariates that the response itself takes, beside
+    those that drive it.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    response: Callable[[AnalyticalPush, Push], Array]
+    needs: tuple[str, ...] = ()
+
+    def plausible(self, values: Array) -> bool:
+        """Whether values (n, p) of the parameters are such as a rig could have."""
+        return bool(np.all(np.abs(values) <= [parameter.largest for parameter in self.parameters]))

@@ -1,0 +1,28 @@
+"""How far from the centre the slider presses: the limit surface's length c = mmax / fmax (Goyal et al. 1991)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.types import Array
+
+STEP = 0.05  # of the logarithm
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit of the logarithm of c, (n, 3, 1)."""
+
+    def displaced(step: float) -> Array:
+        support = replace(physics.support, length=physics.support.length * float(np.exp(step)))
+        return replace(physics, support=support).displacement(push.inputs, push.duration)
+
+    return ((displaced(STEP) - displaced(-STEP)) / (2.0 * STEP))[:, :, None]
+
+
+PRESSURE_SPREAD = Mechanism(
+    "pressure_spread", (Parameter("relative change of the pressure's spread", "1", 1.0),), response
+)

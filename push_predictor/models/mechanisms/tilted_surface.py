@@ -1,0 +1,38 @@
+"""A table that is not level, or another steady pull on the slider: it adds to the load on the limit surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
+from push_predictor.models.mechanisms.perturbed import Change, ChangeOf, State, no_change, response_to
+from push_predictor.types import Array
+
+STEP = 0.02
+
+
+def response(physics: AnalyticalPush, push: Push) -> Array:
+    """Outcome per unit of the pull along the world's x and y, as shares of the sliding friction, (n, 3, 2)."""
+    heading = push.covariates["slider_heading"]
+    n = len(heading)
+
+    def along(direction: tuple[float, float]) -> ChangeOf:
+        def change(state: State, amount: float) -> Change:
+            pull = rotate(np.tile(amount * np.array(direction), (n, 1)), -(heading + state.turn))
+            return replace(no_change(n), pull=np.column_stack([pull, np.zeros(n)]))
+
+        return change
+
+    return response_to([along((1.0, 0.0)), along((0.0, 1.0))], STEP, physics, push)
+
+
+TILTED_SURFACE = Mechanism(
+    "tilted_surface",
+    (Parameter("pull along the world's x, share of friction", "1", 0.8), Parameter("the same along y", "1", 0.8)),
+    response,
+    needs=("slider_heading",),
+)

@@ -1,0 +1,138 @@
+"""What a base model leaves over where it was trained: the reference for what lies in its own inputs.
+
+A learnt base is wrong by a function of its inputs, because it saw few pushes; so an effect in these inputs counts only
+as its relation to the residual in the new data less that in the training data, uncertain in both. The same goes for
+covariates that share the tracker's noise with the residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody
+from push_predictor.models.gp import GaussianProcess
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import PushModel, scaled_features
+from push_predictor.models.vhgp import VHGP
+from push_predictor.residuals.candidates import Candidate, Kind, whitened_response
+from push_predictor.residuals.drivers import LOCAL
+from push_predictor.residuals.evidence import Evidence, push_order, whitener_of
+from push_predictor.residuals.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.screening import TINY, Scores, Without, raw_scores
+from push_predictor.types import Array, IntArray
+
+FOLDS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Evidence from the training windows, none of them judged by a model that saw its push; basis of their inputs."""
+
+    evidence: Evidence
+    basis: InputsBasis
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation (3,) of the residuals in units of the prediction: 1 for an honest model."""
+        return np.asarray(self.evidence.z.std(axis=0))
+
+    def applies(self, candidate: Candidate) -> bool:
+        """Whether this candidate is judged against training: one in the base's own inputs, or one local to a push."""
+        if any(name not in self.evidence.table.covariates for name in candidate.form.drivers):
+            return False
+        own = candidate.kind == "constant" or (candidate.kind == "speed" and self.basis.knows_speed)
+        return (own and self.basis.learnt) or candidate.covariate in LOCAL
+
+    def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
+        """Block scores and information of a candidate on the training windows."""
+        evidence = self.evidence
+        response = self._response(candidate.mechanism)
+        there = replace(
+            candidate, response=response, values=candidate.form.values(evidence.table.covariates, len(response))
+        )
+        out = Without(inputs_of(candidate.kind, self.basis))
+        return raw_scores(out.left(evidence.z, evidence.block), out(there.columns))
+
+    def _response(self, mechanism: str | None) -> Array:
+        if mechanism not in self._responses:
+            self._responses[mechanism] = whitened_response(self.evidence, mechanism)
+        return self._responses[mechanism]
+
+    @cached_property
+    def _responses(self) -> dict[str | None, Array]:
+        return {}
+
+
+def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
+    """What of the inputs (n, m) is taken out of a candidate and the residual: nothing, where it lies in them itself."""
+    if kind == "constant":
+        return basis.columns[:, :0]
+    return basis.still if kind == "speed" else basis.columns
+
+
+def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
+    """The baseline of a model, from the training windows that it keeps."""
+    table = model.training
+    push = Push(table.inputs, table.duration, table.covariates)
+    moments = _crossed(model.base.body, table.outcomes - _shift(model, push), push, push_order(table))
+    mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
+    evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
+    return Baseline(evidence, inputs_basis(model, table))
+
+
+def difference(new: tuple[Scores, Array], training: tuple[Scores, Array]) -> Scores:
+    """Scores of b + b' blocks of the relation in new data less that in training, as screening.screen takes them.
+
+    new, training: block scores and information of the same columns in both.
+    """
+    (scores, information), (others, other) = new, training
+    values, vectors = np.linalg.eigh(information + other)
+    keep = vectors[:, values > TINY * max(values[-1], np.finfo(float).tiny)]
+    ours, theirs = (np.linalg.inv(_lifted(keep.T @ a @ keep, information + other)) for a in (information, other))
+    spread, axes = np.linalg.eigh(ours + theirs)
+    root = axes / np.sqrt(spread)
+    return scores.turned(keep @ ours @ root).beside(others.turned(-keep @ theirs @ root))
+
+
+def _lifted(information: Array, scale: Array) -> Array:
+    """Information that is nowhere zero: where training says nothing, no difference can be told."""
+    return np.asarray(information + 1e-9 * np.trace(scale) / len(scale) * np.eye(len(information)))
+
+
+def _shift(model: PushModel, push: Push) -> Array:
+    return model.body.shift(push)[0] if isinstance(model.body, ExtendedBody) else np.zeros((len(push.inputs), 3))
+
+
+def _crossed(
+    body: LearnedBody | AnalyticalBody | ExtendedBody, outcomes: Array, push: Push, order: IntArray
+) -> tuple[Array, Array, Array]:
+    """Moments at the training windows by the model without their fold of pushes, its hyperparameters kept."""
+    if not isinstance(body, LearnedBody):
+        return body.moments(push)
+    moments = tuple(np.empty(shape) for shape in ((len(order), 3), (len(order), 3, 3), (len(order), 3, 3)))
+    for fold in range(FOLDS):
+        test = order % FOLDS == fold
+        if test.any():
+            without = _conditioned(body, push.inputs[~test], outcomes[~test], ~test)
+            there = Push(push.inputs[test], push.duration[test], {})
+            for whole, part in zip(moments, without.moments(there), strict=True):
+                whole[test] = part
+    return moments[0], moments[1], moments[2]
+
+
+def _conditioned(body: LearnedBody, inputs: Array, outcomes: Array, rows: Array) -> LearnedBody:
+    features = scaled_features(body.rig, body.scaling, inputs)
+    scaled = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd
+    return replace(
+        body, regressions=tuple(_again(r, features, y, rows) for r, y in zip(body.regressions, scaled.T, strict=True))
+    )
+
+
+def _again(regression: GaussianProcess | VHGP, features: Array, outputs: Array, rows: Array) -> GaussianProcess | VHGP:
+    if isinstance(regression, GaussianProcess):
+        return GaussianProcess(features, outputs, regression.parameters)
+    return VHGP(features, outputs, regression.parameters, regression.site_precisions[rows])

@@ -1,0 +1,121 @@
+"""Mechanism x driver: everything that is tried, in units of the residual's standard deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from push_predictor.models.effects import generic_responses, mechanism_named
+from push_predictor.models.forms import Form
+from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.residuals.drivers import CONSTANT, HEADINGS, screening_forms
+from push_predictor.residuals.evidence import Evidence
+from push_predictor.residuals.inputs_basis import InputsBasis
+from push_predictor.residuals.screening import Without
+from push_predictor.types import Array
+
+HEADED = "push_heading"  # drives what has a direction in the world by itself
+SIDES = "edge"  # tells apart what a base folds
+SPEED = "velocity"
+OUTSIDE = 0.5  # share of a constant effect that a base which folds the sides cannot have learnt: then sides drive it
+
+Kind = Literal["driven", "speed", "constant"]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mechanism (None: the generic fall-back) with a driver in one form.
+
+    response (n, 3, p): whitened outcome per unit of the parameters; values (n, m): what the form multiplies it by.
+    """
+
+    mechanism: str | None
+    covariate: str
+    form: Form
+    response: Array
+    values: Array | None = None
+
+    @property
+    def columns(self) -> Array:
+        """Whitened columns (n, 3, p * m), p first."""
+        if self.values is None:
+            return self.response
+        n = len(self.response)
+        return (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
+
+    @property
+    def kind(self) -> Kind:
+        """Whether something drives it that is no input of a base, or the speed, or nothing."""
+        if self.covariate == CONSTANT:
+            return "constant"
+        return "speed" if self.covariate == SPEED else "driven"
+
+    @property
+    def label(self) -> tuple[str | None, str]:
+        """What a reader calls it."""
+        return self.mechanism, self.covariate
+
+
+def candidates_of(
+    evidence: Evidence, names: Sequence[str] | None = None, basis: InputsBasis | None = None
+) -> list[Candidate]:
+    """All candidates: every mechanism whose needs are recorded, and the fall-back, with every driver and with none.
+
+    basis: of the model's inputs, by which a constant effect that differs between the sides it folds is told apart.
+    """
+    forms = [(CONSTANT, Form("constant")), *screening_forms(evidence.table, names)]
+    values = [form.values(evidence.table.covariates, len(evidence.table)) for _, form in forms]
+    found = []
+    for mechanism in usable(evidence):
+        response = whitened_response(evidence, mechanism)
+        for (covariate, form), column in zip(forms, values, strict=True):
+            if covariate in HEADINGS and _headed(mechanism):
+                continue  # turned back by the heading, it would be one of the body, by a wrong name
+            driver = _constant_driver(mechanism, response, basis) if covariate == CONSTANT else covariate
+            found.append(Candidate(mechanism, driver, form, response, column))
+    return found
+
+
+def usable(evidence: Evidence) -> list[str | None]:
+    """The mechanisms whose needs are recorded, and None, the fall-back."""
+    recorded = evidence.table.covariates
+    return [*(m.name for m in LIBRARY if all(need in recorded for need in m.needs)), None]
+
+
+def candidate(evidence: Evidence, mechanism: str | None, covariate: str, form: Form) -> Candidate:
+    """One candidate on these windows."""
+    values = form.values(evidence.table.covariates, len(evidence.table))
+    return Candidate(mechanism, covariate, form, whitened_response(evidence, mechanism), values)
+
+
+def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
+    """Outcome per unit of a mechanism's parameters (n, 3, p), in units of the predicted deviation."""
+    physics, push = evidence.physics, evidence.push
+    response = (
+        generic_responses(physics, push, evidence_scale(evidence))
+        if mechanism is None
+        else mechanism_named(mechanism).response(physics, push)
+    )
+    return np.einsum("nij,njp->nip", evidence.whitener, response)
+
+
+def evidence_scale(evidence: Evidence) -> Array:
+    """Unit of the generic responses (3,): deviation of the residuals per metre of the tip's way."""
+    way = evidence.table.inputs[:, 0] * evidence.table.duration
+    return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(way**2)))
+
+
+def _constant_driver(mechanism: str | None, response: Array, basis: InputsBasis | None) -> str:
+    if _headed(mechanism):
+        return HEADED
+    if basis is None or not basis.folds:
+        return CONSTANT
+    outside = np.sum(Without(basis.columns)(response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
+    return SIDES if outside > OUTSIDE else CONSTANT
+
+
+def _headed(mechanism: str | None) -> bool:
+    return mechanism is not None and "slider_heading" in mechanism_named(mechanism).needs

@@ -1,0 +1,71 @@
+"""Putting a measurement error right where it was made: in the stream, so that the windows can be cut again.
+
+The tracker's stream is brought to the robot's frame and clock, since the pusher's command, the contact and the push
+frame are told in these; a tool offset goes out of the pusher's stream, a bias out of the wrench. A push table keeps no
+streams: its windows cannot be cut again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.recordings.streams import PoseStream, Recording
+
+NO_STREAMS = "a push table keeps no streams: the error can be told but not corrected, give the recording"
+
+
+def correct(recording: Recording, mechanism: str, values: Sequence[float]) -> Recording:
+    """The recording without an error of measurement.
+
+    values: the error's parameters as MeasurementError.values gives them. clock_offset (s): the slider's stamps come
+    late; frame_rotation (rad): the tracker's frame shows the slider turned about the world's origin; frame_shift (m,
+    m): it shows it shifted; tool_offset (m, m): the pusher's stream shows the tip shifted; wrench_bias (N, N): the
+    sensor reads too much, in world axes. Raises KeyError for another mechanism.
+    """
+    corrected = CORRECTIONS[mechanism](recording, *values)
+    told = ", ".join(f"{value:.3g}" for value in values)
+    return replace(corrected, notes=(*recording.notes, f"corrected for {mechanism} ({told})"))
+
+
+def _clock(recording: Recording, lateness: float) -> Recording:
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, stamp=slider.stamp - round(lateness * 1e9)))
+
+
+def _rotation(recording: Recording, turn: float) -> Recording:
+    slider = recording.slider
+    place = rotate(np.column_stack([slider.x, slider.y]), np.array(-turn))
+    heading = wrap_angle(slider.heading - turn)
+    return replace(recording, slider=replace(slider, x=place[:, 0], y=place[:, 1], heading=heading))
+
+
+def _shift(recording: Recording, x: float, y: float) -> Recording:
+    return replace(recording, slider=_moved(recording.slider, -x, -y))
+
+
+def _tool(recording: Recording, x: float, y: float) -> Recording:
+    return replace(recording, pusher=_moved(recording.pusher, -x, -y))
+
+
+def _bias(recording: Recording, x: float, y: float) -> Recording:
+    wrench = recording.wrench
+    if wrench is None:
+        return recording
+    return replace(recording, wrench=replace(wrench, fx=wrench.fx - x, fy=wrench.fy - y))
+
+
+def _moved(stream: PoseStream, x: float, y: float) -> PoseStream:
+    return replace(stream, x=stream.x + x, y=stream.y + y)
+
+
+CORRECTIONS: dict[str, Callable[..., Recording]] = {
+    "clock_offset": _clock,
+    "frame_rotation": _rotation,
+    "frame_shift": _shift,
+    "tool_offset": _tool,
+    "wrench_bias": _bias,
+}

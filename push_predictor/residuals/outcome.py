@@ -1,0 +1,112 @@
+"""What a trace found, as the contract's section 5 tells it, and what its report shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from push_predictor.evaluation.validation import Comparison
+from push_predictor.models.effects import Effect
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+Verdict = Literal["none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance"]
+CHANNELS: dict[Verdict, str] = {
+    "none": "none",
+    "effect": "motion",
+    "driver_only": "motion",
+    "mechanism_only": "motion",
+    "variance": "motion",
+    "wrench_only": "wrench",
+    "measurement": "measurement",
+}
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A physical parameter with its 95 % interval."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """One effect as it is told: p_value is family-wise, share_of_residual that of the residual's sum of squares."""
+
+    mechanism: str | None
+    covariate: str
+    outputs: tuple[str, ...]
+    form: str
+    parameter: Sized | None
+    p_value: float
+    share_of_residual: float
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A candidate that was tried, with its family-wise p value."""
+
+    mechanism: str | None
+    covariate: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """After minus refit on held-out pushes, with the 95 % interval of a paired bootstrap of pushes."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """The held-out pushes, predicted by the deployed model, by the refit and by the extended model.
+
+    digest: sha256 of their rows, taken before the first look at them.
+    """
+
+    table: PushTable
+    before: Comparison
+    refit: Comparison
+    after: Comparison
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """All that a trace found. effects go with terms, strongest first.
+
+    analysis: the windows that the search saw, residual and left (n, 3) their standardised residuals before and after
+    what was found. equivalent: rivals of the first effect's driver; mechanisms: rivals of its mechanism. extended: the
+    model with the effects, None where the motion model stays. notes: what a reader must know, in sentences.
+    """
+
+    verdict: Verdict
+    kind: Literal["mean", "variance"] | None
+    model: PushModel
+    effects: tuple[FoundEffect, ...]
+    terms: tuple[Effect, ...]
+    equivalent: tuple[str, ...]
+    mechanisms: tuple[str, ...]
+    undecided: bool
+    analysis: PushTable
+    residual: Array
+    left: Array
+    held_out: HeldOut
+    gain_nmse: Gain
+    gain_nlpd: Gain
+    extended: PushModel | None
+    tested: tuple[Tested, ...]
+    minimum_detectable: Mapping[str, Mapping[str, Any]]
+    remaining: str | None
+    experiment: tuple[Mapping[str, float], ...]
+    alpha: float
+    notes: tuple[str, ...] = field(default=())

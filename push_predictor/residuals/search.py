@@ -1,0 +1,219 @@
+"""The search: screen all candidates, take the best, take it out, look again; at most three."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+
+from push_predictor.models.forms import Form
+from push_predictor.residuals.baseline import Baseline, difference, inputs_of
+from push_predictor.residuals.candidates import Candidate, Kind
+from push_predictor.residuals.drivers import LOCAL
+from push_predictor.residuals.evidence import Evidence
+from push_predictor.residuals.forms_choice import best_form
+from push_predictor.residuals.inputs_basis import InputsBasis
+from push_predictor.residuals.naming import MOST_LEFT, Case, Naming, leaves_over, open_rivals, plausible
+from push_predictor.residuals.screening import Left, Scores, Screened, Without, raw_scores, screen, unit_scores
+from push_predictor.residuals.selection import Judged, fit, judge
+from push_predictor.types import Array
+
+MOST_TERMS = 3
+MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
+MOST_FORMED = 12  # of the labels, those that are tried in every form
+MOST_NAMED = 5  # mechanisms along the driver, best first, that are tried as its name
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One effect found: the best candidate, all rivals that stay open (the best first), family-wise p, coefficients.
+
+    share: of the residual's sum of squares, in units of the prediction, that it explains. naming: what it is called.
+    """
+
+    best: Candidate
+    rivals: tuple[Judged, ...]
+    p_value: float
+    coefficients: Array
+    share: float
+    naming: Naming
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What the search found, what is driven first, then strongest first; first and last screen of all candidates.
+
+    left (n, 3): the standardised residuals less what was found.
+    """
+
+    terms: tuple[Term, ...]
+    candidates: tuple[Candidate, ...]
+    first: Screened
+    last: Screened
+    left: Array
+
+
+def search(
+    evidence: Evidence,
+    candidates: Sequence[Candidate],
+    basis: InputsBasis,
+    alpha: float,
+    seed: int = 0,
+    *,
+    baseline: Baseline | None = None,
+    most_terms: int = MOST_TERMS,
+) -> Search:
+    """Search the residuals of these windows for candidates that chance exceeds anywhere with probability alpha.
+
+    basis: the model's inputs, taken out of residual and candidates. baseline: what a learnt base leaves over in
+    training, against which effects in its own inputs are judged; without it they are judged against zero.
+    """
+    hunt = _Hunt(evidence, tuple(candidates), basis, seed, _training(candidates, baseline))
+    z, first = evidence.z, None
+    terms: list[Term] = []
+    while True:
+        screened = hunt.screened(z)
+        first = first or screened
+        found = hunt.stage([k for k in range(len(candidates)) if screened.p_value[k] <= alpha])
+        if not found or len(terms) == most_terms:
+            return Search(tuple(terms), tuple(candidates), first, screened, z)
+        terms.append(hunt.term(found, screened, z, {term.best.covariate for term in terms}))
+        z = hunt.taken_out(terms[-1], z)
+
+
+def _training(candidates: Sequence[Candidate], baseline: Baseline | None) -> dict[int, tuple[Scores, Array]]:
+    if baseline is None:
+        return {}
+    return {id(c): baseline.scores(c) for c in candidates if baseline.applies(c)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Hunt:
+    """What all rounds of a search share. training: scores there of the candidates that are judged against it."""
+
+    evidence: Evidence
+    candidates: tuple[Candidate, ...]
+    basis: InputsBasis
+    seed: int
+    training: dict[int, tuple[Scores, Array]]
+
+    @cached_property
+    def outs(self) -> dict[Kind, Without]:
+        """What takes the inputs out, by kind of candidate."""
+        return {kind: Without(inputs_of(kind, self.basis)) for kind in get_args(Kind)}
+
+    def screened(self, z: Array) -> Screened:
+        """All candidates on residuals z."""
+        lefts = {kind: out.left(z, self.evidence.block) for kind, out in self.outs.items()}
+        return screen([self._scores(c, lefts[c.kind]) for c in self.candidates], self.seed)
+
+    def _scores(self, candidate: Candidate, left: Left) -> Scores:
+        """Scores of the blocks of these windows, then of the training windows (zero if not judged against them)."""
+        raw = raw_scores(left, self.outs[candidate.kind](candidate.columns))
+        if id(candidate) in self.training:
+            return difference(raw, self.training[id(candidate)])
+        return unit_scores(*raw).padded(next((len(there.rows) for there, _ in self.training.values()), 0))
+
+    def stage(self, found: list[int]) -> list[int]:
+        """Of what was found, that which goes first: a refit of the base makes up for what lies in its own inputs."""
+        ranks = [self._rank(self.candidates[k]) for k in found]
+        return [k for k, rank in zip(found, ranks, strict=True) if rank == min(ranks)]
+
+    def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> Term:
+        """The best of what was found, named. used: drivers of earlier terms, preferred where they do as well."""
+        chosen = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_JUDGED]
+        judged = self._formed([self.candidates[k] for k in chosen], z)
+        open_ = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
+        driver = next((j for j in open_ if j.candidate.covariate in used), judged[0]).candidate.covariate
+        best, naming = self._named(judged, driver, z)
+        drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in open_)]))
+        labels = {j.candidate.label for j in judged}
+        p_value = min(float(screened.p_value[k]) for k in chosen if self.candidates[k].label in labels
+                      and self.candidates[k].covariate == driver)  # fmt: skip
+        return self._term(best, open_, p_value, replace(naming, drivers=drivers), z)
+
+    def taken_out(self, term: Term, z: Array) -> Array:
+        """The residuals less a term; for a learnt base also less what is constant of it: the refit makes up for it."""
+        left = z - term.best.columns @ term.coefficients
+        if not self.basis.learnt or term.best.kind == "constant":
+            return left
+        constant = term.best.response
+        return left - constant @ fit(constant, left)
+
+    def _rank(self, candidate: Candidate) -> int:
+        if candidate.covariate in LOCAL:
+            return 1
+        own = candidate.kind == "constant" or (candidate.kind == "speed" and self.basis.knows_speed)
+        return 2 if own else 0
+
+    def _case(self, judged: Judged, z: Array) -> Case:
+        return Case(z, inputs_of(judged.candidate.kind, self.basis), self.evidence.block)
+
+    def _formed(self, candidates: list[Candidate], z: Array) -> list[Judged]:
+        """The candidates by their gain, the best forms of the best of them; each label once."""
+        kinds = {c.kind for c in candidates}
+        judged = [j for kind in kinds for j in self._judge([c for c in candidates if c.kind == kind], kind, z)]
+        first = _one_each(sorted(judged, key=lambda j: -j.gain), None, "label")[:MOST_FORMED]
+        return sorted((self._in_best_form(j.candidate, z) for j in first), key=lambda j: -j.gain)
+
+    def _judge(self, candidates: list[Candidate], kind: Kind, z: Array) -> list[Judged]:
+        return judge(candidates, z, inputs_of(kind, self.basis), self.evidence.block)
+
+    def _in_best_form(self, candidate: Candidate, z: Array) -> Judged:
+        case = inputs_of(candidate.kind, self.basis)
+        return best_form(candidate, self.evidence.table, z, case, self.evidence.block)
+
+    def _named(self, judged: list[Judged], driver: str, z: Array) -> tuple[Judged, Naming]:
+        """The best mechanism along a driver, if any fits; else the generic fall-back."""
+        along = [c for c in _labels(self.candidates) if c.covariate == driver]
+        formed = {j.candidate.label: j for j in judged}
+        by_gain = sorted((formed.get(c.label) or self._in_best_form(c, z) for c in along), key=lambda j: -j.gain)
+        known = [
+            j
+            for j in by_gain
+            if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j.candidate, self._case(j, z))
+        ]
+        generics = self._generics(driver, known[0].candidate.form if known else None, z)
+        left = {id(j): self._left_over(j, generics, z) for j in known[:MOST_NAMED]}
+        fitting = [j for j in known[:MOST_NAMED] if left[id(j)] <= MOST_LEFT]
+        if not fitting:
+            best = max((self._in_best_form(g, z) for g in generics), key=lambda j: j.gain)
+            return best, Naming((driver,), (None,), False, min(left.values(), default=1.0))
+        best = fitting[0]
+        mechanisms = open_rivals(best, fitting[1:], self._case(best, z), self.seed)
+        return best, Naming((driver,), tuple(j.candidate.mechanism for j in mechanisms), True, left[id(best)])
+
+    def _left_over(self, mechanism: Judged, generics: list[Candidate], z: Array) -> float:
+        return max(leaves_over(mechanism, generic, self._case(mechanism, z), self.seed) for generic in generics)
+
+    def _generics(self, driver: str, form: Form | None, z: Array) -> list[Candidate]:
+        """The fall-back along a driver: in the form of the mechanism, or in all screening forms of the driver."""
+        response = next(c.response for c in self.candidates if c.mechanism is None)
+        if form is not None and form.drivers:
+            values = form.values(self.evidence.table.covariates, len(z))
+            return [Candidate(None, driver, form, response, values)]
+        same = [c for c in self.candidates if c.mechanism is None and c.covariate == driver]
+        return same or [c for c in self.candidates if c.mechanism is None and c.kind == "constant"]
+
+    def _term(self, best: Judged, open_: list[Judged], p_value: float, naming: Naming, z: Array) -> Term:
+        out = self.outs[best.candidate.kind]
+        left, flat = out(z), out(best.candidate.columns)
+        coefficients = fit(flat, left)
+        share = 1.0 - float(np.sum((left - flat @ coefficients) ** 2) / np.sum(left**2))
+        others = tuple(j for j in open_ if j.candidate.label != best.candidate.label)
+        return Term(best.candidate, (best, *others), p_value, coefficients, share, naming)
+
+
+def _labels(candidates: Sequence[Candidate]) -> list[Candidate]:
+    return list({c.label: c for c in reversed(candidates)}.values())
+
+
+def _one_each(judged: Sequence[Judged], best: Judged | None, what: Literal["covariate", "label"]) -> list[Judged]:
+    """The first of each driver (or label), without that of the best."""
+    first: dict[object, Judged] = {}
+    for each in judged:
+        first.setdefault(getattr(each.candidate, what), each)
+    return [j for key, j in first.items() if best is None or key != getattr(best.candidate, what)]

@@ -1,0 +1,289 @@
+"""Trace the residual of a deployed model to an effect that the model lacks, add it, and measure again.
+
+The order is that of trust: an error of measurement is put right before anything is said about motion; a motion effect
+before the scatter; the force's channel by itself. The held-out pushes are opened once, at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from push_predictor.errors import RequestError
+from push_predictor.evaluation.offline import window_options
+from push_predictor.models.bodies import ExtendedBody
+from push_predictor.models.effects import Effect
+from push_predictor.models.model_file import load_model
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.corrections import NO_STREAMS, correct
+from push_predictor.residuals.drivers import CONSTANT
+from push_predictor.residuals.effect_size import size_of
+from push_predictor.residuals.evidence import evidence_of
+from push_predictor.residuals.extension import compared, extend, gain, physics_of, refit_base
+from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
+from push_predictor.residuals.measurement import MeasurementFinding, measurement_errors
+from push_predictor.residuals.motion import MotionFinding, motion_effects
+from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
+from push_predictor.residuals.split import RULE, digest_of, held_out_rows
+from push_predictor.residuals.wrench import WrenchFinding, wrench_effects
+
+FEWEST_PUSHES = 12
+SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
+Watch = Callable[[str, float], None]
+NO_GAIN = Gain(0.0, 0.0, 0.0)
+CUT_AGAIN = (
+    "The slider's stream was put right and the windows cut again: `after` is the deployed model, unchanged, on the "
+    "held-out pushes of the corrected recordings."
+)
+
+
+def no_watch(stage: str, done: float) -> None:
+    """Nobody is waiting."""
+
+
+def trace_data(
+    paths: Sequence[Path | str],
+    model_path: Path | str,
+    *,
+    alpha: float = 0.01,
+    covariates: Sequence[str] | None = None,
+    rig: Rig | None = None,
+    seed: int = 0,
+    watch: Watch = no_watch,
+) -> Trace:
+    """Judge a model file on recordings or push tables that it was not trained on; see `trace`."""
+    watch("windows", 0.0)
+    model = load_model(Path(model_path))
+    loaded = load_evidence([Path(path) for path in paths], rig, window_options(model))
+    return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
+
+
+def trace(
+    model: PushModel,
+    loaded: Loaded,
+    *,
+    alpha: float = 0.01,
+    covariates: Sequence[str] | None = None,
+    seed: int = 0,
+    watch: Watch = no_watch,
+) -> Trace:
+    """Find what the model leaves over in these windows and what drives it.
+
+    alpha: probability of any false alarm where there is nothing. covariates: drivers to try, all recorded ones if None.
+    watch: told of each stage, and which share of the work is done, when it begins.
+    Raises RequestError for an alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
+    """
+    _check(loaded.table, alpha, covariates)
+    context = _Context.of(model, loaded, alpha, covariates, seed)
+    training, physics = model.training, physics_of(model)
+    watch("measurement", 0.1)
+    measured = measurement_errors(context.analysis, training, loaded.rig, context.share("measurement"), seed)
+    if measured is not None and measured.errors:
+        return _of_measurement(context, measured)
+    watch("motion", 0.15)
+    motion = motion_effects(model, context.analysis, context.share("motion"), context.covariates, seed)
+    watch("force", 0.6)
+    forces = wrench_effects(context.analysis, training, physics, context.share("wrench"), seed)
+    watch("extended model", 0.7)
+    return _of_motion(context, motion, measured, forces)
+
+
+@dataclass(frozen=True, eq=False)
+class _Context:
+    """A trace's question, and its data, split once. analysis: what is searched; held_out: opened at the end."""
+
+    model: PushModel
+    loaded: Loaded
+    alpha: float
+    covariates: tuple[str, ...] | None
+    seed: int
+    analysis: PushTable
+    held_out: PushTable
+
+    @classmethod
+    def of(
+        cls, model: PushModel, loaded: Loaded, alpha: float, covariates: Sequence[str] | None, seed: int
+    ) -> _Context:
+        """Split the windows, the residual of the push before among their covariates."""
+        table = loaded.table
+        z = evidence_of(model, table, physics_of(model)).z
+        table = replace(table, covariates={**table.covariates, "previous_residual": previous_residual(table, z)})
+        held = held_out_rows(table)
+        names = None if covariates is None else tuple(covariates)
+        return cls(model, loaded, alpha, names, seed, table.take(~held), table.take(held))
+
+    def share(self, channel: str) -> float:
+        """The part of alpha that a channel may spend."""
+        return SHARES[channel] * self.alpha
+
+
+def _of_motion(
+    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
+) -> Trace:
+    model, terms = context.model, [(t.mechanism, t.covariate, t.form) for t in motion.terms]
+    refit = refit_base(model, context.analysis)
+    after = extend(refit, context.analysis, terms, physics_of(model)) if terms else refit
+    effects = after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ()
+    nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
+    return Trace(
+        verdict=_verdict(motion, forces),
+        kind="mean" if terms else "variance" if motion.scatter else None,
+        model=model,
+        effects=_told(motion, forces, effects, context),
+        terms=effects,
+        equivalent=motion.equivalent,
+        mechanisms=motion.mechanisms,
+        undecided=bool(motion.equivalent),
+        analysis=context.analysis,
+        residual=motion.residual,
+        left=evidence_of(after, context.analysis, physics_of(model)).z,
+        held_out=_held_out(context, model, refit, after, context.held_out),
+        gain_nmse=nmse,
+        gain_nlpd=nlpd,
+        extended=after if terms and nlpd.high < 0.0 else None,
+        tested=(
+            *_family_wise(motion.tested, "motion"),
+            *_family_wise(measured.tested if measured else (), "measurement"),
+            *_family_wise(forces.tested, "wrench"),
+        ),
+        minimum_detectable=motion.minimum_detectable,
+        remaining=motion.remaining,
+        experiment=motion.experiment,
+        alpha=context.alpha,
+        notes=_notes(context, motion, measured, forces),
+    )
+
+
+def _verdict(motion: MotionFinding, forces: WrenchFinding) -> Verdict:
+    if motion.terms:
+        if motion.terms[0].mechanism is None:
+            return "driver_only"
+        return "mechanism_only" if motion.equivalent else "effect"
+    if motion.scatter:
+        return "variance"
+    return "wrench_only" if forces.effects else "none"
+
+
+def _told(
+    motion: MotionFinding, forces: WrenchFinding, effects: tuple[Effect, ...], context: _Context
+) -> tuple[FoundEffect, ...]:
+    """What was found on the channel that the verdict is about."""
+    if motion.terms:
+        sizes = [size_of(effect, context.analysis) for effect in effects]
+        return tuple(
+            FoundEffect(t.mechanism, t.covariate, t.outputs, t.form.name, size, _of_all(t.p_value, "motion"), t.share)
+            for t, size in zip(motion.terms, sizes, strict=True)
+        )
+    if motion.scatter:
+        return tuple(
+            FoundEffect(None, s.covariate, s.outputs, s.form.name, None, _of_all(s.p_value, "motion"), 0.0)
+            for s in motion.scatter
+        )
+    return tuple(
+        FoundEffect(e.mechanism, e.covariate, (), e.form, parameter, _of_all(e.p_value, "wrench"), 0.0)
+        for e in forces.effects
+        for parameter in e.parameters
+    )
+
+
+def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
+    """The error told and, where there are streams, put right in them: the same pushes cut again, the model as it is."""
+    model = context.model
+    recordings = context.loaded.recordings
+    corrected = None if recordings is None else _cut_again(context, measured, recordings)
+    refit = refit_base(model, context.analysis)
+    held = context.held_out if corrected is None else corrected.take(held_out_rows(corrected))
+    left = evidence_of(model, context.analysis if corrected is None else corrected.take(~held_out_rows(corrected)),
+                       physics_of(model)).z  # fmt: skip
+    evidence = evidence_of(model, context.analysis, physics_of(model))
+    first = measured.errors[0]
+    return Trace(
+        verdict="measurement",
+        kind="mean",
+        model=model,
+        effects=tuple(
+            FoundEffect(e.mechanism, CONSTANT, (), "constant", parameter, _of_all(e.p_value, "measurement"), 0.0)
+            for e in measured.errors
+            for parameter in e.parameters
+        ),
+        terms=(),
+        equivalent=(),
+        mechanisms=first.rivals,
+        undecided=bool(first.rivals),
+        analysis=context.analysis,
+        residual=evidence.z,
+        left=left,
+        held_out=_held_out(context, model, refit, model, held),
+        gain_nmse=NO_GAIN,
+        gain_nlpd=NO_GAIN,
+        extended=None,
+        tested=_family_wise(measured.tested, "measurement"),
+        minimum_detectable={},
+        remaining=None,
+        experiment=(),
+        alpha=context.alpha,
+        notes=(NO_STREAMS if corrected is None else CUT_AGAIN, *_of_the_data(context)),
+    )
+
+
+def _cut_again(context: _Context, measured: MeasurementFinding, recordings: Sequence[Recording]) -> PushTable:
+    """The table of recordings whose streams were put right, error by error."""
+    righted = list(recordings)
+    for error in measured.errors:
+        righted = [correct(recording, error.mechanism, error.values) for recording in righted]
+    return cut_anew(righted, context.loaded.rig, window_options(context.model))
+
+
+def _held_out(context: _Context, model: PushModel, refit: PushModel, after: PushModel, held: PushTable) -> HeldOut:
+    """Held-out pushes by all three; after on `held`, which differs where the measurement was put right."""
+    mean, before = model.training_mean, context.held_out
+    return HeldOut(
+        before,
+        compared(model, before, mean),
+        compared(refit, before, mean),
+        compared(after, held, mean),
+        digest_of(before),
+    )
+
+
+def _notes(
+    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
+) -> tuple[str, ...]:
+    notes = [*_of_the_data(context)]
+    if motion.deviation is not None:
+        told = ", ".join(f"{value:.2f}" for value in motion.deviation)
+        notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
+    if measured is None:
+        notes.append("The measurement itself could not be judged: these windows have no contact gap or pose.")
+    if motion.terms and forces.effects:
+        what = ", ".join(f"{e.mechanism} by {e.covariate}" for e in forces.effects)
+        notes.append(f"On the force's channel, beside: {what}.")
+    return tuple(notes)
+
+
+def _of_the_data(context: _Context) -> tuple[str, ...]:
+    left_out = (f"{name} was left out: {why}." for name, why in context.loaded.left_out.items())
+    return (f"Split: {RULE}. Windows of one push stay together.", *left_out)
+
+
+def _family_wise(tested: Sequence[Tested], channel: str) -> tuple[Tested, ...]:
+    return tuple(replace(one, p_value=_of_all(one.p_value, channel)) for one in tested)
+
+
+def _of_all(p_value: float, channel: str) -> float:
+    """A channel's p value as one of the whole trace: at most alpha where the channel, with its share, finds it."""
+    return min(1.0, p_value / SHARES[channel])
+
+
+def _check(table: PushTable, alpha: float, covariates: Sequence[str] | None) -> None:
+    if not 0.0 < alpha < 1.0:
+        raise RequestError("alpha", alpha, "a probability above 0 and below 1")
+    if len(table.pushes) < FEWEST_PUSHES:
+        raise RequestError("pushes", len(table.pushes), f"{FEWEST_PUSHES} at the least, better hundreds")
+    for name in covariates or ():
+        if name not in table.covariates and name != "previous_residual":
+            raise RequestError("covariate", name, f"one of {', '.join(sorted(table.covariates))}")
