@@ -18,15 +18,13 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from rcl_interfaces.srv import GetParameters
-from rclpy.action import ActionServer, CancelResponse
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.task import Future
 
 from push_predictor.errors import PushPredictorError, RecordingError, RequestError
 from push_predictor.models.model_file import save_model
 from push_predictor.models.push_model import PushModel
+from push_predictor.nodes.deferred_action import DeferredAction
 from push_predictor.nodes.runtime import one_line
 from push_predictor.nodes.trace_worker import (
     EXTENDED,
@@ -38,45 +36,26 @@ from push_predictor.nodes.trace_worker import (
     evidence_in,
     start_trace,
 )
+from push_predictor.nodes.validator_folder import ValidatorFolder
 from push_predictor_interfaces.action import TraceResidual
 
 PERIOD = 0.05  # s between two looks at the process, while there is one
-PATIENCE = 3.0  # s that a validator has to be found, and to say where it writes
 LAST_PATIENCE = 2.0  # s that the end of the node waits for its executor to end a trace
-NOTHING = "holds nothing to trace"
 HOLDS = "pushes.csv as push_validator writes it, push tables or recordings"
 
 
 @dataclass(eq=False)
 class _Job:
-    """A goal at work: first a validator may be asked where it writes, then a process traces."""
+    """A goal at work: without a pipe a validator is being asked where it writes, with one a process traces."""
 
     goal: Any
     model: PushModel
     alpha: float
     output: Path
-    begun: float
-    asked: Future | None = None
     place: Path | None = None
     process: BaseProcess | None = None
     pipe: Connection | None = None
     told: str = ""
-
-
-class _Deferred(ActionServer):
-    """An action whose goals are answered when their work is done, while the executor goes on with other things."""
-
-    def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
-        """Nothing: the work is done elsewhere, and an executor polls a callback that waits without a pause."""
-
-    def finish(self, goal_handle: Any, end: Callable[[], None], result: TraceResidual.Result) -> None:
-        """Set the goal's last state and send the result."""
-
-        def last(_: Any) -> TraceResidual.Result:
-            end()
-            return result
-
-        super().notify_execute(goal_handle, last)
 
 
 class ResidualTracer:
@@ -90,25 +69,20 @@ class ResidualTracer:
         self._job: _Job | None = None
         self._timer: Any = None
         self._closing = threading.Event()
-        self._validator = node.create_client(GetParameters, "push_validator/get_parameters")
-        self._action = _Deferred(
-            node,
-            TraceResidual,
-            "trace_residual",
-            execute_callback=lambda goal: None,
-            handle_accepted_callback=self._on_goal,
-            cancel_callback=lambda goal: CancelResponse.ACCEPT,
-        )
+        self._validator = ValidatorFolder(node)
+        self._action = DeferredAction(node, TraceResidual, "trace_residual", self._on_goal)
 
     def close(self) -> None:
         """End the trace that runs; for another thread than the executor's, which goes on meanwhile."""
         self._closing.set()
+        if self._job is None:
+            return
         deadline = monotonic() + LAST_PATIENCE
-        while (job := self._job) is not None:
+        while self._job is not None and monotonic() < deadline:
             time.sleep(PERIOD)
-            if monotonic() > deadline:  # the executor has ended: nobody can be told any more
-                _clear(job)
-                return
+        time.sleep(PERIOD)  # the result is sent in the executor's next turns
+        if (job := self._job) is not None:  # the executor has ended: nobody can be told any more
+            _clear(job)
 
     def end(self, reason: str) -> None:
         """End the trace that runs, if there is one; its client is told why."""
@@ -118,7 +92,6 @@ class ResidualTracer:
     # --- a goal ---------------------------------------------------------------------------------------------
 
     def _on_goal(self, goal: Any) -> None:
-        goal.execute()
         self._guarded(goal, lambda: self._begin(goal))
 
     def _begin(self, goal: Any) -> None:
@@ -131,11 +104,13 @@ class ResidualTracer:
         if not request.output:
             raise RequestError("output", "", "the folder for report, verdict and extended model")
         output = Path(request.output).expanduser().absolute()
-        self._job = job = _Job(goal, model, self._alpha(), output, monotonic())
+        self._job = job = _Job(goal, model, self._alpha(), output)
         self._timer = self._node.create_timer(PERIOD, self._work, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._tell(Stage("recorded pushes", 0.0))
         if evidence := evidence_in(output):
             self._trace(job, evidence)
+        else:
+            self._validator.ask()
 
     def _trace(self, job: _Job, evidence: tuple[Path, ...]) -> None:
         job.output.mkdir(parents=True, exist_ok=True)
@@ -175,14 +150,17 @@ class ResidualTracer:
             self._abort(goal, f"internal error, see the log of the node: {error!r}")
 
     def _await_folder(self, job: _Job) -> None:
-        """Ask the validator where it writes, and go on there. Raises RecordingError if there is nothing to trace."""
-        if job.asked is None and self._validator.service_is_ready():
-            job.asked = self._validator.call_async(GetParameters.Request(names=["output"]))
-        if job.asked is not None and job.asked.done():
-            self._trace(job, _evidence_of_validator(job))
-        elif monotonic() - job.begun > PATIENCE:
-            said = "runs" if job.asked is None else "answers"
-            raise RecordingError(f"output {job.output}: {NOTHING}, and no push_validator {said}; give {HOLDS}")
+        """Go on where the validator writes, once it has said so. Raises RecordingError if there is nothing to trace."""
+        try:
+            folder = self._validator.work()
+        except RecordingError as error:
+            raise RecordingError(f"output {job.output}: holds nothing to trace, and {error}; give {HOLDS}") from None
+        if folder is None:
+            return
+        if not (evidence := evidence_in(folder)):
+            here = f"{folder}, the output of push_validator"
+            raise RecordingError(f"output {job.output}: holds nothing to trace, nor does {here}; give {HOLDS}")
+        self._trace(job, evidence)
 
     def _take(self, job: _Job, pipe: Connection) -> None:
         try:
@@ -230,17 +208,6 @@ class ResidualTracer:
 
 def _result(message: str) -> TraceResidual.Result:
     return TraceResidual.Result(success=False, message=message)
-
-
-def _evidence_of_validator(job: _Job) -> tuple[Path, ...]:
-    """What lies in the folder that the validator has named. Raises RecordingError if it has none, or nothing in it."""
-    assert job.asked is not None
-    values = job.asked.result().values
-    folder = Path(values[0].string_value).expanduser().absolute() if values and values[0].string_value else None
-    if folder and (evidence := evidence_in(folder)):
-        return evidence
-    where = f"nor does its output, {folder}" if folder else "and its parameter output is empty"
-    raise RecordingError(f"output {job.output}: {NOTHING}; push_validator runs, {where}; give {HOLDS}")
 
 
 def _death(process: BaseProcess | None) -> str:

@@ -19,6 +19,7 @@ from pathlib import Path
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.window_table import TABLE
 from push_predictor.recordings.bag_metadata import METADATA_FILE
+from push_predictor.recordings.rig import HOW_TO_GIVE
 from push_predictor.recordings.table_file import ENDINGS, rig_path
 
 REPORT, VERDICT, EXTENDED = "trace.html", "trace.json", "extended.pushmodel"
@@ -99,6 +100,7 @@ def _serve(connection: Connection, task: TraceTask) -> None:
         shutil.rmtree(task.place, ignore_errors=True)  # the node is gone and cannot do it
     except (PushPredictorError, OSError) as error:
         told = str(error).replace(str(task.place / COPIES), str(task.evidence[0].parent))
+        told = told.replace(HOW_TO_GIVE, "write it there")  # there is no option of that name here
         connection.send(Failed(" ".join(told.split())))
 
 
