@@ -1,4 +1,4 @@
-# make demo   learn, serve, replay, validate, report: the main job, end to end
+# make demo   learn, serve, replay, validate, report, trace a change: the main job, end to end
 # make test   lint, types, tests
 # Both build .venv themselves and write into ignored folders only.
 

@@ -72,7 +72,8 @@ class LiveTable:
         return next((values for name, values in self._values.items() if "push_validator" in name), {})
 
     def _models(self) -> list[str]:
-        return [key.removesuffix(" windows") for key in self._validator() if key.endswith(" windows")]
+        values = self._validator()
+        return [key.removesuffix(" nmse") for key in values if key.endswith(" nmse")]
 
     def _line(self, model: str) -> str:
         values = self._validator()

@@ -17,14 +17,14 @@ GRACE = 15.0  # s to end after SIGINT
 
 
 @contextmanager
-def node(executable: str, parameters: Mapping[str, Any]) -> Iterator[None]:
+def node(executable: str, parameters: Mapping[str, Any], log_name: str = "") -> Iterator[None]:
     """Run one of this package's nodes; leaving the context interrupts it as Ctrl-C would.
 
-    What it prints goes to out/demo/EXECUTABLE.log. Raises SystemExit if it did not end well.
+    What it prints goes to out/demo/EXECUTABLE.log, or LOG_NAME.log. Raises SystemExit if it did not end well.
     """
     assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_text(value)}")]
     command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *assigned]
-    log = LOGS / f"{executable}.log"
+    log = LOGS / f"{log_name or executable}.log"
     with log.open("w") as stream:
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
     try:

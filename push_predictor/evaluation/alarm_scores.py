@@ -23,7 +23,7 @@ from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.vhgp import VHGP
+from push_predictor.models.vhgp import VHGP, condition_vhgp
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray
 
@@ -168,7 +168,7 @@ def _without(
 def _conditioned(regression: GaussianProcess | VHGP, kept: BoolArray) -> GaussianProcess | VHGP:
     inputs, outputs = regression.inputs[kept], regression.outputs[kept]
     if isinstance(regression, VHGP):
-        return VHGP(inputs, outputs, regression.parameters, regression.site_precisions[kept])
+        return condition_vhgp(inputs, outputs, regression.parameters)
     return GaussianProcess(inputs, outputs, regression.parameters)
 
 

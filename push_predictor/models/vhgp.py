@@ -16,8 +16,11 @@ from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.vhgp_bound import Bound, VhgpProblem
 from push_predictor.models.vhgp_fit import maximise_bound
+from push_predictor.models.vhgp_inner import maximise_over_noise
 from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
+
+CONDITIONED = 1e-2  # nats, to which the noise of rows left over is solved for
 
 
 class VHGP:
@@ -66,3 +69,14 @@ def fit_vhgp(
     check_rows(inputs, outputs)
     near = start or fit_gp(inputs, outputs, choice).parameters
     return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations))
+
+
+def condition_vhgp(inputs: Array, outputs: Array, parameters: VhgpParameters) -> VHGP:
+    """A VHGP of these rows at given hyperparameters, its noise process solved for on them.
+
+    Site precisions of other rows do not do: the noise's mean is a sum over all rows that nearly cancel. Raises
+    TrainingError when the rows do not match or are not finite.
+    """
+    check_rows(inputs, outputs)
+    bound = maximise_over_noise(VhgpProblem.of(inputs, outputs, parameters), None, CONDITIONED)
+    return VHGP(inputs, outputs, parameters, bound.tied_precisions)

@@ -17,7 +17,7 @@ from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBo
 from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel, scaled_features
-from push_predictor.models.vhgp import VHGP
+from push_predictor.models.vhgp import VHGP, condition_vhgp
 from push_predictor.residuals.candidates import Candidate, Kind, whitened_response
 from push_predictor.residuals.drivers import LOCAL
 from push_predictor.residuals.evidence import Evidence, push_order, whitener_of
@@ -117,22 +117,22 @@ def _crossed(
     for fold in range(FOLDS):
         test = order % FOLDS == fold
         if test.any():
-            without = _conditioned(body, push.inputs[~test], outcomes[~test], ~test)
+            without = _conditioned(body, push.inputs[~test], outcomes[~test])
             there = Push(push.inputs[test], push.duration[test], {})
             for whole, part in zip(moments, without.moments(there), strict=True):
                 whole[test] = part
     return moments[0], moments[1], moments[2]
 
 
-def _conditioned(body: LearnedBody, inputs: Array, outcomes: Array, rows: Array) -> LearnedBody:
+def _conditioned(body: LearnedBody, inputs: Array, outcomes: Array) -> LearnedBody:
     features = scaled_features(body.rig, body.scaling, inputs)
     scaled = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd
     return replace(
-        body, regressions=tuple(_again(r, features, y, rows) for r, y in zip(body.regressions, scaled.T, strict=True))
+        body, regressions=tuple(_again(r, features, y) for r, y in zip(body.regressions, scaled.T, strict=True))
     )
 
 
-def _again(regression: GaussianProcess | VHGP, features: Array, outputs: Array, rows: Array) -> GaussianProcess | VHGP:
+def _again(regression: GaussianProcess | VHGP, features: Array, outputs: Array) -> GaussianProcess | VHGP:
     if isinstance(regression, GaussianProcess):
         return GaussianProcess(features, outputs, regression.parameters)
-    return VHGP(features, outputs, regression.parameters, regression.site_precisions[rows])
+    return condition_vhgp(features, outputs, regression.parameters)

@@ -1,0 +1,95 @@
+"""A recording with an effect that nobody names here: a seed draws it from the registry of the blind benchmark.
+
+Slider, table and sensors are those of bags/square_abs_train. The first pushes are like those of training, then the
+effect sets in. What was drawn goes to a file of its own, which is read when all is over.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from benchmarks.blind import conditions
+from benchmarks.blind_effects import GROUPS, World, draw
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.write import write_recording
+from push_predictor.simulation.changes import Changes, Law, Moment
+from push_predictor.simulation.physics import GRAVITY
+from push_predictor.simulation.pushes import random_pushes
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.simulation.standard_bags import SPEEDS, TRAVEL, standard_bags
+
+Stream = TypeVar("Stream", PoseStream, WrenchStream)
+GROUP, SIZE = "library", "large"
+PLAIN, TRACED, REST = 25, 150, 80  # pushes: before the effect, with it until the trace, after the trace
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Where things are. recorded: the pushes until the trace; whole: those and the rest; truth: what was drawn."""
+
+    recorded: Path
+    whole: Path
+    truth: Path
+
+
+def make_hidden(folder: Path, seed: int) -> Hidden:
+    """Draw an effect, simulate, write both recordings and, apart from them, the truth."""
+    places = Hidden(folder / "changed", folder / "changed_whole", folder / "truth" / "hidden.json")
+    rng = np.random.default_rng([seed, 7])
+    plain = standard_bags()["square_abs_train"]
+    pushes = random_pushes(PLAIN + TRACED + REST, SPEEDS, TRAVEL, rng)
+    spec = replace(plain, pushes=pushes, seed=int(rng.integers(2**31)), name=places.whole.name)
+    act, told = _drawn(spec, rng)
+    whole = simulate(replace(spec, changes=act))
+    begins = conditions(spec).values["elapsed_time"]
+    write_recording(places.whole, whole)
+    write_recording(places.recorded, _until(whole, float(begins[PLAIN + TRACED])))
+    places.truth.parent.mkdir(parents=True, exist_ok=True)
+    places.truth.write_text(json.dumps(told, indent=1))
+    return places
+
+
+def _drawn(spec: SimulationSpec, rng: np.random.Generator) -> tuple[Changes, Mapping[str, Any]]:
+    """What acts from push PLAIN on, as strongly to the end, and what a reader is told of it."""
+    world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, conditions(spec), rng)
+    kinds = GROUPS[GROUP]
+    kind = replace(kinds[int(rng.integers(len(kinds)))], drivers=("constant",), alone=1.0)
+    drawn = draw(kind, SIZE, world)
+    assert isinstance(drawn.act, Changes)  # no fault of the measurement is in this group
+    told = {"mechanism": drawn.kind, "value": drawn.value, "unit": drawn.unit, "size": SIZE, "from push": PLAIN}
+    return _later(drawn.act), {**told, "right names": drawn.names}
+
+
+def _later(changes: Changes) -> Changes:
+    """The same from push PLAIN on, nothing before."""
+    laws = {f.name: getattr(changes, f.name) for f in fields(changes) if f.name != "added_mass"}
+    return replace(changes, **{name: _gated(law) for name, law in laws.items() if law is not None})
+
+
+def _gated(law: Law) -> Law:
+    def gated(moment: Moment) -> np.ndarray:
+        value = np.asarray(law(moment))
+        on = moment.conditions.row >= PLAIN
+        return np.where(on.reshape(-1, *[1] * (value.ndim - 1)), value, 0.0)
+
+    return gated
+
+
+def _until(recording: Recording, seconds: float) -> Recording:
+    """What was recorded in the first seconds."""
+    first = min(int(recording.slider.stamp[0]), int(recording.pusher.stamp[0]))
+    last = first + round(seconds * 1e9)
+    wrench = None if recording.wrench is None else _cut(recording.wrench, last)
+    return replace(recording, slider=_cut(recording.slider, last), pusher=_cut(recording.pusher, last), wrench=wrench)
+
+
+def _cut(stream: Stream, last: int) -> Stream:
+    keep = stream.stamp <= last
+    return replace(stream, **{f.name: getattr(stream, f.name)[keep] for f in fields(stream)})
