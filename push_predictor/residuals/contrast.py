@@ -104,7 +104,8 @@ def best_first(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, 
     order = np.argsort([-float(gain.sum()) for gain in gains], kind="stable").tolist()
     best = gains[order[0]]
     weights = _weights(len(best), seed)
-    alike = [k for k in order[1:] if float(np.quantile(weights @ (best - gains[k]), 0.05)) <= 0.0]
+    level = 0.05 / max(len(order) - 1, 1)  # the best was chosen among them all, so that it looks better than it is
+    alike = [k for k in order[1:] if float(np.quantile(weights @ (best - gains[k]), level)) <= 0.0]
     return [tried[k] for k in (order[0], *alike)]
 
 
