@@ -34,6 +34,7 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.srv import LoadModel, PredictPush
 
+STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
 PATIENCE = 60.0  # s, for a trace on a busy machine; alone it takes 3
 DRIVERS = ["elapsed_time", "slider_x"]
 RIG = "pushes.rig.yaml"
@@ -91,9 +92,10 @@ class Goal:
 
     def __init__(self, action: ActionClient, goal: TraceResidual.Goal) -> None:
         assert action.wait_for_server(harness.START_TIMEOUT)
+        time.sleep(0.5)  # the server has found our requests by now, not yet surely our ear for its answer and feedback
         self.stages: list[tuple[str, float]] = []
         sent = action.send_goal_async(goal, lambda m: self.stages.append((m.feedback.stage, m.feedback.progress)))
-        assert harness.wait_until(sent.done)
+        assert harness.wait_until(sent.done, PATIENCE)
         self.handle: Any = sent.result()
         assert self.handle.accepted
         self._result = self.handle.get_result_async()
@@ -103,7 +105,7 @@ class Goal:
         return bool(self._result.done())
 
     def reached(self, stage: str) -> bool:
-        return harness.wait_until(lambda: stage in dict(self.stages), PATIENCE)
+        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), PATIENCE)
 
     def end(self) -> tuple[int, TraceResidual.Result]:
         assert harness.wait_until(self._result.done, PATIENCE), self.stages
