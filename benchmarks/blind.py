@@ -1,9 +1,9 @@
 """The residual loop on recordings whose truth it cannot see.
 
-    python benchmarks/blind.py make --out blind/data --truth blind/truth --seed 1 --count 100
-    python benchmarks/blind.py run --data blind/data --out blind/results [--without contact_friction]
-    python benchmarks/blind.py oracle --data blind/data --truth blind/truth
-    python benchmarks/blind.py score --results blind/results --truth blind/truth [--json FILE] [--markdown FILE]
+    python -m benchmarks.blind make --out blind/data --truth blind/truth --seed 1 --count 100
+    python -m benchmarks.blind run --data blind/data --out blind/results [--without contact_friction]
+    python -m benchmarks.blind oracle --data blind/data --truth blind/truth
+    python -m benchmarks.blind score --results blind/results --truth blind/truth [--json FILE] [--markdown FILE]
 
 make: the rig simulator makes, for each number, a model trained on a recording (its windows are in the model; the
 recording is not kept) and a new recording with an effect drawn from benchmarks/blind_effects.py, with none, or with a
@@ -25,11 +25,7 @@ from typing import Any
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
-
-from benchmarks.blind_effects import (  # noqa: E402
+from benchmarks.blind_effects import (
     GROUPS,
     HUMIDITY,
     SIZES,
@@ -39,20 +35,20 @@ from benchmarks.blind_effects import (  # noqa: E402
     draw,
     undisturbed,
 )
-from benchmarks.blind_library import library_without  # noqa: E402
-from benchmarks.blind_oracle import oracle_gain  # noqa: E402
-from benchmarks.blind_score import markdown_of, score_of  # noqa: E402
-from push_predictor.models.model_file import save_model  # noqa: E402
-from push_predictor.models.train import train_model  # noqa: E402
-from push_predictor.recordings.window_finder import find_windows  # noqa: E402
-from push_predictor.recordings.windows import windows_to_table  # noqa: E402
-from push_predictor.recordings.write import write_recording  # noqa: E402
-from push_predictor.simulation.batches import conditions_of, end_times  # noqa: E402
-from push_predictor.simulation.changes import Changes, Conditions, Topic  # noqa: E402
-from push_predictor.simulation.physics import GRAVITY  # noqa: E402
-from push_predictor.simulation.pushes import PushPlan, pusher_path  # noqa: E402
-from push_predictor.simulation.rig_simulator import simulate  # noqa: E402
-from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, start_poses  # noqa: E402
+from benchmarks.blind_library import library_without
+from benchmarks.blind_oracle import oracle_gain
+from benchmarks.blind_score import markdown_of, score_of
+from push_predictor.models.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.window_finder import find_windows
+from push_predictor.recordings.windows import windows_to_table
+from push_predictor.recordings.write import write_recording
+from push_predictor.simulation.batches import conditions_of, end_times
+from push_predictor.simulation.changes import Changes, Conditions, Topic
+from push_predictor.simulation.physics import GRAVITY
+from push_predictor.simulation.pushes import PushPlan, pusher_path
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, start_poses
 
 SHAPES = ("rect1", "rect1", "rect1", "ellip2", "hex")
 SURFACES = ("abs", "delrin", "plywood", "pu")

@@ -19,11 +19,10 @@ from push_predictor.evaluation.splits import push_folds
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody
-from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.vhgp import VHGP, condition_vhgp
+from push_predictor.models.vhgp import conditioned
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray
 
@@ -162,14 +161,7 @@ def _without(
         return replace(body, base=base)
     if isinstance(body, AnalyticalBody):
         return body
-    return replace(body, regressions=tuple(_conditioned(regression, ~rows) for regression in body.regressions))
-
-
-def _conditioned(regression: GaussianProcess | VHGP, kept: BoolArray) -> GaussianProcess | VHGP:
-    inputs, outputs = regression.inputs[kept], regression.outputs[kept]
-    if isinstance(regression, VHGP):
-        return condition_vhgp(inputs, outputs, regression.parameters)
-    return GaussianProcess(inputs, outputs, regression.parameters)
+    return replace(body, regressions=tuple(conditioned(r, r.inputs[~rows], r.outputs[~rows]) for r in body.regressions))
 
 
 def _physics(model: PushModel) -> AnalyticalPush:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gp import GpParameters, check_rows, fit_gp
+from push_predictor.models.gp import GaussianProcess, GpParameters, check_rows, fit_gp
 from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
@@ -71,12 +71,14 @@ def fit_vhgp(
     return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations))
 
 
-def condition_vhgp(inputs: Array, outputs: Array, parameters: VhgpParameters) -> VHGP:
-    """A VHGP of these rows at given hyperparameters, its noise process solved for on them.
+def conditioned(regression: GaussianProcess | VHGP, inputs: Array, outputs: Array) -> GaussianProcess | VHGP:
+    """A regression's hyperparameters on other rows; the noise process of a VHGP is solved for on them.
 
     Site precisions of other rows do not do: the noise's mean is a sum over all rows that nearly cancel. Raises
     TrainingError when the rows do not match or are not finite.
     """
-    check_rows(inputs, outputs)
-    bound = maximise_over_noise(VhgpProblem.of(inputs, outputs, parameters), None, CONDITIONED)
+    if isinstance(regression, GaussianProcess):
+        return GaussianProcess(inputs, outputs, regression.parameters)
+    parameters = regression.parameters
+    bound = maximise_over_noise(VhgpProblem.of(check_rows(inputs, outputs), outputs, parameters), None, CONDITIONED)
     return VHGP(inputs, outputs, parameters, bound.tied_precisions)

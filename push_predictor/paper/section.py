@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -46,3 +46,13 @@ class Section:
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
     data: Mapping[str, Any] = field(default_factory=dict)
+
+
+def joined(key: str, title: str, parts: Sequence[tuple[str, Section]]) -> Section:
+    """One section of what each corpus gave, with the corpus' title; the parts' own keys and titles are dropped."""
+
+    def every(field_name: str) -> tuple[Any, ...]:
+        return tuple(item for _, part in parts for item in getattr(part, field_name))
+
+    data = {name: part.data for name, part in parts}
+    return Section(key, title, every("findings"), every("tables"), every("pictures"), every("notes"), data)

@@ -14,10 +14,9 @@ import numpy as np
 
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody
-from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel, scaled_features
-from push_predictor.models.vhgp import VHGP, condition_vhgp
+from push_predictor.models.vhgp import conditioned
 from push_predictor.residuals.candidates import Candidate, Kind, whitened_response
 from push_predictor.residuals.drivers import LOCAL
 from push_predictor.residuals.evidence import Evidence, push_order, whitener_of
@@ -128,11 +127,5 @@ def _conditioned(body: LearnedBody, inputs: Array, outcomes: Array) -> LearnedBo
     features = scaled_features(body.rig, body.scaling, inputs)
     scaled = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd
     return replace(
-        body, regressions=tuple(_again(r, features, y) for r, y in zip(body.regressions, scaled.T, strict=True))
+        body, regressions=tuple(conditioned(r, features, y) for r, y in zip(body.regressions, scaled.T, strict=True))
     )
-
-
-def _again(regression: GaussianProcess | VHGP, features: Array, outputs: Array) -> GaussianProcess | VHGP:
-    if isinstance(regression, GaussianProcess):
-        return GaussianProcess(features, outputs, regression.parameters)
-    return condition_vhgp(features, outputs, regression.parameters)

@@ -24,7 +24,7 @@ from push_predictor.paper.curves import Curves, curves, nlpd_of, nmse_of
 from push_predictor.paper.estimate import Estimate, Figure, by_push, difference_by_push, over_seeds
 from push_predictor.paper.figures.curves import KIND_LOOKS, Line, Panel, paint_panels
 from push_predictor.paper.fits import KINDS, SPLIT_WORDS, SPLITS, SplitName
-from push_predictor.paper.section import Section, Table
+from push_predictor.paper.section import Section, Table, joined
 from push_predictor.paper.study import Study
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.types import Array
@@ -42,16 +42,8 @@ SIMULATOR = (
 
 def section(study: Study) -> Section:
     """The three kinds of model on the reference pair of every corpus."""
-    parts = [_of_corpus(study, corpus, k) for k, corpus in enumerate(study.corpora)]
-    return Section(
-        "comparison",
-        "Analytical model, GP and VHGP",
-        tuple(finding for part in parts for finding in part.findings),
-        tuple(table for part in parts for table in part.tables),
-        tuple(picture for part in parts for picture in part.pictures),
-        tuple(note for part in parts for note in part.notes),
-        {corpus.title: part.data for corpus, part in zip(study.corpora, parts, strict=True)},
-    )
+    parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
+    return joined("comparison", "Analytical model, GP and VHGP", parts)
 
 
 def common_sizes(found: Curves, corpus: Corpus, split: SplitName) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from push_predictor.paper.curves import Curves, Measure, curves, sizes_tried
 from push_predictor.paper.estimate import Estimate, over_seeds
 from push_predictor.paper.figures.curves import Line, Panel, look_of, paint_panels
 from push_predictor.paper.fits import SPLIT_WORDS, SPLITS, SplitName
-from push_predictor.paper.section import Section, Table
+from push_predictor.paper.section import Section, Table, joined
 from push_predictor.paper.study import Study
 
 FEWEST_FOR_BAND = 3  # folds
@@ -36,16 +36,8 @@ SIMULATOR = (
 
 def section(study: Study) -> Section:
     """The VHGP's learning curves on every pair of shape and surface of every corpus."""
-    parts = [_of_corpus(study, corpus, k) for k, corpus in enumerate(study.corpora)]
-    return Section(
-        "learning_curves",
-        "Learning curves: surfaces and shapes",
-        tuple(finding for part in parts for finding in part.findings),
-        tuple(table for part in parts for table in part.tables),
-        tuple(picture for part in parts for picture in part.pictures),
-        tuple(note for part in parts for note in part.notes),
-        {corpus.title: part.data for corpus, part in zip(study.corpora, parts, strict=True)},
-    )
+    parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
+    return joined("learning_curves", "Learning curves: surfaces and shapes", parts)
 
 
 def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:

@@ -15,7 +15,7 @@ from push_predictor.paper.estimate import Estimate, difference_by_push
 from push_predictor.paper.figures.curves import DASHES, MARKERS, Line, Panel, paint_panels
 from push_predictor.paper.fits import KINDS, SPLIT_WORDS, SPLITS, SplitName
 from push_predictor.paper.held_out import HeldOut, held_out, within_nmse
-from push_predictor.paper.section import Finding, Section, Table, Verdict
+from push_predictor.paper.section import Finding, Section, Table, Verdict, joined
 from push_predictor.paper.study import Study
 from push_predictor.recordings.table import OUTPUTS
 
@@ -25,16 +25,8 @@ COLUMNS = ("total", *OUTPUTS)
 
 def section(study: Study) -> Section:
     """The difference at every size on both splits, and speed by speed at the plan's size."""
-    parts = [_of_corpus(study, corpus, k) for k, corpus in enumerate(study.corpora)]
-    return Section(
-        "mean_gain",
-        "Does input-dependent noise improve the mean?",
-        tuple(finding for part in parts for finding in part.findings),
-        tuple(table for part in parts for table in part.tables),
-        tuple(picture for part in parts for picture in part.pictures),
-        tuple(note for part in parts for note in part.notes),
-        {corpus.title: part.data for corpus, part in zip(study.corpora, parts, strict=True)},
-    )
+    parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
+    return joined("mean_gain", "Does input-dependent noise improve the mean?", parts)
 
 
 def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:

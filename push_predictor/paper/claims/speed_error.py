@@ -14,7 +14,7 @@ from push_predictor.paper.estimate import Estimate, of_draws
 from push_predictor.paper.figures.speed_error import SpeedCurve, paint_speed_error
 from push_predictor.paper.fits import KINDS, SPLIT_WORDS
 from push_predictor.paper.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
-from push_predictor.paper.section import Finding, Section, Table, Verdict
+from push_predictor.paper.section import Finding, Section, Table, Verdict, joined
 from push_predictor.paper.study import Study
 from push_predictor.types import Array
 
@@ -33,16 +33,8 @@ SIMULATOR = (
 
 def section(study: Study) -> Section:
     """NMSE within each speed and the bias along and across, all kinds, pushes left out."""
-    parts = [_of_corpus(study, corpus, k) for k, corpus in enumerate(study.corpora)]
-    return Section(
-        "speed_error",
-        "Error against speed",
-        tuple(finding for part in parts for finding in part.findings),
-        tuple(table for part in parts for table in part.tables),
-        tuple(picture for part in parts for picture in part.pictures),
-        tuple(note for part in parts for note in part.notes),
-        {corpus.title: part.data for corpus, part in zip(study.corpora, parts, strict=True)},
-    )
+    parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
+    return joined("speed_error", "Error against speed", parts)
 
 
 def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
