@@ -95,7 +95,14 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
             raise ModelFileError(f"{path}: unpacks to {unpacked} bytes, at most {LARGEST} are accepted")
         with np.load(path, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError, RuntimeError) as error:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        ValueError,
+        NotImplementedError,  # zipfile's word for a compression that it does not know
+        RuntimeError,  # and for a member that is encrypted
+    ) as error:
         raise ModelFileError(f"{path}: not a model file, or a damaged one ({error})") from None
     except OSError as error:
         raise ModelFileError(f"{path}: cannot be read ({error.strerror or error})") from None

@@ -137,7 +137,12 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
             yield archive
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+    except (
+        zipfile.BadZipFile,
+        EOFError,
+        NotImplementedError,  # zipfile's word for a compression that it does not know
+        RuntimeError,  # and for a member that is encrypted
+    ) as error:
         raise ImportSourceError(f"{path}: the archive cannot be read ({error})") from None
 
 
