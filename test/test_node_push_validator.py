@@ -375,7 +375,7 @@ def test_finish_writes_everything_and_what_comes_then_is_a_new_score(domain: int
         assert finish(node).success
         assert (tmp_path / "validation.json").read_text() == first, "no push was found, so there is nothing to tell"
 
-        with replaying(domain, rate=40.0) as replay:
+        with replaying(domain, rate=10.0) as replay:
             replay.wait_for_text("finished: published", 60.0)
             (tmp_path / "validation.json").unlink()
             assert process.stop(signal.SIGTERM) == 0
