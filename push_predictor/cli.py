@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from push_predictor import __version__
+from push_predictor.commands.output import check_json
 from push_predictor.errors import PushPredictorError
 
 COMMANDS = ("import", "simulate", "train", "predict", "evaluate", "validate", "trace", "report", "info")
@@ -21,6 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command and return the exit status."""
     options = build_parser().parse_args(arguments)
     try:
+        check_json(options)
         options.run(options)
     except BrokenPipeError:  # the reader of our output has gone, `| head` for instance
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

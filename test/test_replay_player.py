@@ -265,7 +265,7 @@ def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
 
     def look(sent: RawMessage) -> bool:
         done = stage.publish(sent)
-        seen.append(stage.player.time)  # late by now, so that the clock alone would be far ahead
+        stage.player.tell_time(seen.append)  # late by now, so that the clock alone would be far ahead
         return done
 
     stage.player._outlet = Outlet(look, lambda: None, stage.states.append)

@@ -137,6 +137,7 @@ def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_sec
     slider: list[bytes] = []
     wrench: list[bytes] = []
     inlet: Any = SimpleNamespace(_inboxes={"slider": slider, "wrench": wrench}, _empty=0.0)
+    inlet._scalars = SimpleNamespace(waiting=lambda: True)
     complete = sensor_inlet.SensorInlet.complete
     assert not complete(inlet), "nothing has come"
     slider.append(b"pose")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, progress, write_json
+from push_predictor.commands.output import add_command, add_rig, check_output, progress, write_json
 
 KINDS = ("mit", "mit-square", "mlab", "mcube", "rosbag1")
 
@@ -30,6 +30,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.importers import import_source
     from push_predictor.recordings.rig import load_rig
 
+    check_output("--out", options.out, folder=True)
     rig = load_rig(options.rig) if options.rig else None
     with progress(f"import {options.kind}"):
         report = import_source(options.kind, options.sources, options.out, rig=rig)

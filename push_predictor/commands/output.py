@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import threading
 import time
@@ -63,6 +64,30 @@ def write_text(path: Path, text: str) -> None:
 def warn(text: str) -> None:
     """Say something on stderr that does not stop the work."""
     print(f"warning: {text}", file=sys.stderr)
+
+
+def check_output(option: str, path: Path | None, *, folder: bool = False) -> None:
+    """Raise RequestError unless a file (or a folder with its files) can be written there: before the work, not after.
+
+    Folders that are not there will be made.
+    """
+    if path is None:
+        return
+    if path.exists() and path.is_dir() != folder:
+        accepted = "a folder, this is a file" if folder else "the path of a file, this is a folder"
+        raise RequestError(option, str(path), accepted)
+    places = [path.absolute(), *path.absolute().parents] if folder else path.absolute().parents
+    place = next(place for place in places if place.exists())
+    if not place.is_dir():
+        raise RequestError(option, str(path), f"a path in a folder, {place} is none")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise RequestError(option, str(path), f"a path in a folder that may be written to, {place} may not")
+
+
+def check_json(options: argparse.Namespace) -> None:
+    """The same for --json."""
+    if options.json not in (None, "-"):
+        check_output("--json", Path(options.json))
 
 
 def check_data(paths: Sequence[Path]) -> None:

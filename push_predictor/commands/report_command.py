@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, progress, write_json, write_text
+from push_predictor.commands.output import add_command, check_output, progress, write_json, write_text
 from push_predictor.errors import PushPredictorError, RequestError
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
         for name in names:
             if kind != options.kind and getattr(options, name) is not None:
                 raise RequestError(f"--{name}", getattr(options, name), f"`report {kind}` alone")
+    check_output("--out", options.out, folder=True)
     options.out.mkdir(parents=True, exist_ok=True)
     if options.kind == "paper":
         _paper(options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, check_seed, progress, write_json
+from push_predictor.commands.output import add_command, check_output, check_seed, progress, write_json
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,6 +38,7 @@ def run(options: argparse.Namespace) -> None:
     if options.pushes < 1:
         raise RequestError("--pushes", options.pushes, "a number from 1 on")
     check_seed(options.seed)
+    check_output("--out", options.out, folder=options.out.suffix != ".mcap")
     rng = np.random.default_rng([options.seed, 0])
     plan = random_pushes(options.pushes, options.speed, options.travel, rng)
     name = options.out.name.removesuffix(".mcap")

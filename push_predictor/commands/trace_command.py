@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, add_rig, check_data, check_seed, progress, warn, write_json
+from push_predictor.commands.output import (
+    add_command,
+    add_rig,
+    check_data,
+    check_output,
+    check_seed,
+    progress,
+    warn,
+    write_json,
+)
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -44,6 +53,8 @@ def run(options: argparse.Namespace) -> None:
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
     check_seed(options.seed)
+    check_output("--report", options.report)
+    check_output("--save-model", options.save_model)
     names = None if options.covariates is None else _names(options.covariates)
     check_data(options.data)
     rig = load_rig(options.rig) if options.rig else None

@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, check_data, check_seed, progress, write_json
+from push_predictor.commands.output import (
+    add_command,
+    add_rig,
+    check_data,
+    check_output,
+    check_seed,
+    progress,
+    write_json,
+)
 from push_predictor.errors import RequestError
 
 
@@ -38,6 +46,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_data(options.data)
     check_seed(options.seed)
+    check_output("--out", options.out)
     if options.fit and options.model != "analytical":
         raise RequestError("--fit", options.model, "it with --model analytical only, a learnt model has nothing to fit")
     if options.stride is not None and not 0.0 < options.stride < float("inf"):

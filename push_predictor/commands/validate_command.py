@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from push_predictor.commands.metrics_text import print_metrics
-from push_predictor.commands.output import add_command, add_rig, progress, warn, write_json
+from push_predictor.commands.output import add_command, add_rig, check_output, progress, warn, write_json
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,6 +35,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.windows import windows_to_table
 
+    check_output("--windows", options.windows)
     model = load_model(options.model)
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):

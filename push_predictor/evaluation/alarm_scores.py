@@ -1,7 +1,7 @@
 """The scores of a push by which the alarm judges it, and those of the training pushes, to which it compares them.
 
-A training push is judged by the model without it: the regressions are conditioned on the other folds of pushes, with
-hyperparameters as they are. So its residuals are those of a push that the model has not seen, but for a slightly
+A training push is judged by the model without its fold of pushes, with hyperparameters as they are
+(push_predictor.models.left_out). So its residuals are those of a push that the model has not seen, but for a slightly
 smaller training set.
 """
 
@@ -19,12 +19,12 @@ from push_predictor.evaluation.splits import push_folds
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody
+from push_predictor.models.left_out import moments_left_out
 from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.vhgp import conditioned
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.types import Array, BoolArray
+from push_predictor.types import Array
 
 FOLDS = 10
 FEWEST_PUSHES = 10  # of the calibration; below that no evidence would come of hundreds of pushes
@@ -121,13 +121,11 @@ def calibrate(model: PushModel) -> Calibration:
 
 def held_out(model: PushModel) -> tuple[Array, Array]:
     """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their fold of pushes."""
-    table, mean, covariance = model.training, np.empty((len(model.training), 3)), np.empty((len(model.training), 3, 3))
-    folds = push_folds(table, FOLDS)
-    for fold in range(FOLDS):
-        rows = folds == fold
-        part = table.take(rows)
-        moments = _without(model.body, rows).moments(Push(part.inputs, part.duration, part.covariates))
-        mean[rows], covariance[rows] = moments[:2]
+    table = model.training
+    push = Push(table.inputs, table.duration, table.covariates)
+    base, folds = model.base.body, push_folds(table, FOLDS)
+    moments = moments_left_out(base, folds) if isinstance(base, LearnedBody) else base.moments(push)
+    mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
     return mean, covariance
 
 
@@ -149,19 +147,6 @@ def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, c
             own = part.push_id == push
             found[push] = _scores(calibration, [(along[own], reach[own]) for along, reach in parts])
     return found
-
-
-def _without(
-    body: LearnedBody | AnalyticalBody | ExtendedBody, rows: BoolArray
-) -> LearnedBody | AnalyticalBody | ExtendedBody:
-    """The body as if it had not seen some of its rows; the analytical one has learnt next to nothing from them."""
-    if isinstance(body, ExtendedBody):
-        base = _without(body.base, rows)
-        assert not isinstance(base, ExtendedBody)
-        return replace(body, base=base)
-    if isinstance(body, AnalyticalBody):
-        return body
-    return replace(body, regressions=tuple(conditioned(r, r.inputs[~rows], r.outputs[~rows]) for r in body.regressions))
 
 
 def _physics(model: PushModel) -> AnalyticalPush:

@@ -6,12 +6,13 @@ them, and told as the way along the outline; a circle, whose contacts are all al
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from push_predictor.errors import TableError
+from push_predictor.evaluation.map_conditions import covariates_of_map
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -109,13 +110,19 @@ def coarse_cells(outline: Outline, table: PushTable) -> Cells:
     return _cells(outline, table, along, _whole(wanted / along))
 
 
-def push_map(model: PushModel, velocity: float, duration: float, cells: Cells) -> PushMap:
-    """What the model predicts at the centre of every cell; NaN outside the domain of its training."""
+def push_map(
+    model: PushModel, velocity: float, duration: float, cells: Cells, held: Mapping[str, float] | None = None
+) -> PushMap:
+    """What the model predicts at the centre of every cell; NaN outside the domain of its training.
+
+    held: the covariates that an extended model needs, see `map_conditions.held_covariates`.
+    """
     contact = 0.5 * (cells.contact[1:] + cells.contact[:-1]) / model.rig.outline.perimeter
     angle = 0.5 * (cells.angle[1:] + cells.angle[:-1])
     angles, contacts = np.meshgrid(angle, contact, indexing="ij")
     inputs = np.column_stack([np.full(contacts.size, velocity), contacts.ravel(), angles.ravel()])
-    prediction = model.predict(inputs, np.full(len(inputs), duration))
+    covariates = covariates_of_map(model.rig.outline, held or {}, inputs)
+    prediction = model.predict(inputs, np.full(len(inputs), duration), covariates)
     sd = np.sqrt(np.diagonal(prediction.covariance, axis1=1, axis2=2))
     hidden = ~prediction.in_domain[:, None]
     shape = (*cells.shape, len(OUTPUTS))

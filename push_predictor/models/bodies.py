@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -18,8 +18,12 @@ from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.quadrature import exact_log_density
 from push_predictor.models.vhgp import VHGP
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import OUTPUTS
+from push_predictor.recordings.table import INPUTS, OUTPUTS
 from push_predictor.types import Array
+
+SIDE = "edge"
+TOLD_BY_PUSH = (*INPUTS, SIDE)  # covariates that no request needs to bring
+Cross: TypeAlias = Mapping[tuple[int, int], Array]
 
 
 class Body(Protocol):
@@ -124,18 +128,34 @@ class ExtendedBody:
     """A base with effects that it lacks: each shifts the mean and adds its own uncertainty to the covariance.
 
     physics: the analytical model from which the effects' responses are computed. scale (3,): what the base's standard
-    deviations of dx, dy, dtheta are multiplied by, found once the effects are in.
+    deviations of dx, dy, dtheta are multiplied by, found once the effects are in. cross: for effects i < j that were
+    estimated jointly, the covariance (coefficients of i, coefficients of j); what is not in it is independent. Without
+    it two effects whose drivers go together would be told as far less certain than their sum is.
     """
 
     base: LearnedBody | AnalyticalBody
     physics: AnalyticalPush
     effects: tuple[Effect, ...]
     scale: Array
+    cross: Cross = field(default_factory=dict)
+
+    @cached_property
+    def takes(self) -> tuple[str, ...]:
+        """The covariates that its effects take, each name once."""
+        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.needs))
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
-        """See Body: what its effects take, each name once."""
-        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.needs))
+        """See Body: what its effects take and the push itself does not tell."""
+        return tuple(name for name in self.takes if name not in TOLD_BY_PUSH)
+
+    def completed(self, push: Push) -> Push:
+        """The push with what its inputs tell among its covariates, where an effect takes it."""
+        told = dict(zip(INPUTS, push.inputs.T, strict=True))
+        if SIDE in self.takes:
+            told[SIDE] = self.physics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
+        own = {name: column for name, column in told.items() if name in self.takes}
+        return replace(push, covariates={**push.covariates, **own}) if own else push
 
     def moments(self, push: Push) -> tuple[Array, Array, Array]:
         """See Body."""
@@ -149,11 +169,16 @@ class ExtendedBody:
         return mean + shift, total * factor + unsure, process * factor
 
     def shift(self, push: Push) -> tuple[Array, Array]:
-        """Sum of the effects' shifts (n, 3), and its covariance (n, 3, 3) as if they were found independently."""
+        """Sum of the effects' shifts (n, 3), and its covariance (n, 3, 3)."""
         shift, unsure = np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3))
-        for effect in self.effects:
-            each, covariance = effect.shift(self.physics, push)
-            shift, unsure = shift + each, unsure + covariance
+        push = self.completed(push)
+        designs = [effect.design(self.physics, push) for effect in self.effects]
+        for effect, design in zip(self.effects, designs, strict=True):
+            shift = shift + design @ effect.coefficients
+            unsure = unsure + design @ effect.covariance @ design.transpose(0, 2, 1)
+        for (i, j), covariance in self.cross.items():
+            shared = designs[i] @ covariance @ designs[j].transpose(0, 2, 1)
+            unsure = unsure + shared + shared.transpose(0, 2, 1)
         return shift, unsure
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:

@@ -36,9 +36,13 @@ class Effect:
         own = () if self.mechanism is None else mechanism_named(self.mechanism).needs
         return tuple(dict.fromkeys([*self.form.drivers, *own]))
 
+    def design(self, physics: AnalyticalPush, push: Push) -> Array:
+        """What the coefficients multiply, (n, 3, p * m)."""
+        return design_of(self.mechanism, self.form, physics, push, self.outcome_scale)
+
     def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
         """Shift of the mean (n, 3) and its covariance (n, 3, 3)."""
-        design = design_of(self.mechanism, self.form, physics, push, self.outcome_scale)
+        design = self.design(physics, push)
         return design @ self.coefficients, design @ self.covariance @ np.transpose(design, (0, 2, 1))
 
 

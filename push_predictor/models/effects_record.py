@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from push_predictor.models.bodies import Cross
 from push_predictor.models.effects import Effect, generic_width, mechanism_named
 from push_predictor.models.forms import FORMS, Form, columns_of
 from push_predictor.models.mechanisms import LIBRARY
@@ -32,6 +34,40 @@ def effects_of(records: list[Any], arrays: Mapping[str, np.ndarray]) -> tuple[Ef
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ValueError(f"effect {k}: {error}") from None
     return tuple(effects)
+
+
+def cross_record(cross: Cross, arrays: dict[str, np.ndarray]) -> list[list[int]]:
+    """Which effects share what; the covariances go into `arrays`."""
+    for (i, j), shared in cross.items():
+        arrays[f"effect_covariance_{i}_{j}"] = shared
+    return [list(pair) for pair in cross]
+
+
+def cross_of(pairs: list[Any], effects: tuple[Effect, ...], arrays: Mapping[str, np.ndarray]) -> Cross:
+    """What effects share. Raises ValueError for what is no covariance together with the effects' own."""
+    ends = np.cumsum([0, *(len(effect.coefficients) for effect in effects)]).tolist()
+    parts = [slice(low, high) for low, high in pairwise(ends)]
+    whole, cross = np.zeros((ends[-1], ends[-1])), {}
+    for part, effect in zip(parts, effects, strict=True):
+        whole[part, part] = effect.covariance
+    for i, j in pairs:
+        if not 0 <= i < j < len(effects):
+            raise ValueError(f"effects {i!r} and {j!r} of {len(effects)} share a covariance")
+        shared = np.asarray(arrays[f"effect_covariance_{i}_{j}"], dtype=np.float64)
+        if shared.shape != (size := (len(effects[i].coefficients), len(effects[j].coefficients))):
+            raise ValueError(f"effects {i} and {j}: covariance of shape {shared.shape}, {size} is needed")
+        cross[i, j] = shared
+        whole[parts[i], parts[j]], whole[parts[j], parts[i]] = shared, shared.T
+    _check_covariance(whole, "covariance of all effects")
+    return cross
+
+
+def _check_covariance(covariance: Array, name: str) -> None:
+    if not np.all(np.isfinite(covariance)):
+        raise ValueError(f"{name}: a number is not finite")
+    sd = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+    if np.linalg.eigvalsh(covariance / np.outer(sd, sd))[0] < -1e-6:  # coefficients have units of their own
+        raise ValueError(f"{name} is not positive semidefinite")
 
 
 def _record(effect: Effect) -> dict[str, Any]:

@@ -21,7 +21,7 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.effects_record import effects_of, effects_record
+from push_predictor.models.effects_record import cross_of, cross_record, effects_of, effects_record
 from push_predictor.models.gp import GaussianProcess, GpParameters
 from push_predictor.models.kernels import DEFAULT_CHOICE, FAMILIES
 from push_predictor.models.limit_surface import Support
@@ -42,7 +42,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
-FORMAT_VERSION = 3  # 2: other kernels than the squared exponential, and a nugget; 3: effects; without any it stays at 1
+# 2: other kernels than the squared exponential, and a nugget; 3: effects; 4: effects that share a covariance
+FORMAT_VERSION = 4
 LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
 HEADER = "header"
 
@@ -142,7 +143,7 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 def _version(body: dict[str, Any]) -> int:
     """The lowest version whose readers understand a body."""
     if "effects" in body:
-        return 3
+        return 4 if "cross" in body else 3
     return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in body.get("regressions", ())) else 1
 
 
@@ -202,6 +203,7 @@ def _body_header(body: LearnedBody | AnalyticalBody | ExtendedBody, arrays: dict
             "physics": _physics_header(body.physics),
             "effects": effects_record(body.effects, arrays),
             "scale": body.scale.tolist(),
+            **({"cross": cross_record(body.cross, arrays)} if body.cross else {}),
         }
     if isinstance(body, AnalyticalBody):
         return {**_physics_header(body.physics), "covariance": body.covariance.tolist()}
@@ -254,7 +256,8 @@ def _extended_body(
         raise ValueError(f"scale {header['scale']!r}, three finite numbers above 0 are needed")
     rows = training if kind == "analytical" else replace(training, outcomes=_finite(arrays, "base_outcomes"))
     base = _base_body(header["base"], kind, rig, rows, arrays)
-    body = ExtendedBody(base, _physics(header["physics"], rig), effects, scale)
+    cross = cross_of(header.get("cross", []), effects, arrays)
+    body = ExtendedBody(base, _physics(header["physics"], rig), effects, scale, cross)
     if missing := [name for name in body.needs if name not in training.covariates]:
         raise ValueError(f"an effect needs the covariate {missing[0]}, which the training rows do not hold")
     return body

@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody, Scaling, scaled_features
+from push_predictor.models.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray
 
 __all__ = [
@@ -37,7 +38,8 @@ class Prediction:
     """n predicted outcomes in the push frame (dx m, dy m, dtheta rad).
 
     mean (n, 3); covariance (n, 3, 3) of an observed outcome; process_covariance (n, 3, 3), the noise alone;
-    in_domain (n,), whether the push lies inside the domain of the training data.
+    in_domain (n,), whether the push, with the covariates that the model needs, lies inside the domain of the training
+    data.
     """
 
     mean: Array
@@ -76,8 +78,8 @@ class PushModel:
         The caller checks requests from outside with `check_requests`; this does not. Raises KeyError where one of the
         covariates that the model needs is missing; others are ignored.
         """
-        mean, covariance, process = self.body.moments(Push(inputs, duration, covariates or {}))
-        return Prediction(mean, covariance, process, self.in_domain(inputs))
+        push = Push(inputs, duration, covariates or {})
+        return Prediction(*self.body.moments(push), self.in_domain(inputs) & self.covariates_seen(push))
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -94,11 +96,38 @@ class PushModel:
         return self.body.exact_log_density(Push(table.inputs, table.duration, table.covariates), table.outcomes)
 
     def in_domain(self, inputs: Array) -> BoolArray:
-        """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space."""
+        """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
+
+        Covariates are another matter, see `covariates_seen`.
+        """
         low, high = self._feature_range
         features = push_features(self.rig.outline, inputs)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
         return np.asarray(np.all((features >= low - margin) & (features <= high + margin), axis=1))
+
+    def covariates_seen(self, push: Push) -> BoolArray:
+        """Whether the covariates of each of n pushes lie where the model's effects have seen them, (n,).
+
+        Raises KeyError where one is missing.
+        """
+        seen = np.ones(len(push.inputs), dtype=np.bool_)
+        if self.covariate_ranges and isinstance(self.body, ExtendedBody):
+            covariates = self.body.completed(push).covariates
+            for name, known in self.covariate_ranges.items():
+                seen &= known.holds(covariates[name])
+        return seen
+
+    @cached_property
+    def covariate_ranges(self) -> dict[str, CovariateRange]:
+        """For each covariate that effects take, its range in the training rows, on which they were fitted.
+
+        The model's own inputs have `in_domain`.
+        """
+        if not isinstance(self.body, ExtendedBody):
+            return {}
+        rows = self.training
+        known = self.body.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
+        return {name: range_of(name, known[name]) for name in self.body.takes if name not in INPUTS}
 
     @cached_property
     def training_mean(self) -> Array:

@@ -3,18 +3,23 @@
 A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but is a smooth function of at most three. It
 is tabulated once, the table is compared with the model, and it is used only if it is true to it. Every other push and
 every other model is answered by the model itself.
+
+The analytical model and the effects that follow from it have no table: where contacts begin to slip they bend, and a
+table would have to be very fine there. One push alone is computed in plain numbers instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction_table import TooFineError
-from push_predictor.models.push_model import ExtendedBody, LearnedBody, Prediction, PushModel
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, LearnedBody, Prediction, PushModel
+from push_predictor.models.single_push import single_push
 from push_predictor.models.tabulated_domain import TabulatedDomain, tabulated_domain
 from push_predictor.types import Array, BoolArray
 
@@ -65,12 +70,18 @@ class ServedModel:
         Of an extended model the base is tabulated; the effects are computed and added.
         """
         if self.domain is None:
-            return self.model.predict(inputs, duration, covariates)
-        prediction, body = self._of_base(self.domain, inputs, duration), self.model.body
+            return self._quick.predict(inputs, duration, covariates)
+        prediction, body = self._of_base(self.domain, inputs, duration), self._quick.body
         if not isinstance(body, ExtendedBody):
             return prediction
-        moments = prediction.mean, prediction.covariance, prediction.process_covariance
-        return Prediction(*body.extended(moments, Push(inputs, duration, covariates or {})), prediction.in_domain)
+        push = Push(inputs, duration, covariates or {})
+        moments = body.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
+        return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
+
+    @cached_property
+    def _quick(self) -> PushModel:
+        """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""
+        return replace(self.model, body=_quick_body(self.model.body))
 
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         base = self.model.base
@@ -101,6 +112,15 @@ def serve(model: PushModel) -> ServedModel:
             return ServedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "
     return ServedModel(model, f"exact: {how}too far off")
+
+
+def _quick_body(body: LearnedBody | AnalyticalBody | ExtendedBody) -> LearnedBody | AnalyticalBody | ExtendedBody:
+    if isinstance(body, LearnedBody):
+        return body
+    quick = replace(body, physics=single_push(body.physics))
+    if isinstance(quick, ExtendedBody) and isinstance(quick.base, AnalyticalBody):
+        return replace(quick, base=replace(quick.base, physics=single_push(quick.base.physics)))
+    return quick
 
 
 def _error(model: PushModel, domain: TabulatedDomain) -> TableError:

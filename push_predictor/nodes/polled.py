@@ -27,13 +27,14 @@ class PolledGroup(CallbackGroup):
         """See CallbackGroup."""
 
 
-def take_all(subscription: Subscription) -> Iterator[tuple[Any, int]]:
-    """What the middleware holds for a subscription, each message with its publisher's count: a tenth of the cost of an
-    executor's turn.
+def take_all(subscription: Subscription) -> Iterator[tuple[Any, int, int]]:
+    """What the middleware holds for a subscription: a tenth of the cost of an executor's turn.
+
+    Each message comes with its publisher's count, and when it was sent (ns, by the publisher's clock).
     """
     with subscription.handle:
         while (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)) is not None:
-            yield taken[0], taken[1]["publication_sequence_number"]
+            yield taken[0], taken[1]["publication_sequence_number"], taken[1]["source_timestamp"]
 
 
 class DeferredTrigger:

@@ -20,7 +20,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from push_predictor.errors import RigError
-from push_predictor.nodes.qos import LATCHED, read_overrides
+from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay_clock import SECOND, PlayerClock, SystemWall, sharpen_sleep
 from push_predictor.nodes.replay_controls import ReplayControls
 from push_predictor.nodes.replay_options import ReplayOptions, read_options
@@ -47,7 +47,7 @@ class PushReplay(Node):
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.senders))
         self._status = self.create_publisher(String, "replay_status", LATCHED)
-        self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
+        self._clock_publisher = self.create_publisher(Clock, "/clock", KEPT)
         self._rig = self.create_publisher(String, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
@@ -99,7 +99,8 @@ class PushReplay(Node):
         return ReplayPlayer(self._source, clock, wall, outlet, options.window, options.loop, options.delay)
 
     def _publish(self, message: RawMessage) -> bool:
-        if self._options.clock_with_topics:
+        untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
+        if self._options.clock_with_topics or untimed:
             self._publish_clock(message.log_time)
         return self._topics.send(message)
 
@@ -146,8 +147,7 @@ class PushReplay(Node):
         period, begin, ticks = (1.0 / frequency if frequency else 0.0), time.perf_counter(), 0
         while frequency and not self._ending.wait(max(0.0, begin + ticks * period - time.perf_counter())):
             ticks = max(ticks + 1, int((time.perf_counter() - begin) / period))
-            if (now := self._player.time) is not None:
-                self._publish_clock(now)
+            self._player.tell_time(self._publish_clock)
 
     def _publish_clock(self, recorded: int) -> None:
         if self._restamper is not None:

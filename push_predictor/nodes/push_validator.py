@@ -48,6 +48,7 @@ PARAMETERS = (
     Param("output", "", "Folder for validation.json, windows.json, the recording of residuals and the report."),
     Param("report", True, "Write the HTML report too, when a recording has finished or ~/finish is called."),
     Param("frame_id", "world", "The frame that sensor messages must name, others are rejected; empty: any."),
+    Param("scalar_topics", [""], "Scalar topics beside the sensors, whose values at a window's start it is given."),
     Param("request_timeout", 2.0, "Seconds after which an unanswered request is sent again.", low=0.05, high=60.0),
     Param(
         "last_answers",
@@ -85,7 +86,7 @@ class PushValidator(Node):
         self._rig: Rig | None = load_rig(Path(self._values["rig"]).expanduser()) if self._values["rig"] else None
         self._rig_problem = "" if self._rig else "waiting for the topic rig; or give the parameter rig"
         self._output = _folder(self._values["output"])
-        self._inlet = SensorInlet(self, self._values["frame_id"])
+        self._inlet = SensorInlet(self, self._values["frame_id"], self._values["scalar_topics"])
         self._client = PredictionClient(self, self._values["request_timeout"])
         self._report = ReportWriter()
         self._run: ValidationRun | None = None  # the present score, or the last one
@@ -143,6 +144,7 @@ class PushValidator(Node):
     # --- the work -------------------------------------------------------------------------------------------
 
     def _work(self) -> None:
+        self._inlet.look()
         self._inlet.drain()
         self._source.work()
         if (models := self._source.models()) is not None:
@@ -152,7 +154,7 @@ class PushValidator(Node):
             self._collect()
             self._ending = self._due()
             if self._ending is not None and self._run is not None:
-                self._run.finish()
+                self._run.finish({} if self._rig_changed() else self._inlet.last_scalars())
         self._client.work()
         if self._ending is not None:
             self._end(self._ending)
@@ -170,11 +172,13 @@ class PushValidator(Node):
             # Reading a recording gives the finder every stream from its beginning, so a score begins with all of them.
             if not (complete or self._closing.is_set() or self._finish.asked()):
                 return
-            self._run = ValidationRun(self._rig, models, self._client, self._show, self._alarm, self._output)
+            scalars = self._inlet.scalar_names
+            self._run = ValidationRun(self._rig, models, self._client, self._show, self._alarm, self._output, scalars)
             self._open, self._failure = True, ""
         samples = self._inlet.take()
-        if self._run is not None and len(samples):
+        if len(samples):
             self._last_sample = monotonic()
+        if self._run is not None:
             self._run.feed(samples)
 
     def _rig_changed(self) -> bool:

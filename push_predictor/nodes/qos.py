@@ -21,6 +21,7 @@ from push_predictor.errors import RequestError
 
 DEPTH = 1000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for subscribers that come late
 _POLICIES: Mapping[str, Any] = {
     "history": HistoryPolicy,
     "reliability": ReliabilityPolicy,
@@ -33,9 +34,11 @@ _KEYS = ", ".join([*_POLICIES, *_DURATIONS, *_OTHERS])
 _PARAMETER = "play.qos_profile_overrides_path"
 
 
-def replay_profile(recorded: str) -> QoSProfile:
-    """Reliable, KEEP_LAST; transient local where all recorded publishers were (`recorded`: rosbag2's YAML text)."""
-    durability = DurabilityPolicy.TRANSIENT_LOCAL if _was_latched(recorded) else DurabilityPolicy.VOLATILE
+def replay_profile(recorded: str, kept: bool = False) -> QoSProfile:
+    """Reliable, KEEP_LAST; transient local where all recorded publishers were (`recorded`: rosbag2's YAML text), or
+    where messages are to be kept for subscribers that come late.
+    """
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if kept or _was_latched(recorded) else DurabilityPolicy.VOLATILE
     return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
 
 

@@ -138,13 +138,14 @@ class ReplayPlayer:
         self._closed = True
         self.stop()
 
-    @property
-    def time(self) -> int | None:
-        """Recorded time, ns, never beyond a message that is still to come; None before the first playback."""
+    def tell_time(self, tell: Callable[[int], None]) -> None:
+        """Tell the recorded time (ns), never beyond a message that is still to come; nothing before the first playback.
+
+        No message goes out meanwhile, so that the times told are in order with those of messages.
+        """
         with self._control():
-            if self._ahead is not None and (head := self._head()) is not None:
-                return min(self._clock.now(), head.log_time)
-            return self._time
+            if (now := self._now()) is not None:
+                tell(now)
 
     @property
     def behind(self) -> int:
@@ -156,6 +157,11 @@ class ReplayPlayer:
     @property
     def _busy(self) -> bool:
         return self._ahead is not None or self._todo is not None or self.state in ("playing", "paused")
+
+    def _now(self) -> int | None:
+        if self._ahead is not None and (head := self._head()) is not None:
+            return min(self._clock.now(), head.log_time)
+        return self._time
 
     @contextmanager
     def _control(self) -> Iterator[None]:

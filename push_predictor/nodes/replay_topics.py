@@ -21,6 +21,7 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.qos import overridden, replay_profile
 from push_predictor.nodes.replay_clock import SECOND
 from push_predictor.recordings.bag import RawMessage
+from push_predictor.recordings.definitions import SCALAR_LAYOUTS
 
 OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
@@ -101,7 +102,9 @@ class ReplayTopics:
     """The publishers of a replay.
 
     senders: {recorded topic: sender}; skipped: {recorded topic: why it is not published}; unstamped: topics that
-    restamping leaves as recorded, because their type does not begin with a header.
+    restamping leaves as recorded, because their type does not begin with a header; untimed: scalar topics whose
+    messages bear no time, which /clock must tell. Scalars are kept for subscribers that come late: a scalar's type is
+    known only once it is published.
     """
 
     def __init__(
@@ -116,6 +119,7 @@ class ReplayTopics:
         self.senders: dict[str, TopicSender] = {}
         self.skipped: dict[str, str] = {}
         self.unstamped: list[str] = []
+        self.untimed = frozenset(t for t, k in topics.items() if k in SCALAR_LAYOUTS and not SCALAR_LAYOUTS[k].header)
         for topic, kind in topics.items():
             self._open(topic, kind)
 
@@ -155,15 +159,15 @@ class ReplayTopics:
         if self._restamper is not None and not stamped:
             self.unstamped.append(topic)
         try:
-            publisher = self._publisher(topic, name, found)
+            publisher = self._publisher(topic, name, found, kept=kind in SCALAR_LAYOUTS)
         except InvalidTopicNameException as error:
             self.skipped[topic] = " ".join(str(error).split())
             return
         self.senders[topic] = TopicSender(publisher, self._restamper if stamped else None)
 
-    def _publisher(self, topic: str, name: str, found: type) -> Publisher:
+    def _publisher(self, topic: str, name: str, found: type, kept: bool) -> Publisher:
         overrides = self._overrides.get(topic.strip("/"), {})
-        profile = overridden(replay_profile(self._qos.get(topic, "")), overrides, topic)
+        profile = overridden(replay_profile(self._qos.get(topic, ""), kept), overrides, topic)
         try:
             options = QoSOverridingOptions.with_default_policies()
             return self._node.create_publisher(found, name, profile, qos_overriding_options=options)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from time import monotonic
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
@@ -14,7 +15,8 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from msg_adapters.streams import SLIDER, TIP, WRENCH, Inbox, slider_stream, tip_stream, wrench_stream
 from push_predictor.nodes.polled import PolledGroup, take_all
-from push_predictor.recordings.streams import PoseStream, WrenchStream
+from push_predictor.nodes.scalar_inlet import ScalarInlet
+from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 
 DEPTH = 1000
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last DEPTH messages only
@@ -28,25 +30,29 @@ TOPICS = (
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A portion of each stream."""
+    """A portion of each stream; scalars: of each scalar topic that is or was there, by its name in a recording."""
 
     slider: PoseStream
     pusher: PoseStream
     wrench: WrenchStream
+    scalars: Mapping[str, ScalarStream] = field(default_factory=dict)
 
     def __len__(self) -> int:
+        """How many samples of the sensors."""
         return len(self.slider) + len(self.pusher) + len(self.wrench)
 
 
 class SensorInlet:
     """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides say otherwise.
 
-    frame_id: what the headers must name, empty for any. A thread empties the middleware's queues: a fast replay fills
-    them within the time that a portion of samples takes to be judged.
+    frame_id: what the headers must name, empty for any. scalars: the scalar topics beside them. A thread empties the
+    middleware's queues: a fast replay fills them within the time that a portion of samples takes to be judged.
     """
 
-    def __init__(self, node: Node, frame_id: str) -> None:
+    def __init__(self, node: Node, frame_id: str, scalars: Sequence[str] = ()) -> None:
         self._node = node
+        self._scalars = ScalarInlet(node, scalars)
+        self._newest: int | None = None  # stamp (ns) of the poses
         self._inboxes = {name: Inbox(kind, frame_id) for name, _, _, kind in TOPICS}
         self.lost: Counter[str] = Counter()
         self._last: dict[str, int] = {}
@@ -77,20 +83,30 @@ class SensorInlet:
         return sum(map(len, self._inboxes.values()))
 
     def complete(self) -> bool:
-        """Has every topic sent something that waits, or one of them nothing for a second after the others?
+        """Has every topic sent something that waits, or one of them nothing for a second after the sensors?
 
         To be asked often, for it takes the time since nothing waited.
         """
         waiting = [len(inbox) > 0 for inbox in self._inboxes.values()]
         if not any(waiting):
             self._empty = monotonic()
-        return all(waiting) or monotonic() - self._empty > PATIENCE
+        return (all(waiting) and self._scalars.waiting()) or monotonic() - self._empty > PATIENCE
+
+    @property
+    def scalar_names(self) -> list[str]:
+        """The scalar topics that were asked for, there or not, by their names in a recording."""
+        return self._scalars.names
+
+    def look(self) -> None:
+        """Subscribe to scalar topics that have appeared; for the executor's thread, often."""
+        self._scalars.look()
 
     def drain(self) -> None:
         """Bring in what has arrived by now."""
+        self._scalars.drain()
         with self._draining:  # one at a time, so that messages stay in order
             for name, subscription in self._subscriptions.items():
-                for data, sequence in take_all(subscription):
+                for data, sequence, _ in take_all(subscription):
                     self._note_loss(name, subscription.topic_name, sequence)
                     self._inboxes[name].put(data)
 
@@ -107,7 +123,14 @@ class SensorInlet:
     def take(self) -> Samples:
         """The usable samples since the last call."""
         slider, tip, wrench = (self._inboxes[name].take() for name, *_ in TOPICS)
-        return Samples(slider_stream(*slider), tip_stream(*tip), wrench_stream(*wrench))
+        for stamp, _ in (slider, tip):
+            self._newest = int(stamp[-1]) if len(stamp) else self._newest
+        scalars = self._scalars.take(self._newest)
+        return Samples(slider_stream(*slider), tip_stream(*tip), wrench_stream(*wrench), scalars)
+
+    def last_scalars(self) -> dict[str, ScalarStream]:
+        """The scalars that no sensor's sample came after."""
+        return self._scalars.take(self._newest, last=True)
 
     def figures(self) -> dict[str, int]:
         """Counts by topic; rejected also by kind, for the kinds that occurred."""
@@ -119,7 +142,7 @@ class SensorInlet:
                 found[f"{name} dropped"] = inbox.dropped
             if self.lost[name]:
                 found[f"{name} lost"] = self.lost[name]
-        return found
+        return found | self._scalars.figures()
 
     def problems(self) -> list[str]:
         """What keeps pushes from being found, in words."""
@@ -135,4 +158,4 @@ class SensorInlet:
                 found.append(f"{topic}: {lost} samples lost, this machine is too busy: replay slower, or a deeper QoS")
             if inbox.dropped:
                 found.append(f"{topic}: {inbox.dropped} samples dropped while model or rig were unknown")
-        return found
+        return found + self._scalars.problems()

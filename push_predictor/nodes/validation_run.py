@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from time import monotonic
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,21 +20,22 @@ from push_predictor.nodes.push_alarm import PushAlarm
 from push_predictor.nodes.push_gate import PushGate
 from push_predictor.nodes.residual_recorder import residual_message, write_residuals
 from push_predictor.nodes.sensor_inlet import Samples
+from push_predictor.nodes.stream_pace import StreamPace
 from push_predictor.nodes.window_table import WindowTable
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.window_finder import HOLD, WindowFinder
+from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.window_finder import WindowFinder
 from push_predictor.recordings.windows import PushWindow
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import PredictPush
-
-SILENCE = 5.0  # s of waiting for a stream that lags behind the others
 
 
 class ValidationRun:
     """Feed it samples; it asks the client about every window and keeps the score.
 
     models: by the name to ask for, the main one first. show: called for every prediction, with the number of the model.
-    alarm: about the main model. output: where the windows are kept while they come; None: nowhere.
+    alarm: about the main model. output: where the windows are kept while they come; None: nowhere. scalars: the topics
+    that may come beside the sensors.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class ValidationRun:
         show: Callable[[int, PushWindow, Prediction, PushResidual], None],
         alarm: PushAlarm | None = None,
         output: Path | None = None,
+        scalars: Sequence[str] = (),
     ) -> None:
         self.rig = rig
         self.alarm = alarm
@@ -57,8 +59,8 @@ class ValidationRun:
         self._finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
         self._show = show
-        self._newest: dict[str, int] = {}  # stamp (ns) by stream
-        self._together = monotonic()
+        self._pace = StreamPace(scalars)
+        self._first: dict[str, float] = {}  # value of each scalar, by the name of its covariate
         if alarm is not None:
             alarm.begin()
 
@@ -69,14 +71,17 @@ class ValidationRun:
 
     def feed(self, samples: Samples) -> None:
         """Take a portion of the streams."""
+        self._add_scalars(samples.scalars)
         self._finder.add_wrench(samples.wrench)
         self._finder.add_pusher(samples.pusher)
         self._finder.add_slider(samples.slider)
-        if self._in_step(samples):
+        self._pace.note(samples)
+        if self._pace.in_step():
             self._ask_about(self._finder.take_ready())
 
-    def finish(self) -> None:
-        """No more samples will come."""
+    def finish(self, scalars: Mapping[str, ScalarStream] = MappingProxyType({})) -> None:
+        """No more samples will come but these."""
+        self._add_scalars(scalars)
         self._ask_about(self._finder.finish())
 
     def no_more_answers(self) -> None:
@@ -98,16 +103,11 @@ class ValidationRun:
             if self.alarm is not None:
                 self.alarm.add(push)
 
-    def _in_step(self, samples: Samples) -> bool:
-        """Are the streams together, or is one of them silent rather than late?
-
-        The finder goes on without a stream that lags by HOLD. In a fast replay that is little time.
-        """
-        self._newest |= {name: int(stream.stamp[-1]) for name, stream in vars(samples).items() if len(stream)}
-        if max(self._newest.values()) - min(self._newest.values()) < 0.5e9 * HOLD:
-            self._together = monotonic()
-            return True
-        return monotonic() - self._together > SILENCE
+    def _add_scalars(self, scalars: Mapping[str, ScalarStream]) -> None:
+        for name, stream in scalars.items():
+            self._finder.add_scalar(name, stream)
+            if len(stream):
+                self._first.setdefault(f"topic:{name}", float(stream.value[0]))
 
     def _ask_about(self, windows: Sequence[PushWindow]) -> None:
         self._keep(windows)
@@ -125,7 +125,7 @@ class ValidationRun:
         if self.table is None or self.table_failure:
             return
         try:
-            self.table.add(windows, self.validation.windows)
+            self.table.add(windows, self.validation.windows, self._first)
         except OSError as error:
             self.table_failure = f"windows are not kept: {error}"
 

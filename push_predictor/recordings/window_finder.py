@@ -3,6 +3,7 @@
 What is found depends on header stamps alone, not on how the samples of different topics are interleaved or in what
 portions they come: a slider sample is judged once all streams have passed it, from data near it in time. So a replay
 watched online yields the same windows as the file read at once (`find_windows` feeds the same code in one portion).
+A window gets the value that each scalar topic had at its start; it is held back until they are known.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 from push_predictor.recordings.contact_judge import REACH, judge
 from push_predictor.recordings.push_tracker import PushTracker
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.scalars import APART, ScalarTrack
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.track import NANOSECOND, Track
 from push_predictor.recordings.window_cut import Tracks, cut_window
 from push_predictor.recordings.windows import PushWindow, WindowOptions
@@ -43,16 +45,19 @@ class WindowFinder:
     def __init__(self, rig: Rig, options: WindowOptions | None = None) -> None:
         self.rig, self.options = rig, options or WindowOptions()
         self.counts = dict.fromkeys(("refused", "clock_set_back", "dropouts", "resets", "not_a_push"), 0)
+        self._cut_out: list[PushWindow] = []  # without their scalars
         self._ready: list[PushWindow] = []
         self._begin()
 
     def find(self, recording: Recording) -> list[PushWindow]:
-        """All windows of a recording, with its scalar topics as covariates; see find_windows."""
+        """All windows of a recording; see find_windows."""
+        for name, stream in recording.scalars.items():
+            self.add_scalar(name, stream)
         if recording.wrench is not None:
             self.add_wrench(recording.wrench)
         self.add_pusher(recording.pusher)
         self.add_slider(recording.slider)
-        return [_with_topics(window, recording) for window in self.finish()]
+        return self.finish()
 
     def add_slider(self, stream: PoseStream) -> None:
         """Samples of the slider's pose."""
@@ -66,9 +71,18 @@ class WindowFinder:
         """Samples of the wrench on the pusher."""
         self._add("wrench", stream.stamp, np.column_stack([stream.fx, stream.fy]))
 
+    def add_scalar(self, name: str, stream: ScalarStream) -> None:
+        """Samples of a scalar topic, the covariate topic:NAME; with none of them, that some are to come.
+
+        A window waits until every topic has passed its start, for APART of the other streams' time at most. Without a
+        value by then it has no such covariate.
+        """
+        self._scalars.setdefault(name, ScalarTrack()).add(stream)
+
     def take_ready(self) -> list[PushWindow]:
         """The windows that are complete and were not taken yet."""
         self._advance(final=False)
+        self._release(final=False)
         return self._taken()
 
     def finish(self) -> list[PushWindow]:
@@ -80,6 +94,7 @@ class WindowFinder:
 
     def _begin(self) -> None:
         self._tracks = {"slider": Track(4, angle=3), "pusher": Track(3), "wrench": Track(2)}
+        self._scalars: dict[str, ScalarTrack] = {}
         self._tracker = PushTracker(self.options)
         self._origin: int | None = None
         self._first = 0
@@ -88,7 +103,9 @@ class WindowFinder:
 
     def _end(self) -> None:
         self._advance(final=True)
+        self._release(final=True)
         self.counts["refused"] += sum(track.refused for track in self._tracks.values())
+        self.counts["refused"] += sum(track.refused for track in self._scalars.values())
         for kind, count in self._tracker.counts.items():
             self.counts[kind] += count
         self._begin()
@@ -162,20 +179,32 @@ class WindowFinder:
         # From window to window: summed over samples, the tracker's noise would count as a way.
         self._slid += float(np.hypot(*window.displacement[:2]))
         elapsed = (start - self._first) * NANOSECOND
-        self._ready.append(replace(window, covariates={"elapsed_time": elapsed, **window.covariates}))
+        self._cut_out.append(replace(window, covariates={"elapsed_time": elapsed, **window.covariates}))
 
     def _forget(self, judged: float) -> None:
         start = self._tracker.start
         needed = judged if start is None or self._origin is None else min(judged, (start - self._origin) * 1e-9)
         for track in self._tracks.values():
             track.forget_before(needed - KEPT_BEHIND)
+        first = self._cut_out[0].start if self._cut_out else start
+        for scalar in self._scalars.values():
+            scalar.forget_before(self._judged_stamp if first is None else min(first, self._judged_stamp))
 
+    # --- scalars ------------------------------------------------------------------------------------------------
 
-def _with_topics(window: PushWindow, recording: Recording) -> PushWindow:
-    """The window with the value that each recorded scalar had at its start."""
-    topics = {
-        f"topic:{name}": float(np.interp(window.start, stream.stamp.astype(np.float64), stream.value))
-        for name, stream in recording.scalars.items()
-        if len(stream)
-    }
-    return replace(window, covariates={**window.covariates, **topics})
+    def _release(self, final: bool) -> None:
+        """Complete the windows whose scalars are known, in order; at the end, all."""
+        waiting = self._cut_out
+        count = len(waiting) if final else next((k for k, w in enumerate(waiting) if self._waits(w)), len(waiting))
+        self._ready += [self._with_scalars(window) for window in waiting[:count]]
+        self._cut_out = waiting[count:]
+
+    def _waits(self, window: PushWindow) -> bool:
+        newest = max(int(track.stamp[-1]) for track in self._tracks.values() if len(track))
+        late = newest - window.start > APART
+        return not late and not all(track.passed(window.start) for track in self._scalars.values())
+
+    def _with_scalars(self, window: PushWindow) -> PushWindow:
+        values = {f"topic:{name}": track.at(window.start) for name, track in self._scalars.items()}
+        known = {name: value for name, value in values.items() if value is not None}
+        return replace(window, covariates={**window.covariates, **known})

@@ -17,10 +17,11 @@ from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBo
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel, scaled_features
 from push_predictor.models.vhgp import conditioned
-from push_predictor.residuals.candidates import Candidate, Kind, whitened_response
-from push_predictor.residuals.drivers import LOCAL
+from push_predictor.residuals.candidates import Candidate, Kind, late_touch, whitened_response
+from push_predictor.residuals.drivers import LOCAL, STANDING
 from push_predictor.residuals.evidence import Evidence, push_order, whitener_of
 from push_predictor.residuals.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.loading import with_inputs
 from push_predictor.residuals.screening import TINY, Scores, Without, raw_scores
 from push_predictor.types import Array, IntArray
 
@@ -46,12 +47,23 @@ class Baseline:
         own = candidate.kind == "constant" or (candidate.kind == "speed" and self.basis.knows_speed)
         return (own and self.basis.learnt) or candidate.covariate in LOCAL
 
+    def stands(self, candidate: Candidate) -> bool:
+        """Whether what drives this candidate belongs to the rig and drove in training too, if it does at all.
+
+        A learnt base that folds sides or knows no place lacks it then, but lacks it since it was trained.
+        """
+        recorded = all(name in self.evidence.table.covariates for name in candidate.form.drivers)
+        return self.basis.learnt and recorded and candidate.covariate in STANDING and not self.applies(candidate)
+
     def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         """Block scores and information of a candidate on the training windows."""
         evidence = self.evidence
         response = self._response(candidate.mechanism)
         there = replace(
-            candidate, response=response, values=candidate.form.values(evidence.table.covariates, len(response))
+            candidate,
+            response=response,
+            values=candidate.form.values(evidence.table.covariates, len(response)),
+            beside=None if candidate.beside is None else self._touch,
         )
         out = Without(inputs_of(candidate.kind, self.basis))
         return raw_scores(out.left(evidence.z, evidence.block), out(there.columns))
@@ -60,6 +72,10 @@ class Baseline:
         if mechanism not in self._responses:
             self._responses[mechanism] = whitened_response(self.evidence, mechanism)
         return self._responses[mechanism]
+
+    @cached_property
+    def _touch(self) -> Array | None:
+        return late_touch(self.evidence, self.basis)
 
     @cached_property
     def _responses(self) -> dict[str | None, Array]:
@@ -75,7 +91,7 @@ def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
     """The baseline of a model, from the training windows that it keeps."""
-    table = model.training
+    table = with_inputs(model.training)
     push = Push(table.inputs, table.duration, table.covariates)
     moments = _crossed(model.base.body, table.outcomes - _shift(model, push), push, push_order(table))
     mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments

@@ -11,7 +11,7 @@ import numpy as np
 from push_predictor.models.effects import generic_responses, mechanism_named
 from push_predictor.models.forms import Form
 from push_predictor.models.mechanisms import LIBRARY
-from push_predictor.residuals.drivers import CONSTANT, HEADINGS, screening_forms
+from push_predictor.residuals.drivers import CONSTANT, HEADINGS, SETTLED, screening_forms
 from push_predictor.residuals.evidence import Evidence
 from push_predictor.residuals.inputs_basis import InputsBasis
 from push_predictor.residuals.screening import Without
@@ -20,6 +20,7 @@ from push_predictor.types import Array
 HEADED = "push_heading"  # drives what has a direction in the world by itself
 SIDES = "edge"  # tells apart what a base folds
 SPEED = "velocity"
+TOUCHED = ("time_since_contact", "contact_gap")  # differ between the window that begins with the touch and later ones
 OUTSIDE = 0.5  # share of a constant effect that a base which folds the sides cannot have learnt: then sides drive it
 
 Kind = Literal["driven", "speed", "constant"]
@@ -30,6 +31,7 @@ class Candidate:
     """A mechanism (None: the generic fall-back) with a driver in one form.
 
     response (n, 3, p): whitened outcome per unit of the parameters; values (n, m): what the form multiplies it by.
+    beside (n, 3, q): what is taken out of the columns, because it comes without any effect; see late_touch.
     """
 
     mechanism: str | None
@@ -37,14 +39,15 @@ class Candidate:
     form: Form
     response: Array
     values: Array | None = None
+    beside: Array | None = None
 
     @property
     def columns(self) -> Array:
         """Whitened columns (n, 3, p * m), p first."""
-        if self.values is None:
-            return self.response
-        n = len(self.response)
-        return (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
+        n, columns = len(self.response), self.response
+        if self.values is not None:
+            columns = (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
+        return columns if self.beside is None else _apart(columns, self.beside)
 
     @property
     def kind(self) -> Kind:
@@ -68,15 +71,29 @@ def candidates_of(
     """
     forms = [(CONSTANT, Form("constant")), *screening_forms(evidence.table, names)]
     values = [form.values(evidence.table.covariates, len(evidence.table)) for _, form in forms]
-    found = []
+    touch, found = late_touch(evidence, basis), []
     for mechanism in usable(evidence):
         response = whitened_response(evidence, mechanism)
         for (covariate, form), column in zip(forms, values, strict=True):
             if covariate in HEADINGS and _headed(mechanism):
                 continue  # turned back by the heading, it would be one of the body, by a wrong name
             driver = _constant_driver(mechanism, response, basis) if covariate == CONSTANT else covariate
-            found.append(Candidate(mechanism, driver, form, response, column))
+            beside = touch if covariate in TOUCHED else None
+            found.append(Candidate(mechanism, driver, form, response, column, beside))
     return found
+
+
+def late_touch(evidence: Evidence, basis: InputsBasis | None) -> Array | None:
+    """What a touch that is felt earlier or later does to the window that begins with it, (n, 3, 1), without the inputs.
+
+    A heavier slider is felt sooner: that shifts the window, not the slider. None where nothing tells which it is.
+    """
+    since = evidence.table.covariates.get("time_since_contact")
+    if since is None:
+        return None
+    first = (since < SETTLED).astype(np.float64)
+    shift = whitened_response(evidence, "pusher_travel") * first[:, None, None]
+    return shift if basis is None else Without(basis.columns)(shift)
 
 
 def usable(evidence: Evidence) -> list[str | None]:
@@ -106,6 +123,13 @@ def evidence_scale(evidence: Evidence) -> Array:
     """Unit of the generic responses (3,): deviation of the residuals per metre of the tip's way."""
     way = evidence.table.inputs[:, 0] * evidence.table.duration
     return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(way**2)))
+
+
+def _apart(columns: Array, beside: Array) -> Array:
+    """Columns (n, 3, k) less what `beside` (n, 3, q) explains of them."""
+    flat, out = columns.reshape(-1, columns.shape[2]), beside.reshape(-1, beside.shape[2])
+    coefficients, *_ = np.linalg.lstsq(out, flat, rcond=None)
+    return np.asarray(flat - out @ coefficients).reshape(columns.shape)
 
 
 def _constant_driver(mechanism: str | None, response: Array, basis: InputsBasis | None) -> str:

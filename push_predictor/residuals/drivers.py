@@ -16,9 +16,11 @@ PLACE = ("slider_x", "slider_y")
 OUTCOMES = ("normal_force", "tangential_force")  # of the same window: what the push did to the sensor, not a cause
 # They share noise with the residual, or go with the course of a push: judged against their relation in training.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
+STANDING = ("edge", *HEADINGS, *PLACE, "velocity")  # of the rig, on any day
 FOLDED = ("contact", "angle")  # inputs that mechanisms and fall-back take already
 CONSTANT = "model_inputs"
 MOST_LEVELS = 12
+SETTLED = 0.03  # s of contact after which tip and slider move together
 
 
 def screening_forms(table: PushTable, names: Sequence[str] | None = None) -> list[tuple[str, Form]]:

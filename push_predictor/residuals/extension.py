@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -20,6 +20,7 @@ from push_predictor.evaluation.estimate import Figure, difference_by_push, total
 from push_predictor.evaluation.tally import tally
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.bodies import Cross
 from push_predictor.models.effects import Effect
 from push_predictor.models.forms import Form
 from push_predictor.models.kernels import KernelChoice
@@ -65,14 +66,19 @@ def extend(
     physics, learnt = physics or physics_of(base), base.kind != "analytical"
     own_inputs, known = inputs_basis(base, table).columns if learnt else None, base
     for _ in range(ROUNDS if learnt else 1):
-        effects = estimate(evidence_of(known, table, physics), terms, own_inputs)
-        extended = _extended(base, table, effects, physics)
-        known = _without(extended, effects)
+        effects, cross = estimate(evidence_of(known, table, physics), terms, own_inputs)
+        extended = _extended(base, table, effects, cross, physics)
+        known = _without_last(extended, len(effects))
     return extended
 
 
-def estimate(evidence: Evidence, terms: Sequence[Term], own_inputs: Array | None = None) -> tuple[Effect, ...]:
-    """The effects of these terms on the residuals; own_inputs (n, m): what goes out of both first."""
+def estimate(
+    evidence: Evidence, terms: Sequence[Term], own_inputs: Array | None = None
+) -> tuple[tuple[Effect, ...], Cross]:
+    """The effects of these terms on the residuals, and what their coefficients share (see ExtendedBody).
+
+    own_inputs (n, m): what goes out of residuals and responses first.
+    """
     scale, designs = evidence_scale(evidence), [candidate(evidence, *term).columns for term in terms]
     columns, rest = np.concatenate(designs, axis=2), Without(np.empty((len(evidence.table), 0)))
     if own_inputs is not None:
@@ -83,10 +89,11 @@ def estimate(evidence: Evidence, terms: Sequence[Term], own_inputs: Array | None
     covariance *= len(columns) / max(len(columns) - rest.q.shape[1], 1)
     ends = np.cumsum([0, *(design.shape[2] for design in designs)])
     parts = [slice(low, high) for low, high in pairwise(ends.tolist())]
-    return tuple(
+    effects = tuple(
         Effect(mechanism, covariate, form, coefficients[part], covariance[part, part], scale)
         for (mechanism, covariate, form), part in zip(terms, parts, strict=True)
     )
+    return effects, {(i, j): covariance[parts[i], parts[j]] for i, j in combinations(range(len(parts)), 2)}
 
 
 def gain(
@@ -117,10 +124,11 @@ def physics_of(model: PushModel) -> AnalyticalPush:
     return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
 
 
-def _extended(base: PushModel, table: PushTable, effects: tuple[Effect, ...], physics: AnalyticalPush) -> PushModel:
+def _extended(
+    base: PushModel, table: PushTable, effects: tuple[Effect, ...], cross: Cross, physics: AnalyticalPush
+) -> PushModel:
     """The base with these effects beside those it has: a learnt one trained anew without them, the other rescaled."""
-    had = base.body.effects if isinstance(base.body, ExtendedBody) else ()
-    body = ExtendedBody(_base_body(base), physics, (*had, *effects), np.ones(3))
+    body = _beside(base.body, physics, effects, cross)
     shift, _ = body.shift(_push(table))
     if base.kind != "analytical":
         trained = _retrained(base.base, table, table.outcomes - shift)
@@ -131,11 +139,26 @@ def _extended(base: PushModel, table: PushTable, effects: tuple[Effect, ...], ph
     return _wrapped(base, table, replace(body, scale=scale))
 
 
-def _without(model: PushModel, effects: tuple[Effect, ...]) -> PushModel:
-    """The model less these effects."""
+def _beside(
+    body: LearnedBody | AnalyticalBody | ExtendedBody,
+    physics: AnalyticalPush,
+    effects: tuple[Effect, ...],
+    cross: Cross,
+) -> ExtendedBody:
+    """The base of a body with its effects and these behind them, unscaled."""
+    if not isinstance(body, ExtendedBody):
+        return ExtendedBody(body, physics, effects, np.ones(3), cross)
+    had = len(body.effects)
+    moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
+    return ExtendedBody(body.base, physics, (*body.effects, *effects), np.ones(3), {**body.cross, **moved})
+
+
+def _without_last(model: PushModel, count: int) -> PushModel:
+    """The model less its last effects."""
     assert isinstance(model.body, ExtendedBody)
-    kept = tuple(effect for effect in model.body.effects if effect not in effects)
-    return replace(model, body=replace(model.body, effects=kept))
+    kept = model.body.effects[:-count]
+    cross = {(i, j): shared for (i, j), shared in model.body.cross.items() if j < len(kept)}
+    return replace(model, body=replace(model.body, effects=kept, cross=cross))
 
 
 def _base_body(model: PushModel) -> LearnedBody | AnalyticalBody:

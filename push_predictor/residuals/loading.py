@@ -60,6 +60,12 @@ def cut_anew(recordings: Sequence[Recording], rig: Rig, options: WindowOptions =
     return _joined(distinct_pushes([recording.name for recording in recordings], tables))[0]
 
 
+def with_inputs(table: PushTable) -> PushTable:
+    """The table with the model's inputs among the covariates: they can drive what the model has constant."""
+    inputs = dict(zip(INPUTS, table.inputs.T, strict=True))
+    return replace(table, covariates={**table.covariates, **inputs})
+
+
 def previous_residual(table: PushTable, z: Array) -> Array:
     """The covariate previous_residual (n,), from residuals z (n, 3) in units of the prediction.
 
@@ -81,7 +87,7 @@ def _first_stamp(recording: Recording) -> int:
 
 def _cut(recordings: Sequence[Recording], rig: Rig, options: WindowOptions) -> list[PushTable]:
     windows = [find_windows(recording, rig, options) for recording in recordings]
-    return [_with_inputs(windows_to_table(found)) for found in _running_on(windows)]
+    return [with_inputs(windows_to_table(found)) for found in _running_on(windows)]
 
 
 def _running_on(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
@@ -109,15 +115,9 @@ def _later(window: PushWindow, added: Array) -> PushWindow:
 
 
 def _read(path: Path, rig: Rig) -> PushTable:
-    table = _with_inputs(read_table(path))
+    table = with_inputs(read_table(path))
     edge = rig.outline.edge(table.inputs[:, 1])[0].astype(np.float64)
     return replace(table, covariates={"edge": edge, **table.covariates})
-
-
-def _with_inputs(table: PushTable) -> PushTable:
-    """The table with the model's inputs among the covariates: they can drive what the model has constant."""
-    inputs = dict(zip(INPUTS, table.inputs.T, strict=True))
-    return replace(table, covariates={**table.covariates, **inputs})
 
 
 def _joined(tables: Sequence[PushTable]) -> tuple[PushTable, dict[str, str]]:

@@ -34,7 +34,7 @@ from push_predictor.residuals.contrast import (
     stacked,
     tells,
 )
-from push_predictor.residuals.drivers import CONSTANT
+from push_predictor.residuals.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.screening import Without
 from push_predictor.types import Array, BoolArray, IntArray
@@ -46,7 +46,6 @@ PARAMETERS = {
     "frame_shift": (("shift of the tracker's frame along x", "m"), ("shift of the tracker's frame along y", "m")),
 }
 ALIKE = {"frame_shift": ("tool_offset",)}  # a tip that is off by -s, as long as the tool does not turn
-SETTLED = 0.03  # s of contact after which tip and slider move together
 MOST_EDGES = 8  # of an outline whose edges are told apart; others are smooth
 FEWEST_ROWS = 2.0  # per column
 CORNER = 0.002  # m; contacts as near to a corner may be on either side of it

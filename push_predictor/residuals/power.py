@@ -76,7 +76,7 @@ def _size(
     out = Without(inputs_of(candidate.kind, basis))
     flat = out(candidate.columns)
     raw = raw_scores(out.left(left, evidence.block), flat)
-    against = baseline is not None and baseline.applies(candidate)
+    against = baseline is not None and (baseline.applies(candidate) or baseline.stands(candidate))
     training = baseline.scores(candidate) if baseline is not None and against else None
     scores = unit_scores(*raw) if training is None else difference(raw, training)
     informations = [raw[1]] if training is None else [raw[1], training[1]]

@@ -71,7 +71,7 @@ def search(
     basis: the model's inputs, taken out of residual and candidates. baseline: what a learnt base leaves over in
     training, against which effects in its own inputs are judged; without it they are judged against zero.
     """
-    hunt = _Hunt(evidence, tuple(candidates), basis, seed, _training(candidates, baseline))
+    hunt = _Hunt(evidence, tuple(candidates), basis, seed, alpha, baseline, _training(candidates, baseline))
     z, first = evidence.z, None
     terms: list[Term] = []
     while True:
@@ -98,6 +98,8 @@ class _Hunt:
     candidates: tuple[Candidate, ...]
     basis: InputsBasis
     seed: int
+    alpha: float
+    baseline: Baseline | None
     training: dict[int, tuple[Scores, Array]]
 
     @cached_property
@@ -108,7 +110,25 @@ class _Hunt:
     def screened(self, z: Array) -> Screened:
         """All candidates on residuals z."""
         lefts = {kind: out.left(z, self.evidence.block) for kind, out in self.outs.items()}
-        return screen([self._scores(c, lefts[c.kind]) for c in self.candidates], self.seed)
+        screened = screen([self._scores(c, lefts[c.kind]) for c in self.candidates], self.seed)
+        return self._news(screened, lefts)
+
+    def _news(self, screened: Screened, lefts: dict[Kind, Left]) -> Screened:
+        """Where what stands in the rig was found: whether it is other than in training, all of these at once."""
+        found = [k for k, c in enumerate(self.candidates) if screened.p_value[k] <= self.alpha and self._stands(c)]
+        if not found or self.baseline is None:
+            return screened
+        changed = []
+        for k in found:
+            c = self.candidates[k]
+            raw = raw_scores(lefts[c.kind], self.outs[c.kind](c.columns))
+            changed.append(difference(raw, self.baseline.scores(c)))
+        p_value = screened.p_value.copy()
+        p_value[found] = np.maximum(p_value[found], screen(changed, self.seed).p_value)
+        return replace(screened, p_value=p_value)
+
+    def _stands(self, candidate: Candidate) -> bool:
+        return self.baseline is not None and self.baseline.stands(candidate)
 
     def _scores(self, candidate: Candidate, left: Left) -> Scores:
         """Scores of the blocks of these windows, then of the training windows (zero if not judged against them)."""
@@ -191,11 +211,9 @@ class _Hunt:
 
     def _generics(self, driver: str, form: Form | None, z: Array) -> list[Candidate]:
         """The fall-back along a driver: in the form of the mechanism, or in all screening forms of the driver."""
-        response = next(c.response for c in self.candidates if c.mechanism is None)
-        if form is not None and form.drivers:
-            values = form.values(self.evidence.table.covariates, len(z))
-            return [Candidate(None, driver, form, response, values)]
         same = [c for c in self.candidates if c.mechanism is None and c.covariate == driver]
+        if same and form is not None and form.drivers:
+            return [replace(same[0], form=form, values=form.values(self.evidence.table.covariates, len(z)))]
         return same or [c for c in self.candidates if c.mechanism is None and c.kind == "constant"]
 
     def _term(self, best: Judged, open_: list[Judged], p_value: float, naming: Naming, z: Array) -> Term:

@@ -15,6 +15,7 @@ from push_predictor.evaluation.figures.nearby import ENOUGH, examples
 from push_predictor.evaluation.figures.push_maps import Panel, paint_maps
 from push_predictor.evaluation.figures.residuals import course_of, paint_residuals
 from push_predictor.evaluation.figures.tracks import paint_tracks
+from push_predictor.evaluation.map_conditions import held_covariates, held_in_words
 from push_predictor.evaluation.maps import (
     FEWEST,
     Condition,
@@ -22,12 +23,13 @@ from push_predictor.evaluation.maps import (
     coarse_cells,
     commonest_condition,
     fine_cells,
+    fold_order,
     predicted_at_windows,
     push_map,
     recorded_map,
 )
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.push_model import ExtendedBody, PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows import PushWindow
 
@@ -52,12 +54,12 @@ def map_pictures(out: Path, shown: Validation) -> list[Picture]:
     recorded = panels[-1].map
     outline = shown.models[0].rig.outline
     size = (WIDTH, 6.6)
-    mean, sd = out / "map_mean.png", out / "map_sd.png"
+    mean, sd, at = out / "map_mean.png", out / "map_sd.png", _held_caption(shown, condition)
     draw(mean, size, lambda figure: paint_maps(figure, outline, panels, "mean"))
     draw(sd, size, lambda figure: paint_maps(figure, outline, panels, "sd"))
     return [
-        Picture(mean, _map_alt("mean", panels), _mean_caption(condition, recorded)),
-        Picture(sd, _map_alt("standard deviation", panels), _sd_caption(condition, shown.models[0].name)),
+        Picture(mean, _map_alt("mean", panels), _mean_caption(condition, recorded) + at),
+        Picture(sd, _map_alt("standard deviation", panels), _sd_caption(condition, shown.models[0].name) + at),
     ]
 
 
@@ -99,7 +101,9 @@ def _map_panels(shown: Validation, condition: Condition) -> list[Panel]:
     alike = shown.table.take(rows)
     fine, coarse = fine_cells(outline, alike), coarse_cells(outline, alike)
     main = shown.comparisons[0]
-    panels = [Panel(m.name, push_map(m, condition.velocity, condition.duration, fine)) for m in shown.models]
+    held = [held_covariates(model, alike) for model in shown.models]
+    velocity, duration = condition.velocity, condition.duration
+    panels = [Panel(m.name, push_map(m, velocity, duration, fine, h)) for m, h in zip(shown.models, held, strict=True)]
     same = predicted_at_windows(outline, alike, main.mean[rows], main.variance[rows], coarse)
     return [
         *panels,
@@ -130,6 +134,16 @@ def _sd_caption(condition: Condition, main: str) -> str:
         f"alike: a recorded cell is worth about as many measurements as the pushes written into it, and from k of "
         f"them it is uncertain by about 1/√(2k), 50 % for two and 25 % for eight."
     )
+
+
+def _held_caption(shown: Validation, condition: Condition) -> str:
+    """At which covariates the maps of extended models are drawn; empty if none is extended."""
+    alike, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
+    told = [held_in_words(model, held_covariates(model, alike)) for model in shown.models]
+    extended = [model.name for model in shown.models if isinstance(model.body, ExtendedBody)]
+    if extended and (sides := fold_order(outline)) > 1:
+        told.append(f"Effects may differ between sides: of the outline's {sides} alike parts, the first is drawn.")
+    return "".join(f" {text}" for text in told if text)
 
 
 def _of_condition(condition: Condition) -> str:

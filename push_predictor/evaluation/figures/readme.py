@@ -12,6 +12,7 @@ from push_predictor.evaluation.figures.canvas import UNITS, draw, grid, output_l
 from push_predictor.evaluation.figures.ellipses import inside, paint_ellipse
 from push_predictor.evaluation.figures.nearby import Example, examples
 from push_predictor.evaluation.figures.push_maps import colour_scale, paint_panel
+from push_predictor.evaluation.map_conditions import held_covariates
 from push_predictor.evaluation.maps import coarse_cells, commonest_condition, fine_cells, push_map, recorded_map
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
@@ -40,7 +41,8 @@ def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
 def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, duration: float) -> None:
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
     outline = model.rig.outline
-    predicted = push_map(model, velocity, duration, fine_cells(outline, table))
+    held = held_covariates(model, table)
+    predicted = push_map(model, velocity, duration, fine_cells(outline, table), held)
     comparison = compare(model, table)
     recorded = recorded_map(outline, table, comparison.mean, coarse_cells(outline, table))
     values = [shown.sd[..., SHOWN_OUTPUT] * UNITS[SHOWN_OUTPUT] for shown in (predicted, recorded)]
@@ -50,6 +52,9 @@ def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, 
         image = paint_panel(ax, outline, shown, value, scale, counted=False)
         ax.set_title(f"{title} scatter at {velocity * 1e3:.0f} mm/s")
         ax.set_xlabel("contact along the outline (mm)")
+    if held:
+        at = ", ".join(f"{name} {value:.3g}" for name, value in held.items())
+        left.set_xlabel(f"contact along the outline (mm)\nat {at}")
     left.set_ylabel("push angle (deg)")
     label = f"sd of {output_label(SHOWN_OUTPUT)}"
     figure.colorbar(image, ax=[left, middle], label=label, extend=scale.extend, pad=0.01)

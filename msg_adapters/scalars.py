@@ -1,0 +1,103 @@
+"""Serialized messages of scalar topics gathered into the library's streams, and the time of those that bear none."""
+
+from __future__ import annotations
+
+import struct
+import threading
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+
+from msg_adapters.streams import LIMIT
+from push_predictor.recordings.cdr import decode
+from push_predictor.recordings.definitions import SCALAR_LAYOUTS
+from push_predictor.recordings.streams import ScalarStream
+from push_predictor.types import BoolArray
+
+CLOCKS = 4000  # messages of /clock that are kept
+FAR = 3_600_000_000_000  # ns; farther from the poses' stamps than this is another clock's time
+NEVER = np.iinfo(np.int64).min
+
+
+class SentTimes:
+    """What /clock told, by the time (ns) at which it was sent."""
+
+    def __init__(self) -> None:
+        self._sent: list[int] = []
+        self._told: list[int] = []
+
+    def put(self, data: bytes, sent: int) -> None:
+        """Take a message of /clock."""
+        seconds, rest = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+        self._sent.append(max(sent, self.newest or 0))
+        self._told.append(seconds * 1_000_000_000 + rest)
+        if len(self._sent) > CLOCKS:
+            del self._sent[: CLOCKS // 2], self._told[: CLOCKS // 2]
+
+    @property
+    def newest(self) -> int | None:
+        """When the last message was sent, None without any."""
+        return self._sent[-1] if self._sent else None
+
+    def at(self, sent: int) -> int | None:
+        """The time (ns) that was told last before something was sent; None if that is not known."""
+        place = bisect_right(self._sent, sent)
+        return self._told[place - 1] if place else None
+
+
+class ScalarInbox:
+    """Serialized messages of one scalar topic until somebody takes them; what cannot be used is counted by kind.
+
+    kind: one of the types that a recording's scalars have. Beyond LIMIT the oldest messages are dropped, and counted.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self.received = 0
+        self.rejected: Counter[str] = Counter()
+        self._layout = SCALAR_LAYOUTS[kind]
+        self._waiting: list[tuple[bytes, int]] = []
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    @property
+    def timed(self) -> bool:
+        """Whether messages bear their time."""
+        return self._layout.header
+
+    def put(self, data: bytes, sent: int) -> None:
+        """Take a message and the time (ns) at which it was sent; any thread may."""
+        with self._lock:
+            self.received += 1
+            self._waiting.append((data, sent))
+            if len(self._waiting) > LIMIT:
+                self.rejected["dropped"] += LIMIT // 10
+                del self._waiting[: LIMIT // 10]
+
+    def take(self, until: int, time_of: Callable[[int], int | None], near: int | None) -> ScalarStream:
+        """The usable samples since the last call; of messages without a time those that were sent before `until` (ns).
+
+        time_of: their time, from when they were sent, None if that cannot be told. near: a recent stamp (ns) of the
+        poses, None if there is none.
+        """
+        with self._lock:
+            count = len(self._waiting) if self.timed else sum(sent < until for _, sent in self._waiting)
+            taken, self._waiting = self._waiting[:count], self._waiting[count:]
+        columns = decode([data for data, _ in taken], self._layout)
+        told = [NEVER if (time := time_of(sent)) is None else time for _, sent in taken] if not self.timed else ()
+        stamp = columns.stamp if self.timed else np.array(told, dtype=np.int64)
+        usable = self._kept("unreadable", np.ones(count, dtype=bool), columns.valid)
+        usable = self._kept("not finite", usable, np.isfinite(columns.values[:, 0]))
+        usable = self._kept("without time", usable, stamp != NEVER)
+        if near is not None:
+            usable = self._kept("another clock", usable, (stamp > near - FAR) & (stamp < near + FAR))
+        return ScalarStream(stamp[usable], columns.values[usable, 0])
+
+    def _kept(self, kind: str, usable: BoolArray, good: BoolArray) -> BoolArray:
+        if count := int(np.sum(usable & ~good)):
+            self.rejected[kind] += count
+        return usable & good

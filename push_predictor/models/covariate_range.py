@@ -1,0 +1,47 @@
+"""The range of a covariate in the training data, beyond which a prediction that needs it is out of domain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.types import Array, BoolArray
+
+HEADINGS = ("slider_heading", "push_heading")  # they come around
+WHOLE_TURN = np.radians(30.0)  # headings that leave no wider gap were seen all around
+MARGIN = 1e-6  # relative: a model file keeps seven digits
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class CovariateRange:
+    """From low to high; of a heading counter-clockwise from low, high may lie beyond pi."""
+
+    low: float
+    high: float
+    heading: bool = False
+
+    def holds(self, values: Array) -> BoolArray:
+        """Which of the values (n,) lie in the range."""
+        margin = MARGIN * max(abs(self.low), abs(self.high))
+        if self.heading:
+            values = self.low - margin + (values - self.low + margin) % TURN
+        return np.asarray((values >= self.low - margin) & (values <= self.high + margin))
+
+    def __str__(self) -> str:
+        return f"{self.low:.3g} to {self.high:.3g}"
+
+
+def range_of(name: str, values: Array) -> CovariateRange:
+    """The range of the values (n,) of a covariate; for a heading the shortest arc with all of them on it."""
+    if name not in HEADINGS:
+        return CovariateRange(float(values.min()), float(values.max()))
+    around = np.sort(values % TURN)
+    gaps = np.diff(around, append=around[0] + TURN)
+    widest = int(np.argmax(gaps))
+    if gaps[widest] <= WHOLE_TURN:
+        return CovariateRange(-np.pi, np.pi, heading=True)
+    low = float(around[(widest + 1) % len(around)])
+    low -= TURN * (low >= np.pi)
+    return CovariateRange(low, low + TURN - float(gaps[widest]), heading=True)
