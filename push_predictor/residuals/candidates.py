@@ -78,7 +78,7 @@ def candidates_of(
             if covariate in HEADINGS and _headed(mechanism):
                 continue  # turned back by the heading, it would be one of the body, by a wrong name
             driver = _constant_driver(mechanism, response, basis) if covariate == CONSTANT else covariate
-            beside = touch if covariate in TOUCHED else None
+            beside = touch if covariate in (*TOUCHED, CONSTANT, SPEED) else None
             found.append(Candidate(mechanism, driver, form, response, column, beside))
     return found
 

@@ -55,7 +55,7 @@ LEAST_SIZE = 1.0  # of an effect on the gap, root mean square, in units of the g
 @dataclass(frozen=True)
 class MeasurementError:
     """One error with its parameters (the slider's stream against the robot's), family-wise p, and the names of what
-    these data cannot tell from it. size: root mean square of what it does to the gap, m."""
+    these data cannot tell from it. size: root mean square of what it does to the gap, m (to the force, N)."""
 
     mechanism: str
     parameters: tuple[Sized, ...]

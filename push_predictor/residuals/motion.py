@@ -48,6 +48,7 @@ class MotionFinding:
 
     residual (n, 3): standardised, before anything was taken out. deviation (3,): of the standardised residuals of
     training pushes by models that had not seen them, None for an analytical base. scatter: what the variance follows.
+    standing: what the base lacks, in words, but lacked in training as much, strongest first.
     """
 
     terms: tuple[MotionTerm, ...]
@@ -60,6 +61,7 @@ class MotionFinding:
     remaining: str | None
     experiment: tuple[Mapping[str, float], ...]
     scatter: tuple[Scatter, ...]
+    standing: tuple[str, ...]
 
 
 def motion_effects(
@@ -89,6 +91,7 @@ def motion_effects(
             for s in scatter
             if not 1.0 / NOTABLE < s.ratio < NOTABLE
         ),
+        standing=_standing(found),
     )
 
 
@@ -131,7 +134,18 @@ def _strongest(last: Screened, candidates: Sequence[Candidate], alpha: float) ->
     k = int(np.argmin(last.p_value))
     if last.p_value[k] > alpha:
         return None
-    mechanism, covariate = candidates[k].label
+    return _in_words(candidates[k])
+
+
+def _standing(found: Search) -> tuple[str, ...]:
+    """The strongest candidate of each driver that acts as it did in training."""
+    ordered = sorted(found.first.standing, key=lambda k: -found.first.statistic[k])
+    strongest = {found.candidates[k].covariate: found.candidates[k] for k in reversed(ordered)}
+    return tuple(_in_words(candidate) for candidate in reversed(strongest.values()))
+
+
+def _in_words(candidate: Candidate) -> str:
+    mechanism, covariate = candidate.label
     return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
 
 

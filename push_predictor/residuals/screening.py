@@ -23,11 +23,15 @@ TINY = 1e-6  # relative; directions of a candidate that the inputs explain away 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """By candidate (c,): statistic on a scale common to all (standard normal by chance), family-wise p value."""
+    """By candidate (c,): statistic on a scale common to all (standard normal by chance), family-wise p value.
+
+    largest: of each bootstrap draw. standing: the candidates that chance does not explain, but training has as well.
+    """
 
     statistic: Array
     p_value: Array
-    largest: Array  # of each bootstrap draw
+    largest: Array
+    standing: tuple[int, ...] = ()
 
     def threshold(self, alpha: float) -> float:
         """Statistic that chance exceeds anywhere with probability alpha."""

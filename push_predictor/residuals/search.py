@@ -125,7 +125,7 @@ class _Hunt:
             changed.append(difference(raw, self.baseline.scores(c)))
         p_value = screened.p_value.copy()
         p_value[found] = np.maximum(p_value[found], screen(changed, self.seed).p_value)
-        return replace(screened, p_value=p_value)
+        return replace(screened, p_value=p_value, standing=tuple(k for k in found if p_value[k] > self.alpha))
 
     def _stands(self, candidate: Candidate) -> bool:
         return self.baseline is not None and self.baseline.stands(candidate)

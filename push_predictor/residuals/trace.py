@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.bodies import ExtendedBody
@@ -25,18 +27,18 @@ from push_predictor.residuals.effect_size import size_of
 from push_predictor.residuals.evidence import evidence_of
 from push_predictor.residuals.extension import compared, extend, gain, physics_of, refit_base
 from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
-from push_predictor.residuals.measurement import MeasurementFinding, measurement_errors
+from push_predictor.residuals.measurement import MeasurementError, MeasurementFinding, measurement_errors
 from push_predictor.residuals.motion import MotionFinding, motion_effects
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.split import RULE, digest_of, held_out_rows
-from push_predictor.residuals.wrench import WrenchFinding, wrench_effects
+from push_predictor.residuals.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
 
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
 Watch = Callable[[str, float], None]
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 CUT_AGAIN = (
-    "The slider's stream was put right and the windows cut again: `after` is the deployed model, unchanged, on the "
+    "The streams were put right and the windows cut again: `after` is the deployed model, unchanged, on the "
     "held-out pushes of the corrected recordings."
 )
 
@@ -89,7 +91,8 @@ def trace(
     watch("force", 0.6)
     forces = wrench_effects(context.analysis, training, physics, context.share("wrench"), seed)
     watch("extended model", 0.7)
-    return _of_motion(context, motion, measured, forces)
+    biased = _biased(forces) if not motion.terms and not motion.scatter else None
+    return _of_motion(context, motion, measured, forces) if biased is None else _of_measurement(context, biased)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +169,16 @@ def _verdict(motion: MotionFinding, forces: WrenchFinding) -> Verdict:
     if motion.scatter:
         return "variance"
     return "wrench_only" if forces.effects else "none"
+
+
+def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
+    """A bias of the force sensor is an error of measurement, though it is found on the force's channel."""
+    first = next(iter(forces.effects), None)
+    if first is None or first.mechanism != WRENCH_BIAS:
+        return None
+    size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
+    error = MeasurementError(first.mechanism, first.parameters, first.p_value, first.rivals, size)
+    return MeasurementFinding((error,), forces.tested, forces.scatter, forces.against_training)
 
 
 def _told(
@@ -257,6 +270,10 @@ def _notes(
     if motion.deviation is not None:
         told = ", ".join(f"{value:.2f}" for value in motion.deviation)
         notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
+    if motion.standing:
+        notes.append(
+            f"The model lacks, but lacked in training as much, so that it is nothing new: {', '.join(motion.standing)}."
+        )
     if measured is None:
         notes.append("The measurement itself could not be judged: these windows have no contact gap or pose.")
     if motion.terms and forces.effects:
