@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, blas
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.descent import Cost, Descent
+from push_predictor.models.descent import Cost, Descent, part_of_rows
 from push_predictor.models.kernels import DEFAULT_CHOICE, ArdKernel, KernelChoice, KernelFamily, ard_kernel
 from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
@@ -22,6 +22,8 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
 _STOP = 1e-8
+_SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; nats by which it must lead to more
+_FEWEST_FOR_SHORT = 100  # rows; fewer may be interpolated by short lengthscales
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,28 @@ def fit_gp(
     d = inputs.shape[1]
     box = np.array([_LENGTHSCALE_BOUNDS] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
     descent = Descent(box, most_iterations, _STOP)
-    first = np.append(np.zeros(d + 1), np.log(0.3))
+    first = _first(inputs, outputs, choice.family, descent)
     # From the start with all rows: likelihoods have several maxima, and a part of the rows may lead to another one.
     found = descent.run(_cost(inputs, outputs, choice.family), first)
     return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
+
+
+def _first(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Array:
+    """Where to begin: the inputs' unit lengthscales, or one of them short, if a part of the rows is surely for it.
+
+    Along a polygon's contact the outcome jumps from side to side: from a long lengthscale the search may call it noise.
+    """
+    d = inputs.shape[1]
+    usual = np.append(np.zeros(d + 1), np.log(0.3))
+    if len(outputs) < _FEWEST_FOR_SHORT:
+        return usual
+    rows = part_of_rows(len(outputs))
+    part = slice(None) if rows is None else rows
+    cost = _cost(inputs[part], outputs[part], family)
+    short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)]
+    reached = [cost(descent.run(cost, start).point)[0] for start in (usual, *short)]
+    best = int(np.argmin(reached))
+    return usual if best == 0 or reached[best] > reached[0] - _SURELY else short[best - 1]
 
 
 def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:

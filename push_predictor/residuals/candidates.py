@@ -20,6 +20,7 @@ from push_predictor.types import Array
 HEADED = "push_heading"  # drives what has a direction in the world by itself
 SIDES = "edge"  # tells apart what a base folds
 SPEED = "velocity"
+ENTANGLED = 0.2  # share of a driver that the inputs leave over; below it nothing is said of the driver
 TOUCHED = ("time_since_contact", "contact_gap")  # differ between the window that begins with the touch and later ones
 OUTSIDE = 0.5  # share of a constant effect that a base which folds the sides cannot have learnt: then sides drive it
 
@@ -31,7 +32,8 @@ class Candidate:
     """A mechanism (None: the generic fall-back) with a driver in one form.
 
     response (n, 3, p): whitened outcome per unit of the parameters; values (n, m): what the form multiplies it by.
-    beside (n, 3, q): what is taken out of the columns, because it comes without any effect; see late_touch.
+    beside (n, 3, q): what is taken out of the columns, because it comes without any effect; see late_touch. own:
+    whether the driver is a function of the inputs that a learnt base has, as the side is where it folds none.
     """
 
     mechanism: str | None
@@ -40,6 +42,7 @@ class Candidate:
     response: Array
     values: Array | None = None
     beside: Array | None = None
+    own: bool = False
 
     @property
     def columns(self) -> Array:
@@ -51,8 +54,8 @@ class Candidate:
 
     @property
     def kind(self) -> Kind:
-        """Whether something drives it that is no input of a base, or the speed, or nothing."""
-        if self.covariate == CONSTANT:
+        """Whether something drives it that is no input of a base, or the speed, or nothing (or contact and angle)."""
+        if self.covariate == CONSTANT or self.own:
             return "constant"
         return "speed" if self.covariate == SPEED else "driven"
 
@@ -68,10 +71,13 @@ def candidates_of(
     """All candidates: every mechanism whose needs are recorded, and the fall-back, with every driver and with none.
 
     basis: of the model's inputs, by which a constant effect that differs between the sides it folds is told apart.
+    Drivers that go with the inputs are left out, see entangled.
     """
-    forms = [(CONSTANT, Form("constant")), *screening_forms(evidence.table, names)]
+    apart = set() if basis is None else set(entangled(evidence, names, basis))
+    forms = [(CONSTANT, Form("constant")), *(f for f in screening_forms(evidence.table, names) if f[0] not in apart)]
     values = [form.values(evidence.table.covariates, len(evidence.table)) for _, form in forms]
     touch, found = late_touch(evidence, basis), []
+    told = basis is not None and basis.learnt and not basis.folds
     for mechanism in usable(evidence):
         response = whitened_response(evidence, mechanism)
         for (covariate, form), column in zip(forms, values, strict=True):
@@ -79,7 +85,23 @@ def candidates_of(
                 continue  # turned back by the heading, it would be one of the body, by a wrong name
             driver = _constant_driver(mechanism, response, basis) if covariate == CONSTANT else covariate
             beside = touch if covariate in (*TOUCHED, CONSTANT, SPEED) else None
-            found.append(Candidate(mechanism, driver, form, response, column, beside))
+            found.append(Candidate(mechanism, driver, form, response, column, beside, own=covariate == SIDES and told))
+    return found
+
+
+def entangled(evidence: Evidence, names: Sequence[str] | None, basis: InputsBasis) -> list[str]:
+    """Drivers that these pushes do not tell from contact and angle: time, where the pushes were done in their order.
+
+    What a base gets wrong in its own inputs would be put down to them.
+    """
+    found, out = [], Without(basis.columns)
+    for name in dict.fromkeys(name for name, _ in screening_forms(evidence.table, names)):
+        if name in (SIDES, SPEED):
+            continue  # functions of the inputs, judged as such
+        values = evidence.table.covariates[name]
+        centred = (values - values.mean())[:, None]
+        if np.sum(out(centred) ** 2) < ENTANGLED * np.sum(centred**2):
+            found.append(name)
     return found
 
 

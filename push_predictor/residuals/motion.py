@@ -12,7 +12,7 @@ from push_predictor.models.forms import Form
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.baseline import Baseline, baseline_of
-from push_predictor.residuals.candidates import Candidate, candidates_of
+from push_predictor.residuals.candidates import Candidate, candidates_of, entangled
 from push_predictor.residuals.evidence import Evidence, evidence_of
 from push_predictor.residuals.experiment import separating_pushes
 from push_predictor.residuals.extension import physics_of
@@ -48,7 +48,8 @@ class MotionFinding:
 
     residual (n, 3): standardised, before anything was taken out. deviation (3,): of the standardised residuals of
     training pushes by models that had not seen them, None for an analytical base. scatter: what the variance follows.
-    standing: what the base lacks, in words, but lacked in training as much, strongest first.
+    standing: what the base lacks, in words, but lacked in training as much, strongest first. entangled: drivers that
+    were not tried, because they go with the inputs.
     """
 
     terms: tuple[MotionTerm, ...]
@@ -62,6 +63,7 @@ class MotionFinding:
     experiment: tuple[Mapping[str, float], ...]
     scatter: tuple[Scatter, ...]
     standing: tuple[str, ...]
+    entangled: tuple[str, ...]
 
 
 def motion_effects(
@@ -92,6 +94,7 @@ def motion_effects(
             if not 1.0 / NOTABLE < s.ratio < NOTABLE
         ),
         standing=_standing(found),
+        entangled=tuple(entangled(evidence, names, basis)),
     )
 
 

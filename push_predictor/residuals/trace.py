@@ -270,6 +270,11 @@ def _notes(
     if motion.deviation is not None:
         told = ", ".join(f"{value:.2f}" for value in motion.deviation)
         notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
+    if motion.entangled:
+        notes.append(
+            f"Not tried, because in these pushes they go with contact, angle and speed: {', '.join(motion.entangled)}. "
+            "Push in an order that is mixed."
+        )
     if motion.standing:
         notes.append(
             f"The model lacks, but lacked in training as much, so that it is nothing new: {', '.join(motion.standing)}."
