@@ -96,6 +96,16 @@ def test_the_fit_finds_the_noise_and_the_input_that_matters() -> None:
     assert irrelevant > relevant + 2.0
 
 
+def test_jumps_from_side_to_side_are_learnt_and_not_called_noise() -> None:
+    """Five sides that no symmetry folds, the outcome turning its sign on each: features.EDGE_SPACING apart."""
+    rng = np.random.default_rng(0)
+    side, along, angle = rng.integers(5, size=300), rng.random(300), rng.uniform(-1.0, 1.0, 300)
+    outputs = 2.0 * along - 1.0 + 0.5 * angle + 0.1 * rng.normal(size=300)
+    inputs = np.column_stack([3.0 * side + along, angle])
+    inputs, outputs = ((x - x.mean(axis=0)) / x.std(axis=0) for x in (inputs, outputs))
+    assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
+
+
 def test_the_fit_is_where_the_likelihood_is_level() -> None:
     fitted = fit_gp(*rows(100))
     _, gradient = log_likelihood_and_gradient(fitted.inputs, fitted.outputs, fitted.parameters)

@@ -16,7 +16,7 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.baseline import baseline_of
-from push_predictor.residuals.candidates import candidates_of
+from push_predictor.residuals.candidates import candidates_of, entangled
 from push_predictor.residuals.evidence import evidence_of
 from push_predictor.residuals.inputs_basis import inputs_basis
 from push_predictor.residuals.power import detectable_json, minimum_detectable
@@ -123,6 +123,35 @@ class TestNothingThere:
     def test_nothing_is_found_with_a_learnt_base_that_saw_few_pushes(self, learnt) -> None:
         verdicts = [searched(learnt, pushes(150, 100 + seed)) for seed in range(3)]
         assert [len(found.terms) for found in verdicts] == [0, 0, 0]
+
+    def test_what_the_base_lacks_is_no_news_where_training_shows_it_as_well(self) -> None:
+        """A slider whose sides differ, learnt by a model that folds them: as many pushes later it is the same one."""
+        shift = Form("constant"), 0.003, -0.002
+        base = train_model(with_effect(pushes(150, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
+        same = searched(base, with_effect(pushes(150, 3), "centre_of_friction", *shift))
+        assert not same.terms
+        assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.standing)
+        other = searched(base, with_effect(pushes(150, 3), "centre_of_friction", Form("constant"), -0.003, 0.002))
+        assert other.terms[0].best.label == ("centre_of_friction", "edge")
+
+    def test_a_driver_that_goes_with_the_inputs_is_not_tried(self, learnt) -> None:
+        """Pushes done in the order of their angle: time could be blamed for whatever the base gets wrong there."""
+        table = pushes(150, 3)
+        ordered = replace(table, covariates={**table.covariates, "elapsed_time": 100.0 * table.inputs[:, 2]})
+        evidence, basis = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
+        assert entangled(evidence, DRIVERS, basis) == ["elapsed_time"]
+        assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, basis)}
+
+    def test_a_touch_that_is_felt_late_is_no_effect_of_the_time_since_contact(self, learnt) -> None:
+        """The window that begins with the touch is then off by the way of the tip; the others are as they were."""
+        table = pushes(150, 3)
+        since = np.tile([0.0, 0.2], 150)
+        late = np.where(since == 0.0, 0.97, 1.0)
+        short = PHYSICS.displacement(table.inputs, table.duration * late)
+        moved = table.outcomes + short - PHYSICS.displacement(table.inputs, table.duration)
+        table = replace(table, outcomes=moved, covariates={**table.covariates, "time_since_contact": since})
+        found = searched(ANALYTICAL, table, drivers=("time_since_contact",)).terms
+        assert "time_since_contact" not in {term.best.covariate for term in found}
 
     def test_a_learnt_base_is_honest_about_pushes_that_it_is_told_without(self, learnt) -> None:
         deviation = baseline_of(learnt, PHYSICS).deviation

@@ -17,11 +17,12 @@ from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBo
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel, scaled_features
 from push_predictor.models.vhgp import conditioned
-from push_predictor.residuals.candidates import Candidate, Kind, late_touch, whitened_response
+from push_predictor.residuals.candidates import Candidate, usable
 from push_predictor.residuals.drivers import LOCAL, STANDING
-from push_predictor.residuals.evidence import Evidence, push_order, whitener_of
-from push_predictor.residuals.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.evidence import Evidence, push_order, whitened_response, whitener_of
+from push_predictor.residuals.inputs_basis import InputsBasis, inputs_basis, inputs_of
 from push_predictor.residuals.loading import with_inputs
+from push_predictor.residuals.nuisance import Nuisance
 from push_predictor.residuals.screening import TINY, Scores, Without, raw_scores
 from push_predictor.types import Array, IntArray
 
@@ -63,7 +64,7 @@ class Baseline:
             candidate,
             response=response,
             values=candidate.form.values(evidence.table.covariates, len(response)),
-            beside=None if candidate.beside is None else self._touch,
+            beside=self._nuisance.beside(*candidate.label, candidate.form, candidate.kind),
         )
         out = Without(inputs_of(candidate.kind, self.basis))
         return raw_scores(out.left(evidence.z, evidence.block), out(there.columns))
@@ -74,19 +75,13 @@ class Baseline:
         return self._responses[mechanism]
 
     @cached_property
-    def _touch(self) -> Array | None:
-        return late_touch(self.evidence, self.basis)
+    def _nuisance(self) -> Nuisance:
+        mechanisms = [name for name in usable(self.evidence) if name is not None]
+        return Nuisance(self.evidence, self.basis, mechanisms, self._response)
 
     @cached_property
     def _responses(self) -> dict[str | None, Array]:
         return {}
-
-
-def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
-    """What of the inputs (n, m) is taken out of a candidate and the residual: nothing, where it lies in them itself."""
-    if kind == "constant":
-        return basis.columns[:, :0]
-    return basis.still if kind == "speed" else basis.columns
 
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects import generic_responses, mechanism_named
+from push_predictor.models.effects import mechanism_named
 from push_predictor.models.forms import Form
 from push_predictor.models.mechanisms import LIBRARY
-from push_predictor.residuals.drivers import CONSTANT, HEADINGS, SETTLED, screening_forms
-from push_predictor.residuals.evidence import Evidence
-from push_predictor.residuals.inputs_basis import InputsBasis
+from push_predictor.residuals.drivers import CONSTANT, HEADINGS, screening_forms
+from push_predictor.residuals.evidence import Evidence, whitened_response
+from push_predictor.residuals.inputs_basis import InputsBasis, Kind
+from push_predictor.residuals.nuisance import Nuisance
 from push_predictor.residuals.screening import Without
 from push_predictor.types import Array
 
@@ -21,10 +21,7 @@ HEADED = "push_heading"  # drives what has a direction in the world by itself
 SIDES = "edge"  # tells apart what a base folds
 SPEED = "velocity"
 ENTANGLED = 0.2  # share of a driver that the inputs leave over; below it nothing is said of the driver
-TOUCHED = ("time_since_contact", "contact_gap")  # differ between the window that begins with the touch and later ones
 OUTSIDE = 0.5  # share of a constant effect that a base which folds the sides cannot have learnt: then sides drive it
-
-Kind = Literal["driven", "speed", "constant"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +29,8 @@ class Candidate:
     """A mechanism (None: the generic fall-back) with a driver in one form.
 
     response (n, 3, p): whitened outcome per unit of the parameters; values (n, m): what the form multiplies it by.
-    beside (n, 3, q): what is taken out of the columns, because it comes without any effect; see late_touch. own:
-    whether the driver is a function of the inputs that a learnt base has, as the side is where it folds none.
+    beside (3 n, q): orthonormal, what is taken out of the columns, because it comes without the effect; see nuisance.
+    own: whether the driver is a function of the inputs that a learnt base has, as the side is where it folds none.
     """
 
     mechanism: str | None
@@ -46,11 +43,20 @@ class Candidate:
 
     @property
     def columns(self) -> Array:
-        """Whitened columns (n, 3, p * m), p first."""
-        n, columns = len(self.response), self.response
-        if self.values is not None:
-            columns = (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
-        return columns if self.beside is None else _apart(columns, self.beside)
+        """Whitened columns (n, 3, p * m), p first, less what comes without the effect."""
+        plain = self.plain
+        if self.beside is None:
+            return plain
+        flat = plain.reshape(len(self.beside), -1)
+        return np.asarray(flat - self.beside @ (self.beside.T @ flat)).reshape(plain.shape)
+
+    @property
+    def plain(self) -> Array:
+        """Whitened columns (n, 3, p * m), p first: what the effect itself does."""
+        if self.values is None:
+            return self.response
+        n = len(self.response)
+        return (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
 
     @property
     def kind(self) -> Kind:
@@ -76,17 +82,19 @@ def candidates_of(
     apart = set() if basis is None else set(entangled(evidence, names, basis))
     forms = [(CONSTANT, Form("constant")), *(f for f in screening_forms(evidence.table, names) if f[0] not in apart)]
     values = [form.values(evidence.table.covariates, len(evidence.table)) for _, form in forms]
-    touch, found = late_touch(evidence, basis), []
+    responses = {mechanism: whitened_response(evidence, mechanism) for mechanism in usable(evidence)}
+    found: list[Candidate] = []
     told = basis is not None and basis.learnt and not basis.folds
-    for mechanism in usable(evidence):
-        response = whitened_response(evidence, mechanism)
+    for mechanism, response in responses.items():
         for (covariate, form), column in zip(forms, values, strict=True):
             if covariate in HEADINGS and _headed(mechanism):
                 continue  # turned back by the heading, it would be one of the body, by a wrong name
             driver = _constant_driver(mechanism, response, basis) if covariate == CONSTANT else covariate
-            beside = touch if covariate in (*TOUCHED, CONSTANT, SPEED) else None
-            found.append(Candidate(mechanism, driver, form, response, column, beside, own=covariate == SIDES and told))
-    return found
+            found.append(Candidate(mechanism, driver, form, response, column, own=covariate == SIDES and told))
+    if basis is None:
+        return found
+    nuisance = Nuisance(evidence, basis, [name for name in responses if name is not None], responses.__getitem__)
+    return [replace(c, beside=nuisance.beside(*c.label, c.form, c.kind)) for c in found]
 
 
 def entangled(evidence: Evidence, names: Sequence[str] | None, basis: InputsBasis) -> list[str]:
@@ -105,19 +113,6 @@ def entangled(evidence: Evidence, names: Sequence[str] | None, basis: InputsBasi
     return found
 
 
-def late_touch(evidence: Evidence, basis: InputsBasis | None) -> Array | None:
-    """What a touch that is felt earlier or later does to the window that begins with it, (n, 3, 1), without the inputs.
-
-    A heavier slider is felt sooner: that shifts the window, not the slider. None where nothing tells which it is.
-    """
-    since = evidence.table.covariates.get("time_since_contact")
-    if since is None:
-        return None
-    first = (since < SETTLED).astype(np.float64)
-    shift = whitened_response(evidence, "pusher_travel") * first[:, None, None]
-    return shift if basis is None else Without(basis.columns)(shift)
-
-
 def usable(evidence: Evidence) -> list[str | None]:
     """The mechanisms whose needs are recorded, and None, the fall-back."""
     recorded = evidence.table.covariates
@@ -128,30 +123,6 @@ def candidate(evidence: Evidence, mechanism: str | None, covariate: str, form: F
     """One candidate on these windows."""
     values = form.values(evidence.table.covariates, len(evidence.table))
     return Candidate(mechanism, covariate, form, whitened_response(evidence, mechanism), values)
-
-
-def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
-    """Outcome per unit of a mechanism's parameters (n, 3, p), in units of the predicted deviation."""
-    physics, push = evidence.physics, evidence.push
-    response = (
-        generic_responses(physics, push, evidence_scale(evidence))
-        if mechanism is None
-        else mechanism_named(mechanism).response(physics, push)
-    )
-    return np.einsum("nij,njp->nip", evidence.whitener, response)
-
-
-def evidence_scale(evidence: Evidence) -> Array:
-    """Unit of the generic responses (3,): deviation of the residuals per metre of the tip's way."""
-    way = evidence.table.inputs[:, 0] * evidence.table.duration
-    return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(way**2)))
-
-
-def _apart(columns: Array, beside: Array) -> Array:
-    """Columns (n, 3, k) less what `beside` (n, 3, q) explains of them."""
-    flat, out = columns.reshape(-1, columns.shape[2]), beside.reshape(-1, beside.shape[2])
-    coefficients, *_ = np.linalg.lstsq(out, flat, rcond=None)
-    return np.asarray(flat - out @ coefficients).reshape(columns.shape)
 
 
 def _constant_driver(mechanism: str | None, response: Array, basis: InputsBasis | None) -> str:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.effects import generic_responses, mechanism_named
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
@@ -71,3 +72,20 @@ def blocks_of(table: PushTable) -> IntArray:
 def whitener_of(covariance: Array) -> Array:
     """L^-1 (n, 3, 3) of covariances (n, 3, 3) = L L'."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
+    """Outcome per unit of a mechanism's parameters (n, 3, p), in units of the predicted deviation."""
+    physics, push = evidence.physics, evidence.push
+    response = (
+        generic_responses(physics, push, evidence_scale(evidence))
+        if mechanism is None
+        else mechanism_named(mechanism).response(physics, push)
+    )
+    return np.einsum("nij,njp->nip", evidence.whitener, response)
+
+
+def evidence_scale(evidence: Evidence) -> Array:
+    """Unit of the generic responses (3,): deviation of the residuals per metre of the tip's way."""
+    way = evidence.table.inputs[:, 0] * evidence.table.duration
+    return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(way**2)))

@@ -9,8 +9,8 @@ import numpy as np
 from push_predictor.models.effects import Effect
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates import Candidate, evidence_scale
-from push_predictor.residuals.evidence import Evidence
+from push_predictor.residuals.candidates import Candidate
+from push_predictor.residuals.evidence import Evidence, evidence_scale
 from push_predictor.types import Array
 
 PUSHES = 4

@@ -29,8 +29,8 @@ from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, Learn
 from push_predictor.models.train import train_model, training_rows
 from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates import candidate, evidence_scale
-from push_predictor.residuals.evidence import Evidence, evidence_of
+from push_predictor.residuals.candidates import candidate
+from push_predictor.residuals.evidence import Evidence, evidence_of, evidence_scale
 from push_predictor.residuals.inputs_basis import inputs_basis
 from push_predictor.residuals.outcome import Gain
 from push_predictor.residuals.screening import Without

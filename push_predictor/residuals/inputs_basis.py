@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from push_predictor.models.features import EDGE_SPACING, push_features
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
+
+Kind = Literal["driven", "speed", "constant"]  # of an effect: by something beside the inputs, by the speed, by nothing
 
 DEGREES = (5, 4, 3, 2, 1)
 PUSHES_PER_COLUMN = 5
@@ -45,6 +48,13 @@ def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
     return InputsBasis(
         columns, still, learnt, learnt and outline.rotational_symmetry != 1, learnt and float(speed.std()) > VARIES
     )
+
+
+def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
+    """What of the inputs (n, m) is taken out of a candidate and the residual: nothing, where it lies in them itself."""
+    if kind == "constant":
+        return basis.columns[:, :0]
+    return basis.still if kind == "speed" else basis.columns
 
 
 def _of_degree(outline: Outline, inputs: Array, degree: int) -> tuple[Array, Array]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.effects import mechanism_named
-from push_predictor.residuals.baseline import Baseline, difference, inputs_of
+from push_predictor.residuals.baseline import Baseline, difference
 from push_predictor.residuals.candidates import HEADED, SIDES, Candidate
 from push_predictor.residuals.drivers import CONSTANT
 from push_predictor.residuals.evidence import Evidence
-from push_predictor.residuals.inputs_basis import InputsBasis
+from push_predictor.residuals.inputs_basis import InputsBasis, inputs_of
 from push_predictor.residuals.screening import TINY, Scores, Without, moments, raw_scores, sums_by, unit_scores
 from push_predictor.residuals.search import Search
 from push_predictor.types import Array, IntArray

@@ -10,12 +10,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from push_predictor.models.forms import Form
-from push_predictor.residuals.baseline import Baseline, difference, inputs_of
-from push_predictor.residuals.candidates import Candidate, Kind
+from push_predictor.residuals.baseline import Baseline, difference
+from push_predictor.residuals.candidates import Candidate
 from push_predictor.residuals.drivers import LOCAL
 from push_predictor.residuals.evidence import Evidence
 from push_predictor.residuals.forms_choice import best_form
-from push_predictor.residuals.inputs_basis import InputsBasis
+from push_predictor.residuals.inputs_basis import InputsBasis, Kind, inputs_of
 from push_predictor.residuals.naming import MOST_LEFT, Case, Naming, leaves_over, open_rivals, plausible
 from push_predictor.residuals.screening import Left, Scores, Screened, Without, raw_scores, screen, unit_scores
 from push_predictor.residuals.selection import Judged, fit, judge
@@ -157,7 +157,7 @@ class _Hunt:
 
     def taken_out(self, term: Term, z: Array) -> Array:
         """The residuals less a term; for a learnt base also less what is constant of it: the refit makes up for it."""
-        left = z - term.best.columns @ term.coefficients
+        left = z - term.best.plain @ term.coefficients
         if not self.basis.learnt or term.best.kind == "constant":
             return left
         constant = term.best.response
