@@ -29,7 +29,7 @@ def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> 
     held_out = held_out_rows(table)
     analysis, rest = table.take(~held_out), table.take(held_out)
     refit = refit_base(model, analysis)
-    nlpd = gain(refit, extend(refit, analysis, [true_term(truth, analysis)]), rest)[1]
+    nlpd = gain(refit, extend(refit, analysis, [true_term(truth, analysis)], model), rest)[1]
     return {"value": nlpd.value, "low": nlpd.low, "high": nlpd.high}
 
 

@@ -38,7 +38,6 @@ from push_predictor.residuals.selection import RIDGE
 from push_predictor.types import Array, IntArray
 
 Term: TypeAlias = tuple[str | None, str, Form]  # mechanism (None: the generic one), covariate, form
-ROUNDS = 2  # of effects and base in turn: the first base was trained with the effects in its outcomes
 
 
 def refit_base(model: PushModel, table: PushTable) -> PushModel:
@@ -56,20 +55,17 @@ def refit_base(model: PushModel, table: PushTable) -> PushModel:
     return _wrapped(base, table, replace(body, base=_base_body(base)))
 
 
-def extend(
-    base: PushModel, table: PushTable, terms: Sequence[Term], physics: AnalyticalPush | None = None
-) -> PushModel:
+def extend(base: PushModel, table: PushTable, terms: Sequence[Term], deployed: PushModel | None = None) -> PushModel:
     """The base with these terms as effects, estimated on the pushes of a table that holds the covariates they need.
 
-    physics: from which responses are computed; that of the base if None. Raises TrainingError for too few rows.
+    deployed: a model that has not seen these pushes, whose residuals therefore hold the effects whole; those of a base
+    that was trained on them, with the effects in its outcomes, do in part. The base if None. Raises TrainingError for
+    too few rows.
     """
-    physics, learnt = physics or physics_of(base), base.kind != "analytical"
-    own_inputs, known = inputs_basis(base, table).columns if learnt else None, base
-    for _ in range(ROUNDS if learnt else 1):
-        effects, cross = estimate(evidence_of(known, table, physics), terms, own_inputs)
-        extended = _extended(base, table, effects, cross, physics)
-        known = _without_last(extended, len(effects))
-    return extended
+    known, learnt = deployed or base, base.kind != "analytical"
+    physics, own_inputs = physics_of(known), inputs_basis(base, table).columns if learnt else None
+    effects, cross = estimate(evidence_of(known, table, physics), terms, own_inputs)
+    return _extended(base, table, effects, cross, physics)
 
 
 def estimate(
@@ -151,14 +147,6 @@ def _beside(
     had = len(body.effects)
     moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
     return ExtendedBody(body.base, physics, (*body.effects, *effects), np.ones(3), {**body.cross, **moved})
-
-
-def _without_last(model: PushModel, count: int) -> PushModel:
-    """The model less its last effects."""
-    assert isinstance(model.body, ExtendedBody)
-    kept = model.body.effects[:-count]
-    cross = {(i, j): shared for (i, j), shared in model.body.cross.items() if j < len(kept)}
-    return replace(model, body=replace(model.body, effects=kept, cross=cross))
 
 
 def _base_body(model: PushModel) -> LearnedBody | AnalyticalBody:

@@ -129,7 +129,7 @@ def _of_motion(
 ) -> Trace:
     model, terms = context.model, [(t.mechanism, t.covariate, t.form) for t in motion.terms]
     refit = refit_base(model, context.analysis)
-    after = extend(refit, context.analysis, terms, physics_of(model)) if terms else refit
+    after = extend(refit, context.analysis, terms, model) if terms else refit
     effects = after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ()
     nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
     return Trace(
