@@ -15,6 +15,7 @@ from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.evaluation.live_validation import MAIN_RESULT
 from push_predictor.nodes import predict_server, push_validator, replay_options
 from push_predictor.nodes.parameters import Param
+from push_predictor.nodes.scalar_inlet import CLOCK
 from push_predictor.nodes.sensor_inlet import TOPICS
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
@@ -77,7 +78,9 @@ def test_the_table_of_the_validators_topics_names_what_it_uses():
     calls = (
         r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\"|DeferredTrigger\(self, \"([^\"]+)\""
     )
-    used = {first or second for first, second in re.findall(calls, code)} | {topic for _, _, topic, _ in TOPICS}
+    used = (
+        {first or second for first, second in re.findall(calls, code)} | {topic for _, _, topic, _ in TOPICS} | {CLOCK}
+    )
     rows = table(REPOSITORY / "docs" / "validation.md", "Topics and services")
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row[0])} == used
 

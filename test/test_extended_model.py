@@ -19,6 +19,7 @@ from push_predictor.cli import main
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.covariate_range import range_of
 from push_predictor.models.effects import Effect, design_of
 from push_predictor.models.forms import Form
 from push_predictor.models.mechanisms import Push
@@ -151,6 +152,119 @@ def test_a_served_model_answers_one_push_as_it_answers_many(bases: dict[str, Pus
     assert np.max(np.abs(among.mean - predicted(model, table).mean) / sd) < 1e-3
 
 
+def joint(model: PushModel, table: PushTable) -> np.ndarray:
+    """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
+    body = model.body
+    assert isinstance(body, ExtendedBody)
+    sizes = [len(effect.coefficients) for effect in body.effects]
+    ends = np.cumsum([0, *sizes])
+    whole = np.zeros((ends[-1], ends[-1]))
+    for k, effect in enumerate(body.effects):
+        whole[ends[k] : ends[k + 1], ends[k] : ends[k + 1]] = effect.covariance
+    for (i, j), shared in body.cross.items():
+        whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
+        whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
+    push = Push(table.inputs, table.duration, table.covariates)
+    design = np.concatenate([effect.design(physics(), push) for effect in body.effects], axis=2)
+    return design @ whole @ design.transpose(0, 2, 1)
+
+
+def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
+    """Two drivers that go together: neither coefficient is known, their sum is."""
+    table = pushes(100, 4, slippery(0.2))
+    slid = table.covariates["elapsed_time"] + np.repeat(40.0 * np.random.default_rng(5).standard_normal(100), 3)
+    table = replace(table, covariates={**table.covariates, "slid_distance": slid})
+    by_distance = replace(DRIFT, drivers=("slid_distance",))
+    terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
+    both = extend(refit_base(bases["analytical"], table), table, terms)
+    one = extend(refit_base(bases["analytical"], table), table, terms[:1])
+    assert isinstance(both.body, ExtendedBody) and isinstance(one.body, ExtendedBody)
+    push = Push(table.inputs, table.duration, table.covariates)
+    unsure, alone = both.body.shift(push)[1], one.body.shift(push)[1]
+    np.testing.assert_allclose(unsure, joint(both, table), rtol=1e-9, atol=1e-18)
+    apart = sum(effect.shift(physics(), push)[1] for effect in both.body.effects)
+    assert np.trace(unsure.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
+
+
+def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, PushModel], tmp_path: Path) -> None:
+    table = pushes(60, 4, slippery(0.2))
+    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+    first = extend(refit_base(bases["gp"], table), table, terms)
+    second = extend(first, table, [(None, "topic:/warmth", WARMTH), ("inertia", "model_inputs", Form("constant"))])
+    assert isinstance(first.body, ExtendedBody) and isinstance(second.body, ExtendedBody)
+    assert list(first.body.cross) == [(0, 1)] and list(second.body.cross) == [(0, 1), (2, 3)]
+    np.testing.assert_array_equal(first.body.cross[0, 1], second.body.cross[0, 1])
+    assert refit_base(second, table).body.cross == second.body.cross
+    save_model(second, tmp_path / "m")
+    loaded, probe = load_model(tmp_path / "m"), pushes(10, 3)
+    assert_same(predicted(loaded, probe), predicted(second, probe), rtol=1e-9, atol=1e-15)
+    unsure = second.body.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
+    np.testing.assert_allclose(unsure, joint(second, probe), rtol=1e-9, atol=1e-18)
+
+
+# --- where it has seen pushes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("answer", [lambda model: model, serve])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_covariate_far_from_what_was_seen_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
+    model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
+    inside = predicted(model, table).in_domain
+    np.testing.assert_array_equal(inside, predicted(answer(bases[kind]), table).in_domain)
+    assert inside.mean() > 0.8
+    for time in (-50.0, 1100.0):
+        late = replace(table, covariates={**table.covariates, "elapsed_time": np.full(58, time)})
+        assert not predicted(model, late).in_domain.any()
+        assert not predicted(model, late.take([0])).in_domain[0]
+    one_late = table.covariates["elapsed_time"].copy()
+    one_late[7] = 5000.0
+    some = predicted(model, replace(table, covariates={**table.covariates, "elapsed_time": one_late})).in_domain
+    np.testing.assert_array_equal(some, inside & (np.arange(58) != 7))
+    warm = replace(table, covariates={**table.covariates, "topic:/warmth": np.full(58, 1e6)})  # not needed
+    np.testing.assert_array_equal(predicted(model, warm).in_domain, inside)
+
+
+def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(extended(bases["gp"], slippery(0.1)), tmp_path / "m")
+    loaded, training = load_model(tmp_path / "m"), bases["gp"].training
+    assert predicted(loaded, training).in_domain.all()
+    late = replace(training, covariates={"elapsed_time": np.full(len(training), 1100.0)})
+    assert not predicted(loaded, late).in_domain.any()
+
+
+@pytest.mark.parametrize(
+    ("seen", "inside", "outside"),
+    [
+        ([-0.5, 0.0, 0.5], [-0.5, 0.2, 0.5, 0.5 + 2.0 * np.pi], [-0.6, 0.6, 3.0, -3.0]),
+        ([3.0, -3.0], [3.0, np.pi, -np.pi, -3.0, 3.1], [2.9, -2.9, 0.0]),
+        ([-2.0, 2.0, 3.1, -3.1], [2.0, 3.0, -2.5, -2.0], [0.0, 1.9, -1.9]),
+        ([0.3], [0.3], [0.31, 0.29, 0.3 + np.pi]),
+        (np.linspace(-np.pi, np.pi, 30), [-np.pi, 0.11, 3.0, 9.0], []),
+    ],
+)
+def test_headings_come_around(seen: list[float], inside: list[float], outside: list[float]) -> None:
+    known = range_of("slider_heading", np.array(seen))
+    assert known.holds(np.array(inside)).all()
+    assert not known.holds(np.array(outside)).any()
+
+
+def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]) -> None:
+    faster = Effect(
+        "inertia", "velocity", Form("linear", ("velocity",), (0.02,), (0.01,)), np.ones(1), np.eye(1), NOISE
+    )
+    sides = Form("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
+    tip = Effect("contact_friction", "edge", sides, np.array([0.1, 0.2, 0.3]), 1e-4 * np.eye(3), NOISE)
+    model, table = extended(bases["gp"], faster, tip), pushes(10, 1)
+    assert model.needs == ()
+    inputs = table.inputs * [2.0, 1.0, 1.0]
+    told = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
+    push = Push(inputs, table.duration, told)
+    shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
+    ours, theirs = (m.predict(inputs, table.duration).mean for m in (model, bases["gp"]))
+    np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
+    np.testing.assert_allclose(serve(model).predict(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
+
+
 # --- what it asks for -------------------------------------------------------------------------------------------
 
 
@@ -206,9 +320,32 @@ def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path)
 
 
 def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
-    for name, model, version in (("base", bases["gp"], 1), ("more", extended(bases["gp"], slippery(0.1)), 3)):
+    apart = extended(bases["gp"], slippery(0.1), slippery(0.2))
+    assert isinstance(apart.body, ExtendedBody)
+    sharing = replace(apart, body=replace(apart.body, cross={(0, 1): np.zeros((1, 1))}))
+    for name, model, version in (("base", bases["gp"], 1), ("more", apart, 3), ("sharing", sharing, 4)):
         save_model(model, tmp_path / name)
         assert _header(tmp_path / name)["format_version"] == version
+
+
+@pytest.mark.parametrize(
+    ("pair", "shared", "message"),
+    [
+        ((0, 1), 2.0, "covariance of all effects is not positive semidefinite"),
+        ((0, 1), np.nan, "covariance of all effects: a number is not finite"),
+        ((0, 1), np.zeros((1, 2)), r"effects 0 and 1: covariance of shape \(1, 2\), \(1, 1\) is needed"),
+        ((1, 1), 0.0, "effects 1 and 1 of 2 share a covariance"),
+        ((0, 2), 0.0, "effects 0 and 2 of 2 share a covariance"),
+    ],
+)
+def test_a_damaged_shared_covariance_is_refused(
+    bases: dict[str, PushModel], pair: tuple[int, int], shared: Any, message: str, tmp_path: Path
+) -> None:
+    model = extended(bases["analytical"], slippery(0.1, sd=1.0), slippery(0.2, sd=1.0))
+    assert isinstance(model.body, ExtendedBody)
+    save_model(replace(model, body=replace(model.body, cross={pair: np.atleast_2d(shared)})), tmp_path / "m")
+    with pytest.raises(ModelFileError, match=message):
+        load_model(tmp_path / "m")
 
 
 def _header(path: Path) -> dict[str, Any]:
@@ -351,6 +488,14 @@ def test_predict_takes_the_covariate_and_asks_for_it(model_file: Path, capsys: p
         assert main([*push, "--covariate", f"elapsed_time={time}", "--json", "-"]) == 0
         means.append(json.loads(capsys.readouterr().out)["mean"])
     assert means[0] != means[1]
+
+
+def test_info_tells_what_it_needs_and_where_it_has_seen_it(
+    model_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", str(model_file), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}
 
 
 def test_evaluate_names_the_column_that_a_table_lacks(

@@ -20,16 +20,19 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float32, Float64, String
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
+from msg_adapters.residual_schema import RESIDUAL_TYPE
 from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.effects import Effect
 from push_predictor.models.forms import Form
 from push_predictor.models.model_file import save_model
-from push_predictor.models.push_model import ExtendedBody
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody
 from push_predictor.models.train import train_model
 from push_predictor.nodes.scalar_inlet import ScalarInlet
 from push_predictor.recordings.bag import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.window_finder import find_windows
 from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.loading import load_evidence
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
@@ -80,6 +83,7 @@ def model(recording: Path) -> Path:
     base = train_model(load_data([recording]), rig, "analytical", name="warm")
     form = Form("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
     effect = Effect("contact_friction", f"topic:{WARMTH}", form, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
+    assert isinstance(base.body, AnalyticalBody)
     body = ExtendedBody(base.body, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3))
     path = recording.parent / "warm.pushmodel"
     save_model(replace(base, body=body), path)
@@ -135,6 +139,17 @@ def test_a_model_that_needs_a_topic_is_judged_as_offline(watched: Watched, model
     assert log["refused"] == [] and log["unanswered"] == 0
 
 
+def test_the_bag_of_residuals_has_them_at_the_windows_starts(watched: Watched, recording: Path) -> None:
+    windows = find_windows(read_recording(recording), load_rig_for([recording]))
+    topics = open_bag(watched.output / "residuals").topics
+    assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys(OURS, "std_msgs/msg/Float64")}
+    for topic in (WARMTH, HUMIDITY):
+        written = [m for m in open_bag(watched.output / "residuals").messages() if m.topic == topic]
+        assert [m.log_time for m in written] == [window.start for window in windows]
+        values = [struct.unpack_from("<d", m.data, 4)[0] for m in written]
+        assert values == pytest.approx([window.covariates[f"topic:{topic}"] for window in windows], abs=1e-9)
+
+
 def test_topics_that_bring_nothing_are_named(watched: Watched) -> None:
     for topic in (*OURS, "/nowhere"):
         assert f"scalar topic {topic}: nobody publishes it" in watched.before
@@ -158,11 +173,20 @@ def test_names_that_are_none_are_refused(names: list[str]) -> None:
 
 
 @pytest.fixture
-def nodes() -> Iterator[tuple[Node, Node]]:
-    """One that hears and one that speaks: within one participant a topic has one type."""
-    domain = free_domain()
-    with ros_context(domain, namespace="cell") as hearing, ros_context(domain, namespace="cell") as speaking:
-        yield hearing, speaking
+def domain() -> int:
+    return free_domain()
+
+
+@pytest.fixture
+def hearing(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
+
+
+@pytest.fixture
+def speaking(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
 
 
 class Gathered:
@@ -198,25 +222,25 @@ def kept() -> QoSProfile:
 
 @pytest.mark.parametrize("profile", [best_effort(), kept(), QoSProfile(depth=10)], ids=["lossy", "kept", "reliable"])
 def test_a_topic_that_appears_later_is_heard_as_its_publisher_offers_it(
-    nodes: tuple[Node, Node], profile: QoSProfile
+    domain: int, hearing: Node, profile: QoSProfile
 ) -> None:
-    inlet = ScalarInlet(nodes[0], ["warmth"])
+    inlet = ScalarInlet(hearing, ["warmth"])
     assert inlet.names == ["/warmth"] and "nobody publishes" in inlet.problems()[0]
-    text = nodes[1].create_publisher(String, "warmth", 10)
     gathered = Gathered(inlet, "/warmth")
-    assert gathered.has(lambda _: "std_msgs/msg/String" in inlet.problems()[0])
-    nodes[1].destroy_publisher(text)
+    with ros_context(domain, namespace="cell") as node:
+        node.create_publisher(String, "warmth", 10)
+        assert gathered.has(lambda _: "std_msgs/msg/String" in inlet.problems()[0])
     message = Temperature(temperature=21.5)
     message.header.stamp.sec = 7
-    publisher = nodes[1].create_publisher(Temperature, "warmth", profile)
-    assert gathered.has(speaks(publisher, message))
-    assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not inlet.problems()
-    nodes[1].destroy_publisher(publisher)
-    publisher = nodes[1].create_publisher(Float32, "warmth", profile)
-    assert gathered.has(speaks(publisher, Float32(data=0.5), 0.5)), "another type from now on"
+    with ros_context(domain, namespace="cell") as node:
+        assert gathered.has(speaks(node.create_publisher(Temperature, "warmth", profile), message, 21.5))
+        assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not inlet.problems()
+    with ros_context(domain, namespace="cell") as node:
+        publisher = node.create_publisher(Float32, "warmth", profile)
+        assert gathered.has(speaks(publisher, Float32(data=0.5), 0.5)), "another type from now on"
 
 
-def speaks(publisher: Any, message: Any, value: float = 21.5) -> Callable[[Gathered], bool]:
+def speaks(publisher: Any, message: Any, value: float) -> Callable[[Gathered], bool]:
     """Publishes until it is heard; where messages are kept, only once, before anybody has subscribed."""
     once = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     publisher.publish(message)
@@ -229,20 +253,20 @@ def speaks(publisher: Any, message: Any, value: float = 21.5) -> Callable[[Gathe
     return heard
 
 
-def test_without_a_clock_the_time_is_when_it_was_sent(nodes: tuple[Node, Node]) -> None:
-    inlet, publisher = ScalarInlet(nodes[0], ["/cell/warmth"]), nodes[1].create_publisher(Float64, "warmth", kept())
-    begin = nodes[1].get_clock().now().nanoseconds
+def test_without_a_clock_the_time_is_when_it_was_sent(hearing: Node, speaking: Node) -> None:
+    inlet, publisher = ScalarInlet(hearing, ["/cell/warmth"]), speaking.create_publisher(Float64, "warmth", kept())
+    begin = speaking.get_clock().now().nanoseconds
     publisher.publish(Float64(data=1.0))
-    end = nodes[1].get_clock().now().nanoseconds
+    end = speaking.get_clock().now().nanoseconds
     gathered = Gathered(inlet, "/cell/warmth")
     assert gathered.has(lambda so_far: bool(so_far.value))
     assert gathered.value == [1.0] and begin <= gathered.stamp[0] <= end
 
 
-def test_with_a_clock_the_time_is_what_it_told_last(nodes: tuple[Node, Node]) -> None:
-    hearing, node = nodes
+def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Node) -> None:
     inlet = ScalarInlet(hearing, ["warmth"])
-    clock, publisher = node.create_publisher(Clock, "/clock", kept()), node.create_publisher(Float32, "warmth", kept())
+    clock = speaking.create_publisher(Clock, "/clock", kept())
+    publisher = speaking.create_publisher(Float32, "warmth", kept())
     for second in range(5):
         message = Clock()
         message.clock.sec, message.clock.nanosec = second, 5
@@ -254,9 +278,9 @@ def test_with_a_clock_the_time_is_what_it_told_last(nodes: tuple[Node, Node]) ->
     assert inlet.take(None, last=True)["/warmth"].value.tolist() == [4.5], "no later tick came"
 
 
-def test_what_another_clock_has_stamped_or_is_no_number_is_counted_not_used(nodes: tuple[Node, Node]) -> None:
-    inlet = ScalarInlet(nodes[0], ["warmth"])
-    publisher = nodes[1].create_publisher(Temperature, "warmth", kept())
+def test_what_another_clock_has_stamped_or_is_no_number_is_counted_not_used(hearing: Node, speaking: Node) -> None:
+    inlet = ScalarInlet(hearing, ["warmth"])
+    publisher = speaking.create_publisher(Temperature, "warmth", kept())
     for sec, value in ((100, 1.0), (100_000, 2.0), (101, float("nan"))):
         message: Any = Temperature(temperature=value)
         message.header.stamp.sec = sec

@@ -194,7 +194,8 @@ def test_the_analytical_model_answers_itself() -> None:
     model = trained(OUTLINES["square"], "analytical", *WIDE)
     answers, inputs = serve(model), inside(model, 5)
     assert not answers.tabulated and answers.error is None and answers.how.startswith("exact")
-    assert np.array_equal(of(answers, inputs).mean, of(model, inputs).mean)
+    for count in (1, 5):  # in plain numbers
+        np.testing.assert_allclose(of(answers, inputs[:count]).mean, of(model, inputs[:count]).mean, rtol=1e-12)
 
 
 def test_a_table_that_would_be_too_large_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:

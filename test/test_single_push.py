@@ -28,7 +28,6 @@ OUTLINES = {
     "ellipse": shape_outline("ellip3"),
     "circle": shape_outline("ellip1"),
     "triangle": triangle(),
-    "notched": NOTCHED,
 }
 SUPPORT = Support((0.004, -0.003), 0.03)
 
@@ -40,15 +39,18 @@ def spread_pushes(n: int, seed: int = 0) -> tuple[Array, Array]:
     return inputs, rng.uniform(0.01, 0.5, n)
 
 
-@pytest.mark.parametrize("shape", OUTLINES)
+@pytest.mark.parametrize("shape", [*OUTLINES, "notched"])
 @given(place=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)))
 @settings(max_examples=100, deadline=None)
 def test_the_nearest_point_is_that_of_the_outline(shape: str, place: tuple[float, float]) -> None:
-    among = OUTLINES[shape].project(np.array([place]))
-    x, y, nx, ny, distance = nearest_on(OUTLINES[shape])(*place)
-    np.testing.assert_allclose([x, y], among.point[0], atol=1e-14)
-    np.testing.assert_allclose([nx, ny], among.normal[0], atol=1e-9)
-    assert distance == pytest.approx(float(among.distance[0]), abs=1e-14)
+    outline = OUTLINES.get(shape, NOTCHED)
+    *point, nx, ny, distance = nearest_on(outline)(*place)  # of two that are equally near it may be either
+    assert distance == pytest.approx(float(outline.project(np.array([place])).distance[0]), abs=1e-14)
+    np.testing.assert_allclose(outline.project(np.array([point])).distance, 0.0, atol=1e-14)
+    assert np.hypot(*(np.array(place) - point)) == pytest.approx(abs(distance), abs=1e-14)
+    if distance > 0.0 or shape != "notched":  # the inside of a notch's corner has no normal of its own
+        np.testing.assert_allclose(np.array(point) + distance * np.array([nx, ny]), place, atol=1e-14)
+    assert np.hypot(nx, ny) == pytest.approx(1.0)
 
 
 def test_points_on_a_level_with_corners_are_inside_or_outside_as_they_should_be() -> None:
@@ -62,7 +64,7 @@ def test_points_on_a_level_with_corners_are_inside_or_outside_as_they_should_be(
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_one_push_goes_as_it_goes_among_others(shape: str, radius: float) -> None:
     physics = AnalyticalPush(OUTLINES[shape], radius, 0.3, SUPPORT)
-    inputs, duration = spread_pushes(100)
+    inputs, duration = spread_pushes(60)
     assert np.max(inputs[:, 0] * duration) > 10.0 * LONGEST_STEP
     alone = single_push(physics)
     rows = [alone.displacement(inputs[k : k + 1], duration[k : k + 1]) for k in range(len(inputs))]

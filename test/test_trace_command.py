@@ -141,6 +141,35 @@ def test_errors_are_one_line_that_names_what_is_wrong(
     assert all(word in lines[0] for word in words), lines[0]
 
 
+@pytest.mark.parametrize("option", ["--report", "--json", "--save-model"])
+@pytest.mark.parametrize(
+    ("where", "accepted"),
+    [("folder", "the path of a file, this is a folder"), ("file/below", "a path in a folder, ")],
+)
+def test_where_nothing_can_be_written_is_told_before_the_work(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, option: str, where: str, accepted: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    asked = found(extended)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("kept")
+    assert run(place, option, str(tmp_path / where)) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"push_predictor trace: {option}: '{tmp_path / where}' is not accepted, give {accepted}")
+    assert asked == {} and (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_folder_that_may_not_be_written_to_is_named(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    asked = found(extended)
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere
+    assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
+    assert f"a path in a folder that may be written to, {tmp_path} may not" in capsys.readouterr().err
+    assert asked == {}
+
+
 def test_data_that_are_not_there_are_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trace", "absent.csv", "--model", str(place / "deployed.pushmodel")]) == 1
     assert "absent.csv: no such file or folder" in capsys.readouterr().err

@@ -56,6 +56,8 @@ def _describe_model(path: Path) -> dict[str, object]:
         "velocity_range": [float(low[0]), float(high[0])],
         "angle_range": [float(low[2]), float(high[2])],
         "covariates": list(model.training.covariates),
+        "needs": list(model.needs),
+        "covariate_ranges": {name: [known.low, known.high] for name, known in model.covariate_ranges.items()},
     }
 
 

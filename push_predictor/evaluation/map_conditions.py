@@ -44,9 +44,8 @@ def held_in_words(model: PushModel, held: Mapping[str, float]) -> str:
     told.append("the middle of these windows' values.")
     if headings := [name for name in held if name in HEADINGS]:
         follows = f" ({OF_PUSH} follows from it)" if OF_PUSH in model.needs and OF_PUSH not in held else ""
-        told.append(
-            f"That is one {headings[0]}, the one nearest to the mean direction{follows}; at another the map differs."
-        )
+        told.append(f"The {headings[0]} is one of many, that nearest to their mean direction{follows};")
+        told.append("at another the map differs.")
     for name, value in held.items():
         known = model.covariate_ranges.get(name)
         if known is not None and not known.holds(np.array([value]))[0]:

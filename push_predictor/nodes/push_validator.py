@@ -48,7 +48,9 @@ PARAMETERS = (
     Param("output", "", "Folder for validation.json, windows.json, the recording of residuals and the report."),
     Param("report", True, "Write the HTML report too, when a recording has finished or ~/finish is called."),
     Param("frame_id", "world", "The frame that sensor messages must name, others are rejected; empty: any."),
-    Param("scalar_topics", [""], "Scalar topics beside the sensors, whose values at a window's start it is given."),
+    Param(
+        "scalar_topics", [""], "Scalar topics beside the sensors, by name; each window gets their values at its start."
+    ),
     Param("request_timeout", 2.0, "Seconds after which an unanswered request is sent again.", low=0.05, high=60.0),
     Param(
         "last_answers",

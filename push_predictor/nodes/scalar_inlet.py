@@ -15,6 +15,7 @@ from time import monotonic, time_ns
 from typing import Any
 
 from rclpy.exceptions import InvalidTopicNameException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
@@ -51,10 +52,14 @@ class _Reader:
             return
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
+            self._subscription, self._suits = None, ()
+        try:
+            self._subscription = self._node.create_subscription(
+                message_class(kind), self._topic, _nothing, profile, callback_group=self._group, raw=True
+            )
+        except rclpy_implementation.RCLError:
+            return  # the executor still holds the one of another type: at the next call
         self._suits = suits
-        self._subscription = self._node.create_subscription(
-            message_class(kind), self._topic, _nothing, profile, callback_group=self._group, raw=True
-        )
 
     def taken(self) -> Iterator[tuple[bytes, int]]:
         """What has arrived, each message with the time (ns) at which it was sent."""

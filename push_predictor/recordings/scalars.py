@@ -39,7 +39,7 @@ class ScalarTrack:
         """The value at a time (ns): linear between samples, constant in gaps and beyond the ends; None without any."""
         if not len(self._stamp):
             return None
-        after = int(np.searchsorted(self._stamp, stamp))
+        after = int(np.searchsorted(self._stamp, stamp, side="right"))
         if after == 0 or after == len(self._stamp):
             return float(self._value[max(after - 1, 0)])
         begin, end = int(self._stamp[after - 1]), int(self._stamp[after])

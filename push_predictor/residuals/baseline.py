@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody
+from push_predictor.models.bodies import ExtendedBody, LearnedBody
+from push_predictor.models.left_out import moments_left_out
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import PushModel, scaled_features
-from push_predictor.models.vhgp import conditioned
+from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates import Candidate, usable
 from push_predictor.residuals.drivers import LOCAL, STANDING
 from push_predictor.residuals.evidence import Evidence, push_order, whitened_response, whitener_of
@@ -24,9 +24,7 @@ from push_predictor.residuals.inputs_basis import InputsBasis, inputs_basis, inp
 from push_predictor.residuals.loading import with_inputs
 from push_predictor.residuals.nuisance import Nuisance
 from push_predictor.residuals.screening import TINY, Scores, Without, raw_scores
-from push_predictor.types import Array, IntArray
-
-FOLDS = 10
+from push_predictor.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ class Baseline:
             beside=self._nuisance.beside(*candidate.label, candidate.form, candidate.kind),
         )
         out = Without(inputs_of(candidate.kind, self.basis))
-        return raw_scores(out.left(evidence.z, evidence.block), out(there.columns))
+        return raw_scores(out.left(evidence.z, evidence.block).apart(there.beside), out(there.columns))
 
     def _response(self, mechanism: str | None) -> Array:
         if mechanism not in self._responses:
@@ -85,10 +83,10 @@ class Baseline:
 
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
-    """The baseline of a model, from the training windows that it keeps."""
-    table = with_inputs(model.training)
+    """The baseline of a model, from the training windows that it keeps, each push left out of what it is judged by."""
+    table, base = with_inputs(model.training), model.base.body
     push = Push(table.inputs, table.duration, table.covariates)
-    moments = _crossed(model.base.body, table.outcomes - _shift(model, push), push, push_order(table))
+    moments = moments_left_out(base, push_order(table)) if isinstance(base, LearnedBody) else base.moments(push)
     mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
     return Baseline(evidence, inputs_basis(model, table))
@@ -111,32 +109,3 @@ def difference(new: tuple[Scores, Array], training: tuple[Scores, Array]) -> Sco
 def _lifted(information: Array, scale: Array) -> Array:
     """Information that is nowhere zero: where training says nothing, no difference can be told."""
     return np.asarray(information + 1e-9 * np.trace(scale) / len(scale) * np.eye(len(information)))
-
-
-def _shift(model: PushModel, push: Push) -> Array:
-    return model.body.shift(push)[0] if isinstance(model.body, ExtendedBody) else np.zeros((len(push.inputs), 3))
-
-
-def _crossed(
-    body: LearnedBody | AnalyticalBody | ExtendedBody, outcomes: Array, push: Push, order: IntArray
-) -> tuple[Array, Array, Array]:
-    """Moments at the training windows by the model without their fold of pushes, its hyperparameters kept."""
-    if not isinstance(body, LearnedBody):
-        return body.moments(push)
-    moments = tuple(np.empty(shape) for shape in ((len(order), 3), (len(order), 3, 3), (len(order), 3, 3)))
-    for fold in range(FOLDS):
-        test = order % FOLDS == fold
-        if test.any():
-            without = _conditioned(body, push.inputs[~test], outcomes[~test])
-            there = Push(push.inputs[test], push.duration[test], {})
-            for whole, part in zip(moments, without.moments(there), strict=True):
-                whole[test] = part
-    return moments[0], moments[1], moments[2]
-
-
-def _conditioned(body: LearnedBody, inputs: Array, outcomes: Array) -> LearnedBody:
-    features = scaled_features(body.rig, body.scaling, inputs)
-    scaled = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd
-    return replace(
-        body, regressions=tuple(conditioned(r, features, y) for r, y in zip(body.regressions, scaled.T, strict=True))
-    )

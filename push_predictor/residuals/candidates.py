@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,8 @@ class Candidate:
 
     response (n, 3, p): whitened outcome per unit of the parameters; values (n, m): what the form multiplies it by.
     beside (3 n, q): orthonormal, what is taken out of the columns, because it comes without the effect; see nuisance.
-    own: whether the driver is a function of the inputs that a learnt base has, as the side is where it folds none.
+    whole (3 n, q): the same, but for what its mechanism does without the driver. own: whether the driver is a function
+    of the inputs that a learnt base has, as the side is where it folds none.
     """
 
     mechanism: str | None
@@ -39,9 +41,10 @@ class Candidate:
     response: Array
     values: Array | None = None
     beside: Array | None = None
+    whole: Array | None = None
     own: bool = False
 
-    @property
+    @cached_property
     def columns(self) -> Array:
         """Whitened columns (n, 3, p * m), p first, less what comes without the effect."""
         plain = self.plain
@@ -64,6 +67,11 @@ class Candidate:
         if self.covariate == CONSTANT or self.own:
             return "constant"
         return "speed" if self.covariate == SPEED else "driven"
+
+    @property
+    def grows(self) -> bool:
+        """Whether what the mechanism does without the driver is in it as well: it was not there at first."""
+        return self.kind == "driven" and self.whole is not None and self.beside is self.whole
 
     @property
     def label(self) -> tuple[str | None, str]:
@@ -94,7 +102,10 @@ def candidates_of(
     if basis is None:
         return found
     nuisance = Nuisance(evidence, basis, [name for name in responses if name is not None], responses.__getitem__)
-    return [replace(c, beside=nuisance.beside(*c.label, c.form, c.kind)) for c in found]
+    return [
+        replace(c, beside=nuisance.beside(*c.label, c.form, c.kind), whole=nuisance.whole(*c.label, c.kind))
+        for c in found
+    ]
 
 
 def entangled(evidence: Evidence, names: Sequence[str] | None, basis: InputsBasis) -> list[str]:

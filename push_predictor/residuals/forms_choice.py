@@ -42,6 +42,8 @@ def forms_for(candidate: Candidate, table: PushTable) -> list[Form]:
         return [Form("periodic", (name,)), Form("periodic, twice around", (name,))]
     values = table.covariates[name]
     forms = [standard_form(kind, name, values) for kind in ("linear", "logarithmic", "quadratic")]
+    if candidate.grows:
+        forms[0] = replace(forms[0], centre=(float(values.min()),))
     forms += [Form("step", (name,), place=place) for place in _places(values)]
     if name in PLACE and all(p in table.covariates for p in PLACE):
         forms.append(two_dimensional(table))

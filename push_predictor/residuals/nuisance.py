@@ -36,8 +36,14 @@ class Nuisance:
 
     def beside(self, mechanism: str | None, covariate: str, form: Form, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) that go out of those of a candidate, the inputs taken out of them; or None."""
-        alone = mechanism if form.name == "constant" else None
-        key = covariate in TOUCHED or kind != "driven", kind == "driven", alone, kind
+        return self._out_of(mechanism if form.name == "constant" else None, covariate, kind)
+
+    def whole(self, mechanism: str | None, covariate: str, kind: Kind) -> Array | None:
+        """The same, but what the mechanism does without a driver stays: for a driver under which it begins at zero."""
+        return self._out_of(mechanism, covariate, kind)
+
+    def _out_of(self, alone: str | None, covariate: str, kind: Kind) -> Array | None:
+        key = covariate in TOUCHED or kind != "driven", kind != "constant", alone, kind
         if key not in self.known:
             self.known[key] = self._columns(*key)
         return self.known[key]

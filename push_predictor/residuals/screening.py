@@ -70,6 +70,13 @@ class Left:
     enlarged: Array
     block: IntArray
 
+    def apart(self, beside: Array | None) -> Left:
+        """Less what orthonormal columns (3 n, q) explain of them, all outputs together."""
+        if beside is None:
+            return self
+        parts = [flat - beside @ (beside.T @ flat) for flat in (self.left.ravel(), self.enlarged.ravel())]
+        return Left(parts[0].reshape(self.left.shape), parts[1].reshape(self.left.shape), self.block)
+
 
 def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
     """Screen candidates by their block scores, each in coordinates in which its information is one."""

@@ -12,7 +12,7 @@ import numpy as np
 from push_predictor.models.forms import Form
 from push_predictor.residuals.baseline import Baseline, difference
 from push_predictor.residuals.candidates import Candidate
-from push_predictor.residuals.drivers import LOCAL
+from push_predictor.residuals.drivers import CONSTANT, LOCAL, STANDING
 from push_predictor.residuals.evidence import Evidence
 from push_predictor.residuals.forms_choice import best_form
 from push_predictor.residuals.inputs_basis import InputsBasis, Kind, inputs_of
@@ -110,10 +110,14 @@ class _Hunt:
     def screened(self, z: Array) -> Screened:
         """All candidates on residuals z."""
         lefts = {kind: out.left(z, self.evidence.block) for kind, out in self.outs.items()}
-        screened = screen([self._scores(c, lefts[c.kind]) for c in self.candidates], self.seed)
-        return self._news(screened, lefts)
+        # Of the candidate's kind, and less what goes out of the candidate: the same array for many of them.
+        groups = {(c.kind, id(c.beside)): c for c in self.candidates}
+        apart = {key: lefts[c.kind].apart(c.beside) for key, c in groups.items()}
+        each = [apart[c.kind, id(c.beside)] for c in self.candidates]
+        screened = screen([self._scores(c, left) for c, left in zip(self.candidates, each, strict=True)], self.seed)
+        return self._news(screened, each)
 
-    def _news(self, screened: Screened, lefts: dict[Kind, Left]) -> Screened:
+    def _news(self, screened: Screened, lefts: Sequence[Left]) -> Screened:
         """Where what stands in the rig was found: whether it is other than in training, all of these at once."""
         found = [k for k, c in enumerate(self.candidates) if screened.p_value[k] <= self.alpha and self._stands(c)]
         if not found or self.baseline is None:
@@ -121,7 +125,7 @@ class _Hunt:
         changed = []
         for k in found:
             c = self.candidates[k]
-            raw = raw_scores(lefts[c.kind], self.outs[c.kind](c.columns))
+            raw = raw_scores(lefts[k], self.outs[c.kind](c.columns))
             changed.append(difference(raw, self.baseline.scores(c)))
         p_value = screened.p_value.copy()
         p_value[found] = np.maximum(p_value[found], screen(changed, self.seed).p_value)
@@ -144,11 +148,12 @@ class _Hunt:
 
     def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> Term:
         """The best of what was found, named. used: drivers of earlier terms, preferred where they do as well."""
-        chosen = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_JUDGED]
-        judged = self._formed([self.candidates[k] for k in chosen], z)
+        chosen = self._not_constant(sorted(found, key=lambda k: -screened.statistic[k])[:MOST_JUDGED])
+        growing = self._growing(found)
+        judged = self._formed([_whole(self.candidates[k], growing) for k in chosen], z)
         open_ = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
         driver = next((j for j in open_ if j.candidate.covariate in used), judged[0]).candidate.covariate
-        best, naming = self._named(judged, driver, z)
+        best, naming = self._named(judged, driver, z, growing)
         drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in open_)]))
         labels = {j.candidate.label for j in judged}
         p_value = min(float(screened.p_value[k]) for k in chosen if self.candidates[k].label in labels
@@ -158,10 +163,22 @@ class _Hunt:
     def taken_out(self, term: Term, z: Array) -> Array:
         """The residuals less a term; for a learnt base also less what is constant of it: the refit makes up for it."""
         left = z - term.best.plain @ term.coefficients
-        if not self.basis.learnt or term.best.kind == "constant":
+        own = any(c.label == (term.best.mechanism, CONSTANT) for c in self.candidates)
+        if not self.basis.learnt or term.best.kind == "constant" or not own:
             return left
         constant = term.best.response
         return left - constant @ fit(constant, left)
+
+    def _growing(self, found: list[int]) -> set[str]:
+        """Mechanisms whose constant effect, which no base can have, was found and found to be driven by something."""
+        labels = [(self.candidates[k].mechanism, self.candidates[k]) for k in found]
+        constant = {name for name, c in labels if name is not None and _is_constant(c)}
+        return constant & {name for name, c in labels if name is not None and c.covariate not in (*STANDING, *LOCAL)}
+
+    def _not_constant(self, found: list[int]) -> list[int]:
+        """Without the constant effects of mechanisms that something drives: they are part of what is driven."""
+        growing = self._growing(found)
+        return [k for k in found if not (_is_constant(c := self.candidates[k]) and c.mechanism in growing)]
 
     def _rank(self, candidate: Candidate) -> int:
         if candidate.covariate in LOCAL:
@@ -186,9 +203,9 @@ class _Hunt:
         case = inputs_of(candidate.kind, self.basis)
         return best_form(candidate, self.evidence.table, z, case, self.evidence.block)
 
-    def _named(self, judged: list[Judged], driver: str, z: Array) -> tuple[Judged, Naming]:
+    def _named(self, judged: list[Judged], driver: str, z: Array, growing: set[str]) -> tuple[Judged, Naming]:
         """The best mechanism along a driver, if any fits; else the generic fall-back."""
-        along = [c for c in _labels(self.candidates) if c.covariate == driver]
+        along = [_whole(c, growing) for c in _labels(self.candidates) if c.covariate == driver]
         formed = {j.candidate.label: j for j in judged}
         by_gain = sorted((formed.get(c.label) or self._in_best_form(c, z) for c in along), key=lambda j: -j.gain)
         known = [
@@ -223,6 +240,16 @@ class _Hunt:
         share = 1.0 - float(np.sum((left - flat @ coefficients) ** 2) / np.sum(left**2))
         others = tuple(j for j in open_ if j.candidate.label != best.candidate.label)
         return Term(best.candidate, (best, *others), p_value, coefficients, share, naming)
+
+
+def _is_constant(candidate: Candidate) -> bool:
+    return candidate.kind == "driven" and candidate.form.name == "constant"
+
+
+def _whole(candidate: Candidate, growing: set[str]) -> Candidate:
+    """A candidate of a mechanism that grows with what it does without the driver in it."""
+    driven = candidate.mechanism in growing and not _is_constant(candidate)
+    return replace(candidate, beside=candidate.whole) if driven else candidate
 
 
 def _labels(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -25,7 +25,7 @@ from push_predictor.residuals.corrections import NO_STREAMS, correct
 from push_predictor.residuals.drivers import CONSTANT
 from push_predictor.residuals.effect_size import size_of
 from push_predictor.residuals.evidence import evidence_of
-from push_predictor.residuals.extension import compared, extend, gain, physics_of, refit_base
+from push_predictor.residuals.extension import compared, estimate, extend, gain, physics_of, refit_base
 from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
 from push_predictor.residuals.measurement import MeasurementError, MeasurementFinding, measurement_errors
 from push_predictor.residuals.motion import MotionFinding, motion_effects
@@ -186,7 +186,7 @@ def _told(
 ) -> tuple[FoundEffect, ...]:
     """What was found on the channel that the verdict is about."""
     if motion.terms:
-        sizes = [size_of(effect, context.analysis) for effect in effects]
+        sizes = [size_of(_as_seen(effect, context), context.analysis) for effect in effects]
         return tuple(
             FoundEffect(t.mechanism, t.covariate, t.outputs, t.form.name, size, _of_all(t.p_value, "motion"), t.share)
             for t, size in zip(motion.terms, sizes, strict=True)
@@ -201,6 +201,14 @@ def _told(
         for e in forces.effects
         for parameter in e.parameters
     )
+
+
+def _as_seen(effect: Effect, context: _Context) -> Effect:
+    """The effect at its whole size: of one in the model's own inputs a refit takes over the most."""
+    if effect.covariate != CONSTANT:
+        return effect
+    evidence = evidence_of(context.model, context.analysis, physics_of(context.model))
+    return estimate(evidence, [(effect.mechanism, effect.covariate, effect.form)])[0][0]
 
 
 def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
@@ -270,6 +278,8 @@ def _notes(
     if motion.deviation is not None:
         told = ", ".join(f"{value:.2f}" for value in motion.deviation)
         notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
+    if motion.terms and motion.terms[0].covariate == CONSTANT and context.model.kind != "analytical":
+        notes.append("What was found lies in the model's own inputs: to train it anew on such pushes makes up for it.")
     if motion.entangled:
         notes.append(
             f"Not tried, because in these pushes they go with contact, angle and speed: {', '.join(motion.entangled)}. "
