@@ -96,7 +96,8 @@ def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", 
 def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tuple[Effect, ...]) -> Trace:
     """What a trace that finds these effects would say."""
     refit = refit_base(model, analysis)
-    after = extend(refit, analysis, [(e.mechanism, e.covariate, e.form) for e in effects]) if effects else refit
+    terms_of = [(e.mechanism, e.covariate, e.form) for e in effects]
+    after = extend(refit, analysis, terms_of, model) if effects else refit
     terms = after.body.effects if isinstance(after.body, ExtendedBody) else ()
     nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
     before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))

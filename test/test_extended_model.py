@@ -389,7 +389,7 @@ def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushM
     away = []
     for seed in range(10, 16):
         table = pushes(100, seed, slippery(0.15), grain(0.1))
-        body = extend(refit_base(bases[kind], table), table, terms).body
+        body = extend(refit_base(bases[kind], table), table, terms, bases[kind]).body
         assert isinstance(body, ExtendedBody)
         found = np.concatenate([effect.coefficients for effect in body.effects])
         sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in body.effects])
@@ -417,7 +417,7 @@ def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushMod
 def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
     refit = refit_base(bases[kind], table)
-    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)])
+    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
     assert nmse.low < nmse.value < nmse.high < 0.0
     assert nlpd.low < nlpd.value < nlpd.high < 0.0
@@ -429,7 +429,7 @@ def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushM
 def test_an_effect_that_is_not_there_gains_nothing(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 7), pushes(60, 8)
     refit = refit_base(bases[kind], table)
-    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)])
+    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     _, nlpd = gain(refit, after, held_out)
     assert abs(nlpd.value) < 0.05
     assert nlpd.high > 0.0

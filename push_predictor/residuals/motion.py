@@ -32,7 +32,10 @@ VARIANCE_SHARE = 0.25  # of the motion's alpha
 
 @dataclass(frozen=True, eq=False)
 class MotionTerm:
-    """One effect of the motion as it may be called; mechanism None: none of the library fits."""
+    """One effect of the motion as it may be called; mechanism None: none of the library fits.
+
+    own: whether it lies in the inputs of a learnt base, so that a refit has it.
+    """
 
     mechanism: str | None
     covariate: str
@@ -40,6 +43,7 @@ class MotionTerm:
     outputs: tuple[str, ...]
     p_value: float
     share: float
+    own: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +80,12 @@ def motion_effects(
     found = search(evidence, candidates_of(evidence, names, basis), basis, share, seed, baseline=baseline)
     scatter = variance_effects(
         model, evidence, found.left, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline
-    ).found
+    )
+    notable = tuple(s for s in scatter.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None
     return MotionFinding(
         terms=tuple(_told(term, evidence, basis) for term in found.terms),
-        equivalent=first.naming.drivers[1:] if first else (),
+        equivalent=first.naming.drivers[1:] if first else scatter.rivals if notable else (),
         mechanisms=_other_mechanisms(first),
         tested=_tested(found),
         residual=evidence.z,
@@ -88,11 +93,7 @@ def motion_effects(
         minimum_detectable=_detectable(found, evidence, basis, share, baseline),
         remaining=_strongest(found.last, found.candidates, share),
         experiment=_experiment(first, evidence, basis),
-        scatter=tuple(
-            replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE))
-            for s in scatter
-            if not 1.0 / NOTABLE < s.ratio < NOTABLE
-        ),
+        scatter=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         standing=_standing(found),
         entangled=tuple(entangled(evidence, names, basis)),
     )
@@ -104,7 +105,8 @@ def _told(term: Term, evidence: Evidence, basis: InputsBasis) -> MotionTerm:
     shift = best.columns @ term.coefficients
     size = np.sqrt(np.mean((shift - shift.mean(axis=0) * (best.kind != "constant")) ** 2, axis=0))
     outputs = tuple(name for name, felt in zip(OUTPUTS, size >= FELT * size.max(), strict=True) if felt)
-    return MotionTerm(mechanism, best.covariate, best.form, outputs, _whole(term.p_value), term.share)
+    own = basis.learnt and (best.kind == "constant" or (best.kind == "speed" and basis.knows_speed))
+    return MotionTerm(mechanism, best.covariate, best.form, outputs, _whole(term.p_value), term.share, own)
 
 
 def _other_mechanisms(first: Term | None) -> tuple[str, ...]:

@@ -25,10 +25,10 @@ from push_predictor.residuals.corrections import NO_STREAMS, correct
 from push_predictor.residuals.drivers import CONSTANT
 from push_predictor.residuals.effect_size import size_of
 from push_predictor.residuals.evidence import evidence_of
-from push_predictor.residuals.extension import compared, estimate, extend, gain, physics_of, refit_base
+from push_predictor.residuals.extension import Term, compared, estimate, extend, gain, physics_of, refit_base
 from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
 from push_predictor.residuals.measurement import MeasurementError, MeasurementFinding, measurement_errors
-from push_predictor.residuals.motion import MotionFinding, motion_effects
+from push_predictor.residuals.motion import MotionFinding, MotionTerm, motion_effects
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.split import RULE, digest_of, held_out_rows
 from push_predictor.residuals.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
@@ -127,10 +127,11 @@ class _Context:
 def _of_motion(
     context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
 ) -> Trace:
-    model, terms = context.model, [(t.mechanism, t.covariate, t.form) for t in motion.terms]
+    model, terms = context.model, [_as_term(t) for t in motion.terms if not t.own]
     refit = refit_base(model, context.analysis)
     after = extend(refit, context.analysis, terms, model) if terms else refit
-    effects = after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ()
+    added = iter(after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ())
+    effects = tuple(_as_seen(t, context) if t.own else next(added) for t in motion.terms)
     nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
     return Trace(
         verdict=_verdict(motion, forces),
@@ -186,7 +187,7 @@ def _told(
 ) -> tuple[FoundEffect, ...]:
     """What was found on the channel that the verdict is about."""
     if motion.terms:
-        sizes = [size_of(_as_seen(effect, context), context.analysis) for effect in effects]
+        sizes = [size_of(effect, context.analysis) for effect in effects]
         return tuple(
             FoundEffect(t.mechanism, t.covariate, t.outputs, t.form.name, size, _of_all(t.p_value, "motion"), t.share)
             for t, size in zip(motion.terms, sizes, strict=True)
@@ -203,12 +204,14 @@ def _told(
     )
 
 
-def _as_seen(effect: Effect, context: _Context) -> Effect:
-    """The effect at its whole size: of one in the model's own inputs a refit takes over the most."""
-    if effect.covariate != CONSTANT:
-        return effect
+def _as_term(term: MotionTerm) -> Term:
+    return term.mechanism, term.covariate, term.form
+
+
+def _as_seen(term: MotionTerm, context: _Context) -> Effect:
+    """An effect in the model's own inputs, at its whole size; a refit takes it over, so that no model is given it."""
     evidence = evidence_of(context.model, context.analysis, physics_of(context.model))
-    return estimate(evidence, [(effect.mechanism, effect.covariate, effect.form)])[0][0]
+    return estimate(evidence, [_as_term(term)])[0][0]
 
 
 def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
@@ -278,8 +281,9 @@ def _notes(
     if motion.deviation is not None:
         told = ", ".join(f"{value:.2f}" for value in motion.deviation)
         notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
-    if motion.terms and motion.terms[0].covariate == CONSTANT and context.model.kind != "analytical":
-        notes.append("What was found lies in the model's own inputs: to train it anew on such pushes makes up for it.")
+    if any(term.own for term in motion.terms):
+        what = ", ".join(f"{t.mechanism or 'the unknown one'} by {t.covariate}" for t in motion.terms if t.own)
+        notes.append(f"In the model's own inputs, so that a model trained anew on such pushes has it: {what}.")
     if motion.entangled:
         notes.append(
             f"Not tried, because in these pushes they go with contact, angle and speed: {', '.join(motion.entangled)}. "

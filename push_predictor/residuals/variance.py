@@ -44,10 +44,14 @@ class Scatter:
 
 @dataclass(frozen=True, eq=False)
 class VarianceFinding:
-    """found: significant drivers of the scatter, each once, the strongest first; tested: all, with their p values."""
+    """found: significant drivers of the scatter, each once, the strongest first; tested: all, with their p values.
+
+    rivals: drivers that are as significant, but nothing of the first's trend is left for them.
+    """
 
     found: tuple[Scatter, ...]
     tested: tuple[Scatter, ...]
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +73,40 @@ def variance_effects(
     names: Sequence[str] | None = None,
     baseline: Baseline | None = None,
 ) -> VarianceFinding:
-    """Test the scatter of residuals left (n, 3), mean effects out, against every driver and against training."""
+    """Test the scatter of residuals left (n, 3), mean effects out, against every driver and against training.
+
+    What differs from training is told where nothing drives it.
+    """
+    first = _tested(model, evidence, left, alpha, seed, names, baseline)
+    driven = tuple(s for s in first.found if s.covariate != CONSTANT)
+    if len(driven) < 2:
+        return replace(first, found=driven or first.found)
+    levelled = left / _trend(evidence, left, driven[0])
+    again = {s.covariate for s in _tested(model, evidence, levelled, alpha, seed, names, baseline).found}
+    found = (driven[0], *(s for s in driven[1:] if s.covariate in again))
+    return replace(first, found=found, rivals=tuple(s.covariate for s in driven[1:] if s.covariate not in again))
+
+
+def _trend(evidence: Evidence, left: Array, scatter: Scatter) -> Array:
+    """Relative deviation (n, 3) of the residuals as a driver has it, one in the outputs that it does not touch."""
+    values = scatter.form.values(evidence.table.covariates, len(left))
+    on = np.array([name in scatter.outputs for name in OUTPUTS])
+    size = _log_squares(left)[:, on].mean(axis=1)
+    design = np.column_stack([np.ones(len(values)), values])
+    slope, *_ = np.linalg.lstsq(design, size, rcond=None)
+    fitted = design @ slope
+    return np.asarray(np.exp(0.5 * (fitted - fitted.mean())[:, None] * on))
+
+
+def _tested(
+    model: PushModel,
+    evidence: Evidence,
+    left: Array,
+    alpha: float,
+    seed: int,
+    names: Sequence[str] | None,
+    baseline: Baseline | None,
+) -> VarianceFinding:
     basis = inputs_basis(model, evidence.table).columns
     size = _log_squares(Without(basis)(left))
     trials = [t for name, form in _forms(evidence, names) for t in _along(evidence, size, basis, name, form)]
