@@ -210,3 +210,21 @@ def test_a_mechanism_is_out_of_the_library_only_inside() -> None:
     assert candidates.LIBRARY is LIBRARY
     with pytest.raises(SystemExit, match="perpetual"), library_without("perpetual"):
         pass
+
+
+def test_a_small_run_of_all_steps_ends_in_a_table(tmp_path: Path) -> None:
+    """Nothing, an effect of the library and a change of the wrench, each on 120 pushes."""
+    data, hidden, results = (tmp_path / name for name in ("data", "truth", "results"))
+    small = ["--training", "120", "--least", "120", "--most", "120", "--rows", "200", "--model", "gp"]
+    main(["make", "--out", str(data), "--truth", str(hidden), "--seed", "177", "--count", "3", "--cores", "2", *small])
+    main(["run", "--data", str(data), "--out", str(results), "--cores", "2"])
+    main(["oracle", "--data", str(data), "--truth", str(hidden), "--cores", "2"])
+    table, scored = tmp_path / "table.md", tmp_path / "score.json"
+    main(["score", "--results", str(results), "--truth", str(hidden), "--json", str(scored), "--markdown", str(table)])
+    told = json.loads(scored.read_text())
+    assert told["recordings"] == 3
+    assert counted(told, "traces that failed") == (0, 3)
+    assert counted(told, "motion model changed without cause") == (0, 2)
+    assert counted(told, "harm: interval of the gain wholly above zero") == (0, 3)
+    assert counted(told, "wrench-only changes told as such") == (1, 1)
+    assert "motion model changed without cause | 0 of 2" in table.read_text()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.models.effects import mechanism_named
 from push_predictor.residuals.candidates import Candidate
 from push_predictor.residuals.screening import Left, Without, raw_scores, screen, unit_scores
 from push_predictor.residuals.selection import Judged, fit, gains_of
@@ -19,21 +20,6 @@ from push_predictor.types import Array, IntArray
 STRUCK_OFF = 0.01  # p below which a rival is not the truth
 LEFT_OVER = 0.05  # p below which a mechanism leaves something over along its driver
 MOST_LEFT = 0.15  # share of what can be explained along the driver that a named mechanism may leave over: it is linear
-PLAUSIBLE = {  # largest size of a parameter, in its unit; beyond it the mechanism only mimics another
-    "contact_friction": 1.0,
-    "contact_asymmetry": 1.0,
-    "pressure_spread": 1.0,
-    "centre_of_friction": 0.05,
-    "pushing_height": 0.05,
-    "limit_surface_power": 3.0,
-    "body_anisotropy": 1.0,
-    "anisotropic_friction": 1.0,
-    "friction_gradient": 50.0,
-    "tilted_surface": 0.7,
-    "inertia": 3.0,
-    "pusher_radius": 0.005,
-    "pusher_travel": 0.5,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +55,15 @@ def open_rivals(best: Judged, others: Sequence[Judged], case: Case, seed: int = 
 
 
 def plausible(candidate: Candidate, case: Case) -> bool:
-    """Whether the size that fits is one that a rig can have; a mechanism without a limit always is."""
+    """Whether the size that fits is one that a rig can have; beyond it a mechanism only mimics another."""
+    if candidate.mechanism is None:
+        return True
     out = Without(case.basis)
     coefficients = fit(out(candidate.columns), out(case.z)).reshape(candidate.response.shape[2], -1)
     values = np.ones((len(case.z), 1)) if candidate.values is None else candidate.values
     values = values - (values.mean(axis=0) if candidate.kind == "driven" and candidate.form.drivers else 0.0)
     size = np.quantile(np.abs(values @ coefficients.T), 0.9, axis=0)
-    return bool(np.all(size <= PLAUSIBLE.get(str(candidate.mechanism), np.inf)))
+    return mechanism_named(candidate.mechanism).plausible(size[None])
 
 
 def leaves_over(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:

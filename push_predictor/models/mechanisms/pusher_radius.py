@@ -18,4 +18,4 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
     return ((more - less) / (high - low))[:, :, None]
 
 
-PUSHER_RADIUS = Mechanism("pusher_radius", (Parameter("change of the pusher's radius", "m", 0.01),), response)
+PUSHER_RADIUS = Mechanism("pusher_radius", (Parameter("change of the pusher's radius", "m", 0.005),), response)

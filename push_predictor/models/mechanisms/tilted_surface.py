@@ -32,7 +32,7 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 TILTED_SURFACE = Mechanism(
     "tilted_surface",
-    (Parameter("pull along the world's x, share of friction", "1", 0.8), Parameter("the same along y", "1", 0.8)),
+    (Parameter("pull along the world's x, share of friction", "1", 0.7), Parameter("the same along y", "1", 0.7)),
     response,
     needs=("slider_heading",),
 )
