@@ -3,13 +3,15 @@
     python -m benchmarks.blind make --out blind/data --truth blind/truth --seed 1 --count 100
     python -m benchmarks.blind run --data blind/data --out blind/results [--without contact_friction]
     python -m benchmarks.blind oracle --data blind/data --truth blind/truth
+    python -m benchmarks.blind removed --data blind/data --truth blind/truth --out blind/removed
     python -m benchmarks.blind score --results blind/results --truth blind/truth [--json FILE] [--markdown FILE]
 
 make: the rig simulator makes, for each number, a model trained on a recording (its windows are in the model; the
 recording is not kept) and a new recording with an effect drawn from benchmarks/blind_effects.py, with none, or with a
 change of the wrench only. What was drawn goes to a folder of its own, which `run` is not told. oracle: what a model
-gains that is given the true mechanism, driver and form. run and oracle go on where they were stopped; results and truth
-of a number are JSON files NNN.json.
+gains that is given the true mechanism, driver and form. removed: like run, on the recordings with an effect of the
+library, each traced without the mechanism that acts in it: it must come back as unknown. run, oracle and removed go on
+where they were stopped; results and truth of a number are JSON files NNN.json.
 """
 
 from __future__ import annotations
@@ -101,6 +103,20 @@ def oracle(options: argparse.Namespace) -> None:
     apart(options.data, options.truth)
     todo = [(path, options.data) for path in sorted(options.truth.glob("*.json"))]
     _all(_oracle_kept, [call for call in todo if "oracle_gain" not in json.loads(call[0].read_text())], options.cores)
+
+
+def removed(options: argparse.Namespace) -> None:
+    """Trace every recording with an effect of the library without that mechanism."""
+    apart(options.out, options.truth)
+    options.out.mkdir(parents=True, exist_ok=True)
+    told = {path.stem: json.loads(path.read_text()) for path in sorted(options.truth.glob("*.json"))}
+    acting = {name: truth["names"][0] for name, truth in told.items() if truth["group"] == "library"}
+    todo = [
+        (name, argparse.Namespace(**{**vars(options), "without": mechanism}))
+        for name, mechanism in acting.items()
+        if (options.data / name / MODEL).exists() and not (options.out / f"{name}.json").exists()
+    ]
+    _all(_trace_kept, todo, options.cores)
 
 
 def score(options: argparse.Namespace) -> None:
@@ -279,6 +295,8 @@ def _parser() -> argparse.ArgumentParser:
     command = _command(commands, "run", run, data="recordings", out="verdicts")
     command.add_argument("--alpha", type=float, default=0.01)
     command.add_argument("--without", metavar="MECHANISM", help="take it out of the library")
+    command = _command(commands, "removed", removed, data="recordings", truth="truth", out="verdicts")
+    command.add_argument("--alpha", type=float, default=0.01)
     _command(commands, "oracle", oracle, data="recordings", truth="truth")
     command = _command(commands, "score", score, results="verdicts", truth="truth")
     command.add_argument("--json", type=Path)
