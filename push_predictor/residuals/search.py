@@ -12,7 +12,7 @@ import numpy as np
 from push_predictor.models.forms import Form
 from push_predictor.residuals.baseline import Baseline, difference
 from push_predictor.residuals.candidates import Candidate
-from push_predictor.residuals.drivers import CONSTANT, LOCAL, STANDING
+from push_predictor.residuals.drivers import CONSTANT, HEADINGS, LOCAL
 from push_predictor.residuals.evidence import Evidence
 from push_predictor.residuals.forms_choice import best_form
 from push_predictor.residuals.inputs_basis import InputsBasis, Kind, inputs_of
@@ -22,6 +22,11 @@ from push_predictor.residuals.selection import Judged, fit, judge
 from push_predictor.types import Array
 
 MOST_TERMS = 3
+OWN = 2  # rank of what lies in the base's own inputs, after what is driven (0) and what is local to a push (1)
+DWARFED = (
+    12.0  # ratio of gains; an effect that grows from nothing is at most ten times as large in the mean as about it
+)
+NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that stands in body or world does not grow with them
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_FORMED = 12  # of the labels, those that are tried in every form
 MOST_NAMED = 5  # mechanisms along the driver, best first, that are tried as its name
@@ -77,9 +82,10 @@ def search(
     while True:
         screened = hunt.screened(z)
         first = first or screened
-        found = hunt.stage([k for k in range(len(candidates)) if screened.p_value[k] <= alpha])
+        found = [k for k in range(len(candidates)) if screened.p_value[k] <= alpha]
         if not found or len(terms) == most_terms:
             return Search(tuple(terms), tuple(candidates), first, screened, z)
+        found = hunt.stage(found, screened, z)
         terms.append(hunt.term(found, screened, z, {term.best.covariate for term in terms}))
         z = hunt.taken_out(terms[-1], z)
 
@@ -141,10 +147,22 @@ class _Hunt:
             return difference(raw, self.training[id(candidate)])
         return unit_scores(*raw).padded(next((len(there.rows) for there, _ in self.training.values()), 0))
 
-    def stage(self, found: list[int]) -> list[int]:
-        """Of what was found, that which goes first: a refit of the base makes up for what lies in its own inputs."""
+    def stage(self, found: list[int], screened: Screened, z: Array) -> list[int]:
+        """Of what was found, that which goes first: a refit of the base makes up for what lies in its own inputs.
+
+        Unless that is so much larger that what seems driven will be what its first order leaves over.
+        """
         ranks = [self._rank(self.candidates[k]) for k in found]
-        return [k for k, rank in zip(found, ranks, strict=True) if rank == min(ranks)]
+        by_rank = {rank: [k for k, r in zip(found, ranks, strict=True) if r == rank] for rank in sorted(set(ranks))}
+        first = by_rank[min(ranks)]
+        if min(ranks) == OWN or OWN not in by_rank:
+            return first
+        gains = [self._gain_of_best(each, screened, z) for each in (first, by_rank[OWN])]
+        return by_rank[OWN] if gains[1] > DWARFED * max(gains[0], 0.0) else first
+
+    def _gain_of_best(self, found: list[int], screened: Screened, z: Array) -> float:
+        best = self.candidates[max(found, key=lambda k: screened.statistic[k])]
+        return self._judge([best], best.kind, z)[0].gain
 
     def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> Term:
         """The best of what was found, named. used: drivers of earlier terms, preferred where they do as well."""
@@ -173,7 +191,7 @@ class _Hunt:
         """Mechanisms whose constant effect, which no base can have, was found and found to be driven by something."""
         labels = [(self.candidates[k].mechanism, self.candidates[k]) for k in found]
         constant = {name for name, c in labels if name is not None and _is_constant(c)}
-        return constant & {name for name, c in labels if name is not None and c.covariate not in (*STANDING, *LOCAL)}
+        return constant & {name for name, c in labels if name is not None and c.covariate not in NOT_GROWING}
 
     def _not_constant(self, found: list[int]) -> list[int]:
         """Without the constant effects of mechanisms that something drives: they are part of what is driven."""
@@ -184,7 +202,7 @@ class _Hunt:
         if candidate.covariate in LOCAL:
             return 1
         own = candidate.kind == "constant" or (candidate.kind == "speed" and self.basis.knows_speed)
-        return 2 if own else 0
+        return OWN if own else 0
 
     def _case(self, judged: Judged, z: Array) -> Case:
         return Case(z, inputs_of(judged.candidate.kind, self.basis), self.evidence.block)
