@@ -36,14 +36,21 @@ class Detectable:
 def minimum_detectable(
     found: Search, evidence: Evidence, basis: InputsBasis, alpha: float, baseline: Baseline | None = None
 ) -> list[Detectable]:
-    """For every mechanism: the size of a constant effect, then that along the strongest driver, where one varies."""
+    """For every mechanism: the size of a constant effect, then that along the strongest driver, where one varies.
+
+    What would have to be larger than any rig has it is left out: no such effect would have been found.
+    """
     ordered = sorted(zip(found.first.statistic, found.candidates, strict=True), key=lambda pair: -pair[0])
     driven = [c for _, c in ordered if c.kind != "constant" and c.form.name == "linear"]
     strongest = driven[0].covariate if driven else None
     chosen = [c for c in found.candidates if c.mechanism is not None and _wanted(c, strongest)]
     threshold = found.first.threshold(alpha)
     sizes = [(c, _size(c, found.left, evidence, basis, threshold, baseline)) for c in chosen]
-    return [Detectable(str(c.mechanism), c.covariate, value, _unit(c)) for c, value in sizes if np.isfinite(value)]
+    return [
+        Detectable(str(c.mechanism), c.covariate, value, _unit(c))
+        for c, value in sizes
+        if mechanism_named(str(c.mechanism)).plausible(np.array([[value]]))  # larger ones no rig has
+    ]
 
 
 def detectable_json(sizes: list[Detectable]) -> dict[str, Mapping[str, object]]:
@@ -51,6 +58,8 @@ def detectable_json(sizes: list[Detectable]) -> dict[str, Mapping[str, object]]:
     told: dict[str, Mapping[str, object]] = {}
     for size in sizes:
         entry = {"value": size.value, "unit": size.unit, "covariate": size.covariate}
+        if size.mechanism in told:
+            entry["per"] = f"standard deviation of {size.covariate}"
         told[size.mechanism] = {**told[size.mechanism], "driven": entry} if size.mechanism in told else entry
     return told
 

@@ -161,8 +161,8 @@ class _Hunt:
         return by_rank[OWN] if gains[1] > DWARFED * max(gains[0], 0.0) else first
 
     def _gain_of_best(self, found: list[int], screened: Screened, z: Array) -> float:
-        best = self.candidates[max(found, key=lambda k: screened.statistic[k])]
-        return self._judge([best], best.kind, z)[0].gain
+        best = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_NAMED]
+        return max(self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best)
 
     def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> Term:
         """The best of what was found, named. used: drivers of earlier terms, preferred where they do as well."""

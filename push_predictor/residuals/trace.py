@@ -35,6 +35,7 @@ from push_predictor.residuals.wrench import WRENCH_BIAS, WrenchFinding, wrench_e
 
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
+BADLY_OFF = 0.5  # excess of the squared residuals from which a correction of the measurement must show in them
 Watch = Callable[[str, float], None]
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 CUT_AGAIN = (
@@ -84,7 +85,7 @@ def trace(
     training, physics = model.training, physics_of(model)
     watch("measurement", 0.1)
     measured = measurement_errors(context.analysis, training, loaded.rig, context.share("measurement"), seed)
-    if measured is not None and measured.errors:
+    if measured is not None and measured.errors and _puts_right(context, measured):
         return _of_measurement(context, measured)
     watch("motion", 0.15)
     motion = motion_effects(model, context.analysis, context.share("motion"), context.covariates, seed)
@@ -124,6 +125,25 @@ class _Context:
         return SHARES[channel] * self.alpha
 
 
+def _puts_right(context: _Context, measured: MeasurementFinding) -> bool:
+    """Whether the model, where it is badly off, is much less so once the measurement is corrected.
+
+    A tip that gives way opens the gap as a clock that is late does; but no correction brings the predictions back.
+    Where there are no streams to correct, or the model is hardly off, the gap decides alone.
+    """
+    if context.loaded.recordings is None:
+        return True
+    corrected = _cut_again(context, measured, context.loaded.recordings)
+    before, after = (_excess(context.model, t) for t in (context.analysis, corrected.take(~held_out_rows(corrected))))
+    return before < BADLY_OFF or after < 0.5 * before
+
+
+def _excess(model: PushModel, table: PushTable) -> float:
+    """By how much squared residuals, in units of the prediction, exceed their 1; wild ones count 25."""
+    z = evidence_of(model, table, physics_of(model)).z
+    return float(np.mean(np.minimum(z**2, 25.0))) - 1.0
+
+
 def _of_motion(
     context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
 ) -> Trace:
@@ -132,6 +152,7 @@ def _of_motion(
     after = extend(refit, context.analysis, terms, model) if terms else refit
     added = iter(after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ())
     effects = tuple(_as_seen(t, context) if t.own else next(added) for t in motion.terms)
+    equivalent = motion.equivalent if motion.terms or motion.scatter else _drivers(forces)
     nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
     return Trace(
         verdict=_verdict(motion, forces),
@@ -139,9 +160,9 @@ def _of_motion(
         model=model,
         effects=_told(motion, forces, effects, context),
         terms=effects,
-        equivalent=motion.equivalent,
+        equivalent=equivalent,
         mechanisms=motion.mechanisms,
-        undecided=bool(motion.equivalent),
+        undecided=bool(equivalent),
         analysis=context.analysis,
         residual=motion.residual,
         left=evidence_of(after, context.analysis, physics_of(model)).z,
@@ -180,6 +201,12 @@ def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
     size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
     error = MeasurementError(first.mechanism, first.parameters, first.p_value, first.rivals, size)
     return MeasurementFinding((error,), forces.tested, forces.scatter, forces.against_training)
+
+
+def _drivers(forces: WrenchFinding) -> tuple[str, ...]:
+    """Rivals of what drives the force first."""
+    first = next(iter(forces.effects), None)
+    return () if first is None else tuple(name for name in first.rivals if name != WRENCH_BIAS)
 
 
 def _told(
@@ -293,6 +320,9 @@ def _notes(
         notes.append(
             f"The model lacks, but lacked in training as much, so that it is nothing new: {', '.join(motion.standing)}."
         )
+    if measured is not None and measured.errors:
+        what = ", ".join(error.mechanism for error in measured.errors)
+        notes.append(f"The gap between tip and slider looks like {what}; but that put right, the model is as far off.")
     if measured is None:
         notes.append("The measurement itself could not be judged: these windows have no contact gap or pose.")
     if motion.terms and forces.effects:
