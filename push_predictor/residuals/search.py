@@ -234,15 +234,17 @@ class _Hunt:
         generics = self._generics(driver, known[0].candidate.form if known else None, z)
         left = {id(j): self._left_over(j, generics, z) for j in known[:MOST_NAMED]}
         fitting = [j for j in known[:MOST_NAMED] if left[id(j)] <= MOST_LEFT]
-        if not fitting:
+        if not fitting and generics:
             best = max((self._in_best_form(g, z) for g in generics), key=lambda j: j.gain)
             return best, Naming((driver,), (None,), False, min(left.values(), default=1.0))
+        fitting = fitting or known[:1] or by_gain[:1]  # the last two where the fall-back is not tried
         best = fitting[0]
         mechanisms = open_rivals(best, fitting[1:], self._case(best, z), self.seed)
-        return best, Naming((driver,), tuple(j.candidate.mechanism for j in mechanisms), True, left[id(best)])
+        return best, Naming((driver,), tuple(j.candidate.mechanism for j in mechanisms), True, left.get(id(best), 0.0))
 
     def _left_over(self, mechanism: Judged, generics: list[Candidate], z: Array) -> float:
-        return max(leaves_over(mechanism, generic, self._case(mechanism, z), self.seed) for generic in generics)
+        case = self._case(mechanism, z)
+        return max((leaves_over(mechanism, generic, case, self.seed) for generic in generics), default=0.0)
 
     def _generics(self, driver: str, form: Form | None, z: Array) -> list[Candidate]:
         """The fall-back along a driver: in the form of the mechanism, or in all screening forms of the driver."""
