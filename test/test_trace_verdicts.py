@@ -17,7 +17,9 @@ from push_predictor.residuals.loading import Loaded, cut_anew
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.trace import trace
 from push_predictor.residuals.trace_json import trace_json
+from push_predictor.residuals.wording import worth_sentence
 from push_predictor.residuals.wrench import WrenchEffect, WrenchFinding
+from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.sensors import Faults
@@ -37,8 +39,8 @@ def learnt() -> PushModel:
     return train_model(table, recording.rig, "gp", name="deployed", n_train=min(250, len(table)))
 
 
-def traced(**faults: Any) -> Trace:
-    recording = simulate(replace(spec(2), faults=Faults(**faults)))
+def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
+    recording = simulate(replace(spec(2), changes=changes, faults=Faults(**faults)))
     assert recording.rig is not None
     return trace(learnt(), Loaded(cut_anew([recording], recording.rig), (recording,), recording.rig))
 
@@ -72,3 +74,15 @@ def test_a_soft_tip_is_not_called_a_late_clock() -> None:
     """It opens the gap as a late clock does, but with the clock put right the predictions stay as wrong."""
     found = traced(compliance=2e-3)
     assert found.verdict not in ("none", "measurement")
+
+
+def test_what_lies_in_the_models_own_inputs_is_told_and_left_to_a_refit() -> None:
+    """A slippery rod: every window is other than it was, and the same model trained anew has it."""
+    found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.way), -0.2)))
+    told = trace_json(found)
+    assert (told["verdict"], told["kind"], told["covariates"][0]) == ("effect", "mean", "model_inputs")
+    assert not told["motion_model_changed"] and found.extended is None
+    assert told["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
+    refit, before = (sum(told[model]["nlpd"].values()) for model in ("refit", "before"))
+    assert refit < before
+    assert "training anew" in worth_sentence(found)

@@ -156,7 +156,7 @@ def _of_motion(
     nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
     return Trace(
         verdict=_verdict(motion, forces),
-        kind="mean" if terms else "variance" if motion.scatter else None,
+        kind="mean" if motion.terms else "variance" if motion.scatter else None,
         model=model,
         effects=_told(motion, forces, effects, context),
         terms=effects,

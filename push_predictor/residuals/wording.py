@@ -42,6 +42,10 @@ def worth_sentence(trace: Trace) -> str:
     if not trace.terms:
         return f"The motion model stays as it is; on {pushes} nothing was added to the refit."
     gain = trace.gain_nlpd
+    if gain.low == gain.high == 0.0:  # nothing was added to the refit
+        before, refit = (_nlpd(comparison) for comparison in (trace.held_out.before, trace.held_out.refit))
+        change = f"On {pushes} training anew takes the negative log density from {before} to {refit} nats per window"
+        return f"{change}. What was found lies in the model's own inputs: that is enough, and the model stays as it is."
     change = (
         f"On {pushes} the negative log density changes by {interval(gain)} nats per window against the same model "
         f"refitted without the effect (below zero: better)"
