@@ -156,8 +156,8 @@ def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
 
 
 def _title(verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> str:
-    said = "; ".join(_said(effect) for effect in verdict["effects"]) or "nothing"
-    hidden = f"{truth['mechanism']} {truth['value']:.3g} {_unit(truth['unit'])}"
+    said = "\n    and ".join(_said(effect) for effect in verdict["effects"]) or "nothing"
+    hidden = f"{truth['mechanism']} {truth['value']:.3g} {_unit(truth['unit'])}".strip()
     return (
         f"traced ({verdict['verdict']}): {said}\nhidden, revealed at the end: {hidden} (the simulator's own parameter)"
     )
@@ -168,7 +168,7 @@ def _said(effect: Mapping[str, Any]) -> str:
     size = effect["parameter"]
     if size is None:
         return name
-    return f"{name}, {size['value']:.3g} ({size['low']:.3g} to {size['high']:.3g}) {_unit(size['unit'])}"
+    return f"{name}, {size['value']:.3g} ({size['low']:.3g} to {size['high']:.3g}) {_unit(size['unit'])}".strip()
 
 
 def _unit(unit: str) -> str:
