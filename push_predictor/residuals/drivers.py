@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from push_predictor.models.covariate_range import HEADINGS
 from push_predictor.models.forms import Form
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-HEADINGS = ("slider_heading", "push_heading")
 CATEGORIES = ("edge", "recording")
 PLACE = ("slider_x", "slider_y")
 OUTCOMES = ("normal_force", "tangential_force")  # of the same window: what the push did to the sensor, not a cause

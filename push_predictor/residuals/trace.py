@@ -29,8 +29,9 @@ from push_predictor.residuals.extension import Term, compared, estimate, extend,
 from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
 from push_predictor.residuals.measurement import MeasurementError, MeasurementFinding, measurement_errors
 from push_predictor.residuals.motion import MotionFinding, MotionTerm, motion_effects
+from push_predictor.residuals.notes import CUT_AGAIN, notes_of, notes_of_data
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
-from push_predictor.residuals.split import RULE, digest_of, held_out_rows
+from push_predictor.residuals.split import digest_of, held_out_rows
 from push_predictor.residuals.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
 
 FEWEST_PUSHES = 12
@@ -38,10 +39,6 @@ SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every k
 BADLY_OFF = 0.5  # excess of the squared residuals from which a correction of the measurement must show in them
 Watch = Callable[[str, float], None]
 NO_GAIN = Gain(0.0, 0.0, 0.0)
-CUT_AGAIN = (
-    "The streams were put right and the windows cut again: `after` is the deployed model, unchanged, on the "
-    "held-out pushes of the corrected recordings."
-)
 
 
 def no_watch(stage: str, done: float) -> None:
@@ -179,7 +176,7 @@ def _of_motion(
         remaining=motion.remaining,
         experiment=motion.experiment,
         alpha=context.alpha,
-        notes=_notes(context, motion, measured, forces),
+        notes=notes_of(context.loaded, motion, measured, forces),
     )
 
 
@@ -277,7 +274,7 @@ def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
         remaining=None,
         experiment=(),
         alpha=context.alpha,
-        notes=(NO_STREAMS if corrected is None else CUT_AGAIN, *_of_the_data(context)),
+        notes=(NO_STREAMS if corrected is None else CUT_AGAIN, *notes_of_data(context.loaded)),
     )
 
 
@@ -299,41 +296,6 @@ def _held_out(context: _Context, model: PushModel, refit: PushModel, after: Push
         compared(after, held, mean),
         digest_of(before),
     )
-
-
-def _notes(
-    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
-) -> tuple[str, ...]:
-    notes = [*_of_the_data(context)]
-    if motion.deviation is not None:
-        told = ", ".join(f"{value:.2f}" for value in motion.deviation)
-        notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
-    if any(term.own for term in motion.terms):
-        what = ", ".join(f"{t.mechanism or 'the unknown one'} by {t.covariate}" for t in motion.terms if t.own)
-        notes.append(f"In the model's own inputs, so that a model trained anew on such pushes has it: {what}.")
-    if motion.entangled:
-        notes.append(
-            f"Not tried, because in these pushes they go with contact, angle and speed: {', '.join(motion.entangled)}. "
-            "Push in an order that is mixed."
-        )
-    if motion.standing:
-        notes.append(
-            f"The model lacks, but lacked in training as much, so that it is nothing new: {', '.join(motion.standing)}."
-        )
-    if measured is not None and measured.errors:
-        what = ", ".join(error.mechanism for error in measured.errors)
-        notes.append(f"The gap between tip and slider looks like {what}; but that put right, the model is as far off.")
-    if measured is None:
-        notes.append("The measurement itself could not be judged: these windows have no contact gap or pose.")
-    if motion.terms and forces.effects:
-        what = ", ".join(f"{e.mechanism} by {e.covariate}" for e in forces.effects)
-        notes.append(f"On the force's channel, beside: {what}.")
-    return tuple(notes)
-
-
-def _of_the_data(context: _Context) -> tuple[str, ...]:
-    left_out = (f"{name} was left out: {why}." for name, why in context.loaded.left_out.items())
-    return (f"Split: {RULE}. Windows of one push stay together.", *left_out)
 
 
 def _family_wise(tested: Sequence[Tested], channel: str) -> tuple[Tested, ...]:
