@@ -14,11 +14,14 @@ from push_predictor.models.kernels import KernelChoice
 from push_predictor.models.left_out import left_out, moments_left_out
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.train import train_model
-from push_predictor.models.vhgp import VHGP, conditioned, fit_vhgp
+from push_predictor.models.vhgp import VHGP, fit_vhgp
+from push_predictor.models.vhgp_bound import VhgpProblem
+from push_predictor.models.vhgp_inner import maximise_over_noise
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 BLOCKS = 6
+TO = 1e-2  # nats, to which the noise of rows left over is solved for
 FIELDS = ("mean", "variance", "log_noise_mean", "log_noise_variance")
 
 
@@ -28,6 +31,18 @@ def rows(n: int, seed: int = 0) -> tuple[Array, Array, IntArray]:
     inputs = rng.standard_normal((n, 2))
     noise = np.exp(-1.5 + 0.8 * inputs[:, 0]) * rng.standard_normal(n)
     return inputs, np.sin(inputs[:, 0]) + 0.5 * inputs[:, 1] + noise, np.arange(n) // 5 % BLOCKS
+
+
+def conditioned(regression: GaussianProcess | VHGP, inputs: Array, outputs: Array) -> GaussianProcess | VHGP:
+    """A regression's hyperparameters on other rows; the noise process of a VHGP is solved for on them.
+
+    Site precisions of other rows do not do: the noise's mean is a sum over all rows that nearly cancel.
+    """
+    if isinstance(regression, GaussianProcess):
+        return GaussianProcess(inputs, outputs, regression.parameters)
+    parameters = regression.parameters
+    bound = maximise_over_noise(VhgpProblem.of(inputs, outputs, parameters), None, TO)
+    return VHGP(inputs, outputs, parameters, bound.tied_precisions)
 
 
 def refitted(regression: GaussianProcess | VHGP, block: IntArray) -> dict[str, Array]:

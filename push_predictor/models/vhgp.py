@@ -10,17 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.gp import GaussianProcess, GpParameters, check_rows, fit_gp
+from push_predictor.models.gp import GpParameters, check_rows, fit_gp
 from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.posterior import KernelPosterior
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.vhgp_bound import Bound, VhgpProblem
 from push_predictor.models.vhgp_fit import maximise_bound
-from push_predictor.models.vhgp_inner import maximise_over_noise
 from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
-
-CONDITIONED = 1e-2  # nats, to which the noise of rows left over is solved for
 
 
 class VHGP:
@@ -69,16 +66,3 @@ def fit_vhgp(
     check_rows(inputs, outputs)
     near = start or fit_gp(inputs, outputs, choice).parameters
     return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations))
-
-
-def conditioned(regression: GaussianProcess | VHGP, inputs: Array, outputs: Array) -> GaussianProcess | VHGP:
-    """A regression's hyperparameters on other rows; the noise process of a VHGP is solved for on them.
-
-    Site precisions of other rows do not do: the noise's mean is a sum over all rows that nearly cancel. Raises
-    TrainingError when the rows do not match or are not finite.
-    """
-    if isinstance(regression, GaussianProcess):
-        return GaussianProcess(inputs, outputs, regression.parameters)
-    parameters = regression.parameters
-    bound = maximise_over_noise(VhgpProblem.of(check_rows(inputs, outputs), outputs, parameters), None, CONDITIONED)
-    return VHGP(inputs, outputs, parameters, bound.tied_precisions)

@@ -117,11 +117,6 @@ def sums_by(block: IntArray, values: Array) -> Array:
     return sums
 
 
-def without(values: Array, basis: Array) -> Array:
-    """Values (n, ...) less their least-squares fit by the basis (n, m)."""
-    return Without(basis)(values)
-
-
 class Without:
     """Takes a basis (n, m) out of values, by least squares."""
 

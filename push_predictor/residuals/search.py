@@ -23,9 +23,7 @@ from push_predictor.types import Array
 
 MOST_TERMS = 3
 OWN = 2  # rank of what lies in the base's own inputs, after what is driven (0) and what is local to a push (1)
-DWARFED = (
-    12.0  # ratio of gains; an effect that grows from nothing is at most ten times as large in the mean as about it
-)
+DWARFED = 12.0  # ratio of gains; what grows from nothing is at most ten times as large in the mean as about it
 NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that stands in body or world does not grow with them
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_FORMED = 12  # of the labels, those that are tried in every form

@@ -18,7 +18,6 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5
 RIDGE = 1e-3  # share of a column's own square, for columns that nearly coincide
-DRAWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +39,6 @@ def judge(candidates: Sequence[Candidate], z: Array, basis: Array, block: IntArr
     left = out(z)
     judged = [Judged(c, gains_of(left, out(c.columns), block)) for c in candidates]
     return sorted(judged, key=lambda j: -j.gain)
-
-
-def rivals(judged: Sequence[Judged], seed: int = 0) -> list[Judged]:
-    """Those whose gain is not surely below that of the best: 95 % of paired draws of blocks, the best first."""
-    best = judged[0]
-    return [j for j in judged if j is best or not surely_better(best, j, seed=seed)]
-
-
-def surely_better(one: Judged, other: Judged, level: float = 0.05, seed: int = 0) -> bool:
-    """Whether one gains more than the other in all but `level` of paired draws of blocks."""
-    blocks = len(one.gains)
-    weights = np.random.default_rng(seed).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=DRAWS)
-    return float(np.quantile(weights @ (one.gains - other.gains), level)) > 0.0
 
 
 def folds_of(block: IntArray) -> IntArray:

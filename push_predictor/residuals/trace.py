@@ -19,7 +19,6 @@ from push_predictor.models.effects import Effect
 from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.corrections import NO_STREAMS, correct
 from push_predictor.residuals.drivers import CONSTANT
@@ -82,15 +81,19 @@ def trace(
     training, physics = model.training, physics_of(model)
     watch("measurement", 0.1)
     measured = measurement_errors(context.analysis, training, loaded.rig, context.share("measurement"), seed)
-    if measured is not None and measured.errors and _puts_right(context, measured):
-        return _of_measurement(context, measured)
+    if measured is not None and measured.errors:
+        corrected = _cut_again(context, measured)
+        if _puts_right(context, corrected):
+            return _of_measurement(context, measured, corrected)
     watch("motion", 0.15)
     motion = motion_effects(model, context.analysis, context.share("motion"), context.covariates, seed)
     watch("force", 0.6)
     forces = wrench_effects(context.analysis, training, physics, context.share("wrench"), seed)
     watch("extended model", 0.7)
     biased = _biased(forces) if not motion.terms and not motion.scatter else None
-    return _of_motion(context, motion, measured, forces) if biased is None else _of_measurement(context, biased)
+    if biased is not None:
+        return _of_measurement(context, biased, _cut_again(context, biased))
+    return _of_motion(context, motion, measured, forces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +125,14 @@ class _Context:
         return SHARES[channel] * self.alpha
 
 
-def _puts_right(context: _Context, measured: MeasurementFinding) -> bool:
+def _puts_right(context: _Context, corrected: PushTable | None) -> bool:
     """Whether the model, where it is badly off, is much less so once the measurement is corrected.
 
     A tip that gives way opens the gap as a clock that is late does; but no correction brings the predictions back.
     Where there are no streams to correct, or the model is hardly off, the gap decides alone.
     """
-    if context.loaded.recordings is None:
+    if corrected is None:
         return True
-    corrected = _cut_again(context, measured, context.loaded.recordings)
     before, after = (_excess(context.model, t) for t in (context.analysis, corrected.take(~held_out_rows(corrected))))
     return before < BADLY_OFF or after < 0.5 * before
 
@@ -238,11 +240,9 @@ def _as_seen(term: MotionTerm, context: _Context) -> Effect:
     return estimate(evidence, [_as_term(term)])[0][0]
 
 
-def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
+def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: PushTable | None) -> Trace:
     """The error told and, where there are streams, put right in them: the same pushes cut again, the model as it is."""
     model = context.model
-    recordings = context.loaded.recordings
-    corrected = None if recordings is None else _cut_again(context, measured, recordings)
     refit = refit_base(model, context.analysis)
     held = context.held_out if corrected is None else corrected.take(held_out_rows(corrected))
     left = evidence_of(model, context.analysis if corrected is None else corrected.take(~held_out_rows(corrected)),
@@ -278,9 +278,11 @@ def _of_measurement(context: _Context, measured: MeasurementFinding) -> Trace:
     )
 
 
-def _cut_again(context: _Context, measured: MeasurementFinding, recordings: Sequence[Recording]) -> PushTable:
-    """The table of recordings whose streams were put right, error by error."""
-    righted = list(recordings)
+def _cut_again(context: _Context, measured: MeasurementFinding) -> PushTable | None:
+    """The table of the recordings with their streams put right, error by error; None where there are no recordings."""
+    if context.loaded.recordings is None:
+        return None
+    righted = list(context.loaded.recordings)
     for error in measured.errors:
         righted = [correct(recording, error.mechanism, error.values) for recording in righted]
     return cut_anew(righted, context.loaded.rig, window_options(context.model))
