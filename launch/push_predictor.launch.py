@@ -1,11 +1,13 @@
-"""predict_server, push_replay and push_validator together.
+"""predict_server, push_replay and push_validator together, and RViz2 if wanted.
 
 ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
+rviz:=true opens RViz2 beside them (docs/visualisation.md).
 """
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
@@ -14,7 +16,7 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 
 ARGUMENTS = (
-    ("namespace", "", "Namespace of all three nodes."),
+    ("namespace", "", "Namespace of all nodes."),
     ("params_file", "", "YAML file with parameters, such as those in config/; other arguments that are given win."),
     ("use_sim_time", "false", "Nodes take /clock, which the replay publishes, for their time."),
     ("log_level", "info", "debug, info, warn, error or fatal."),
@@ -25,6 +27,8 @@ ARGUMENTS = (
     ("rate", "", "Recorded seconds per second; empty: 1, or what params_file says."),
     ("output", "", "Folder for the validator's results; empty: nothing is written."),
     ("rig", "", "push_rig YAML file, where the recording holds none."),
+    ("rviz", "false", "Open RViz2 with the configuration of this package: slider, pusher, windows from above."),
+    ("rviz_config", "", "RViz configuration file; empty: config/push_predictor.rviz as installed."),
 )
 
 
@@ -49,6 +53,8 @@ def _nodes(context: LaunchContext) -> list[Node]:
     ]
     if recording:
         nodes.append(_node("push_replay", "push_replay", given, _replay(given, recording)))
+    if _true(given["rviz"]):
+        nodes.append(_rviz(given))
     return nodes
 
 
@@ -81,10 +87,28 @@ def _node(executable: str, name: str, given: dict[str, str], parameters: dict[st
     )
 
 
+def _rviz(given: dict[str, str]) -> Node:
+    share = Path(__file__).resolve().parents[1]  # this file is installed beside config/
+    config = _path(given["rviz_config"]) if given["rviz_config"] else str(share / "config" / "push_predictor.rviz")
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        name="rviz2",
+        namespace=given["namespace"],  # its topics are relative
+        parameters=[_switch(given, "use_sim_time", default=False)],
+        arguments=["-d", config],
+        output="screen",
+    )
+
+
 def _switch(given: dict[str, str], name: str, default: bool) -> dict[str, bool]:
     """The parameter if it is not at its default, so that params_file may say otherwise."""
-    value = given[name].lower() in ("true", "1", "yes")
+    value = _true(given[name])
     return {} if value == default else {name: value}
+
+
+def _true(text: str) -> bool:
+    return text.lower() in ("true", "1", "yes")
 
 
 def _path(text: str) -> str:

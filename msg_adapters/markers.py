@@ -1,4 +1,8 @@
-"""One window as visualization_msgs/MarkerArray: what was predicted beside what was observed."""
+"""One window as visualization_msgs/MarkerArray: what was predicted beside what was observed (docs/visualisation.md).
+
+A window moves a slider of 90 mm by some millimetres and the model is unsure of tenths of one, which at the scale of
+the slider nobody sees. So what concerns the error is drawn twice: as large as it is, and MAGNIFICATION times larger.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +18,18 @@ from push_predictor.geometry.frames import to_world
 from push_predictor.types import Array
 
 CHI2_95_OF_TWO = 5.991464547107979  # -2 log(0.05): the 95 % quantile of chi-squared with two degrees of freedom
+NORMAL_95 = 1.959963984540054  # a normal variable lies within so many standard deviations in 95 % of all cases
+MAGNIFICATION = 20.0
 ELLIPSE_POINTS = 49
-LINE_WIDTH = 0.001  # m
-CENTRE_DIAMETER = 0.004  # m
-GREY, BLUE, ORANGE = (0.6, 0.6, 0.6, 0.6), (0.1, 0.4, 0.9, 1.0), (0.95, 0.5, 0.1, 1.0)
+LINE_WIDTH, FINE_WIDTH = 0.0008, 0.0001  # m
+CENTRE_DIAMETER = 0.0003  # m; of the dot that shows it magnified: MAGNIFIED_DIAMETER
+MAGNIFIED_DIAMETER = 0.004  # m
+DISC_HEIGHT = 0.001  # m
+ARROW_LENGTH, ARROW_WIDTHS = 0.02, (0.002, 0.006, 0.008)  # m; widths of shaft and head, length of the head
+DIAL = (1.06, 1.14, 1.02, 1.18)  # radii of the band, then of the observed stroke, in units of the outline's reach
+LABEL_PLACE, LABEL_HEIGHT = 1.4, 0.005  # above the centre in units of the outline's reach; m
+GREY, BLUE, ORANGE = (0.65, 0.65, 0.65, 0.8), (0.3, 0.6, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0)
+WHITE, RED = (0.9, 0.9, 0.9, 0.8), (1.0, 0.35, 0.3, 1.0)
 
 
 @dataclass(frozen=True)
@@ -27,14 +39,33 @@ class _Sheet:
     frame_id: str
     stamp_ns: int
 
-    def line(self, name: str, points: Array, colour: tuple[float, ...]) -> Marker:
-        marker = self._marker(name, Marker.LINE_STRIP, LINE_WIDTH, colour)
+    def line(self, name: str, points: Array, colour: tuple[float, ...], width: float = LINE_WIDTH) -> Marker:
+        marker = self._marker(name, Marker.LINE_STRIP, width, colour)
         marker.points = [Point(x=float(x), y=float(y)) for x, y in points]
         return marker
 
-    def ball(self, name: str, centre: Array, colour: tuple[float, ...]) -> Marker:
-        marker = self._marker(name, Marker.SPHERE, CENTRE_DIAMETER, colour)
-        marker.pose.position.x, marker.pose.position.y = float(centre[0]), float(centre[1])
+    def ball(self, name: str, centre: Array, colour: tuple[float, ...], diameter: float = CENTRE_DIAMETER) -> Marker:
+        return self._at(centre, self._marker(name, Marker.SPHERE, diameter, colour))
+
+    def disc(self, name: str, centre: Array, radius: float, colour: tuple[float, ...]) -> Marker:
+        marker = self._at(centre, self._marker(name, Marker.CYLINDER, 2.0 * radius, colour))
+        marker.scale.z = DISC_HEIGHT
+        return marker
+
+    def arrow(self, name: str, tail: Array, head: Array, colour: tuple[float, ...]) -> Marker:
+        marker = self._marker(name, Marker.ARROW, 0.0, colour)
+        marker.scale.x, marker.scale.y, marker.scale.z = ARROW_WIDTHS
+        marker.points = [Point(x=float(x), y=float(y)) for x, y in (tail, head)]
+        return marker
+
+    def text(self, name: str, place: Array, text: str, colour: tuple[float, ...]) -> Marker:
+        marker = self._at(place, self._marker(name, Marker.TEXT_VIEW_FACING, LABEL_HEIGHT, colour))
+        marker.text = text
+        return marker
+
+    @staticmethod
+    def _at(place: Array, marker: Marker) -> Marker:
+        marker.pose.position.x, marker.pose.position.y = float(place[0]), float(place[1])
         return marker
 
     def _marker(self, name: str, kind: int, size: float, colour: tuple[float, ...]) -> Marker:
@@ -67,11 +98,68 @@ def prediction_markers(
         markers=[
             sheet.line("start_outline", to_world(closed, slider_start), GREY),
             sheet.line("predicted_outline", to_world(closed, predicted_pose), BLUE),
-            sheet.line("predicted_ellipse", confidence_ellipse(predicted_pose[:2], covariance_world_xy), BLUE),
+            sheet.line(
+                "predicted_ellipse", confidence_ellipse(predicted_pose[:2], covariance_world_xy), BLUE, FINE_WIDTH
+            ),
             sheet.line("observed_outline", to_world(closed, observed_pose), ORANGE),
             sheet.ball("observed_centre", observed_pose, ORANGE),
         ]
     )
+
+
+def push_markers(tip: Array, radius: float, heading: float, frame_id: str, stamp: int) -> MarkerArray:
+    """The pusher as a disc, and an arrow that ends at its back and points to where it pushes.
+
+    tip: (2,) centre of the disc, m; radius m; heading of the push in `frame_id`, rad; stamp: ns. The arrow's length
+    says nothing.
+    """
+    sheet, ahead = _Sheet(frame_id, stamp), np.array([np.cos(heading), np.sin(heading)])
+    back = tip - radius * ahead
+    return MarkerArray(
+        markers=[
+            sheet.disc("pusher", tip, radius, WHITE),
+            sheet.arrow("push", back - ARROW_LENGTH * ahead, back, WHITE),
+        ]
+    )
+
+
+def magnified_markers(
+    predicted_pose: Array,
+    covariance_world: Array,
+    observed_pose: Array,
+    reach: float,
+    ahead: float,
+    frame_id: str,
+    stamp: int,
+) -> MarkerArray:
+    """Where the outcome fell in the prediction, all MAGNIFICATION times larger than it is.
+
+    Around the predicted centre its 95 % ellipse, and a dot for the observed centre. Outside the outline a dial: its
+    middle, in the direction `ahead` (rad), stands for the predicted heading, its band for 95 % of the headings, a
+    stroke for the observed one. predicted_pose, observed_pose (3,): x, y m, heading rad; covariance_world (3, 3) of
+    x, y, heading along the axes of `frame_id`; reach: the outline's largest distance from its centre, m; stamp: ns.
+    """
+    sheet, centre = _Sheet(frame_id, stamp), predicted_pose[:2]
+    ellipse = confidence_ellipse(centre, MAGNIFICATION**2 * covariance_world[:2, :2])
+    observed = centre + MAGNIFICATION * (observed_pose[:2] - centre)
+    spread = min(MAGNIFICATION * NORMAL_95 * float(np.sqrt(max(covariance_world[2, 2], 0.0))), np.pi)
+    turned = ahead + np.clip(MAGNIFICATION * _turn(observed_pose[2] - predicted_pose[2]), -np.pi, np.pi)
+    low, high, begin, end = reach * np.array(DIAL)
+    stroke = _polar(centre, np.array([begin, end]), np.array([turned, turned]))
+    return MarkerArray(
+        markers=[
+            sheet.line("magnified_ellipse", ellipse, BLUE),
+            sheet.ball("magnified_observed", observed, ORANGE, MAGNIFIED_DIAMETER),
+            sheet.line("magnified_heading", _band(centre, low, high, ahead, spread), BLUE),
+            sheet.line("magnified_observed_heading", stroke, ORANGE),
+        ]
+    )
+
+
+def label_marker(text: str, centre: Array, reach: float, outside: bool, frame_id: str, stamp: int) -> MarkerArray:
+    """Text above a slider at centre (2,), m, whose outline reaches that far; red if the outcome lies outside."""
+    place = centre + np.array([0.0, LABEL_PLACE * reach])
+    return MarkerArray(markers=[_Sheet(frame_id, stamp).text("label", place, text, RED if outside else WHITE)])
 
 
 def delete_markers(frame_id: str, stamp: int) -> MarkerArray:
@@ -87,3 +175,20 @@ def confidence_ellipse(centre: Array, covariance: Array) -> Array:
     variance, axes = np.linalg.eigh(covariance)
     radius = np.sqrt(CHI2_95_OF_TWO * np.maximum(variance, 0.0))
     return np.asarray(centre + (radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)) @ axes.T)
+
+
+def _band(centre: Array, low: float, high: float, middle: float, spread: float) -> Array:
+    """The closed border of the part of a ring between two radii within `spread` of an angle."""
+    there = np.linspace(middle - spread, middle + spread, ELLIPSE_POINTS)
+    angle = np.concatenate([there, there[::-1], there[:1]])
+    radius = np.concatenate([np.full(len(there), low), np.full(len(there), high), [low]])
+    return _polar(centre, radius, angle)
+
+
+def _polar(centre: Array, radius: Array, angle: Array) -> Array:
+    return np.asarray(centre + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def _turn(angle: float) -> float:
+    """The same turn in [-pi, pi)."""
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

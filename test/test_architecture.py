@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-LAYERS = ["geometry", "recordings", "models", "evaluation", "residuals", "nodes"]
+LAYERS = ["geometry", "recordings", "models", "planning", "evaluation", "residuals", "nodes"]
 ROS = ("rclpy", "rcl_interfaces", "push_predictor_interfaces", "launch", "ament_index_python")
 
 

@@ -85,6 +85,8 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "rate",
         "output",
         "rig",
+        "rviz",
+        "rviz_config",
     ]
     assert sorted(declared) == sorted(wanted)
     for kwargs in declared.values():
@@ -154,5 +156,18 @@ def test_a_parameter_file_holds_where_no_argument_is_given(launch_file):
     assert parameters(nodes(launch_file, autostart="false")["predict_server"]) == {"autostart": False}
 
 
+def test_rviz_is_opened_only_if_wanted_with_the_configuration_beside_the_launch_file(launch_file):
+    assert "rviz2" not in nodes(launch_file, bag="/b")
+    started = nodes(launch_file, bag="/b", rviz="true", namespace="cell", use_sim_time="true")
+    assert {"predict_server", "push_validator", "push_replay", "rviz2"} == started.keys()
+    rviz = started["rviz2"]
+    assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
+    flag, config = rviz["arguments"]
+    assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()
+    own = nodes(launch_file, rviz="1", rviz_config="own.rviz")["rviz2"]
+    assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
+
+
 def test_the_launch_file_is_installed():
     assert 'glob("launch/*.launch.py")' in (REPOSITORY / "setup.py").read_text()
+    assert 'glob("config/*")' in (REPOSITORY / "setup.py").read_text()

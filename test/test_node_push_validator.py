@@ -161,7 +161,7 @@ def test_the_ellipse_of_a_window_lies_around_its_predicted_centre(watched, model
     assert len(heard.markers) == len(windows)
     for array in heard.markers:
         markers = {marker.ns: marker for marker in array.markers}
-        assert len(markers) == len(array.markers) == 5
+        assert len(markers) == len(array.markers) == 12
         stamp = array.markers[0].header.stamp
         k = by_end[stamp.sec * 10**9 + stamp.nanosec]
         for marker in array.markers:

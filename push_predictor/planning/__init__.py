@@ -1,0 +1,1 @@
+"""What a planner builds on single predictions: poses in the world, sequences of pushes, the choice among them."""
