@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.types import Array
 
 
@@ -25,14 +25,20 @@ class Touch:
 
 
 def touches(outline: Outline, sliders: Array, tips: Array, velocities: Array) -> Touch:
-    """Tips at (n, 2) m that drive with velocities (n, 2) m/s at sliders (n, 3: x, y m, heading rad), in one frame."""
+    """Tips at (n, 2) m that drive with velocities (n, 2) m/s at sliders (n, 3: x, y m, heading rad), in one frame.
+
+    A tip at a corner touches the edge that faces it more squarely, as in a window, unless it pushes only the other one.
+    """
     nearest = outline.project(to_body(tips, sliders))
-    inward = rotate(outline.inward_normal(nearest.contact), sliders[:, 2])
-    across = inward[:, 0] * velocities[:, 1] - inward[:, 1] * velocities[:, 0]
-    angle = np.arctan2(across, np.sum(inward * velocities, axis=1))
+    ahead = rotate(velocities, -sliders[:, 2])
+    contact = nearest.contact
+    if nearest.at_vertex.any():
+        contact = contact.copy()
+        contact[nearest.at_vertex] = _at_corners(outline, nearest, ahead)
     speed = np.hypot(velocities[:, 0], velocities[:, 1])
     heading = np.arctan2(velocities[:, 1], velocities[:, 0])
-    return Touch(np.column_stack([speed, nearest.contact, angle]), heading, nearest.distance)
+    angle = _angle(outline.inward_normal(contact), ahead)
+    return Touch(np.column_stack([speed, contact, angle]), heading, nearest.distance)
 
 
 def displaced(sliders: Array, heading: Array, displacement: Array) -> Array:
@@ -46,3 +52,23 @@ def covariance_in_world(covariance: Array, heading: Array) -> Array:
     turn[:, :2, :2] = np.swapaxes(rotate(np.eye(2), heading[:, None]), 1, 2)
     turn[:, 2, 2] = 1.0
     return np.asarray(turn @ covariance @ np.swapaxes(turn, 1, 2))
+
+
+def _angle(inward: Array, ahead: Array) -> Array:
+    """From inward normals (..., 2) to directions (..., 2), rad."""
+    across = inward[..., 0] * ahead[..., 1] - inward[..., 1] * ahead[..., 0]
+    return np.arctan2(across, np.sum(inward * ahead, axis=-1))
+
+
+def _at_corners(outline: Outline, nearest: Projection, ahead: Array) -> Array:
+    """The contacts (k,) of the k tips that are at a corner; ahead (n, 2): where all n tips drive, in the body frame."""
+    edge, share = outline.edge(nearest.contact[nearest.at_vertex])
+    vertex = edge + (share > 0.5)
+    sides = np.stack([vertex - 1, vertex], axis=1) % len(outline.vertices)
+    contacts = outline.contact_on_edge(sides, np.array([1.0, 0.0]))
+    inward = outline.inward_normal(contacts.ravel()).reshape(-1, 2, 2)
+    pushed = np.abs(_angle(inward, ahead[nearest.at_vertex, None])) < np.pi / 2.0
+    rows = np.arange(len(contacts))
+    first = np.argmax(np.einsum("kej,kj->ke", inward, -nearest.normal[nearest.at_vertex]), axis=1)
+    chosen = np.where(pushed[rows, 1 - first] & ~pushed[rows, first], 1 - first, first)
+    return np.asarray(contacts[rows, chosen])

@@ -1,0 +1,89 @@
+"""Poses in space, for requests whose frame need not lie flat in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.geometry.frames import quaternion_of_yaw
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialPose:
+    """Where a body is in a frame, or how one frame lies in another.
+
+    position (3,) m; quaternion (4,: x, y, z, w) of unit length. `outer @ inner` is a pose given in the frame `outer`,
+    seen from the frame in which `outer` is given.
+    """
+
+    position: Array
+    quaternion: Array
+
+    def __matmul__(self, inner: SpatialPose) -> SpatialPose:
+        return SpatialPose(self.point(inner.position), quaternion_product(self.quaternion, inner.quaternion))
+
+    @property
+    def inverse(self) -> SpatialPose:
+        """The outer frame seen from the inner one."""
+        return SpatialPose(-self.rotation.T @ self.position, self.quaternion * [-1.0, -1.0, -1.0, 1.0])
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Matrix (3, 3) that brings vectors of the inner frame into the outer one."""
+        x, y, z, w = self.quaternion
+        return np.array(
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the two z axes, rad, from 0 to pi."""
+        return float(2.0 * np.arctan2(np.hypot(*self.quaternion[:2]), np.hypot(*self.quaternion[2:])))
+
+    def point(self, point: Array) -> Array:
+        """A point (3,) m of the inner frame, in the outer one."""
+        return np.asarray(self.rotation @ point + self.position)
+
+    def vector(self, vector: Array) -> Array:
+        """A vector (3,) of the inner frame, in the outer one: the frames do not move against each other."""
+        return np.asarray(self.rotation @ vector)
+
+    def covariance(self, covariance: Array) -> Array:
+        """A pose's covariance (6, 6: x, y, z, rotations about x, y, z), in the outer frame's axes."""
+        turn = np.zeros((6, 6))
+        turn[:3, :3] = turn[3:, 3:] = self.rotation
+        return np.asarray(turn @ covariance @ turn.T)
+
+    def turned(self, angle: float) -> SpatialPose:
+        """The body in the same place, turned by angle (rad) about the vertical of the frame that it is given in."""
+        return SpatialPose(self.position, quaternion_product(vertical_turn(angle), self.quaternion))
+
+
+SAME_FRAME = SpatialPose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+
+
+def vertical_turn(angle: float) -> Array:
+    """Quaternion (4,) of a turn by angle (rad) about z."""
+    z, w = quaternion_of_yaw(np.asarray(angle))
+    return np.array([0.0, 0.0, z, w])
+
+
+def quaternion_product(second: Array, first: Array) -> Array:
+    """Quaternion (4,) of the turn `first` followed by the turn `second`."""
+    x, y, z, w = second.tolist()
+    a, b, c, d = first.tolist()
+    return np.array(
+        [
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        ]
+    )

@@ -1,0 +1,55 @@
+"""The frames that requests may be in: the world frame, and where tf2_ros is installed those that tf can lead to it."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.time import Time
+
+from msg_adapters.slider_poses import pose_of_transform
+from push_predictor.errors import RequestError
+from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
+
+
+class RequestFrames:
+    """Knows the world frame, and listens to tf with the node where it can. A lookup never waits.
+
+    world: name of the frame in which sliders lie flat.
+    """
+
+    def __init__(self, node: Node, world: str) -> None:
+        self.world = world
+        self._tf = _imported_tf()
+        if self._tf is not None:
+            self._buffer = self._tf.Buffer()
+            self._listener = self._tf.TransformListener(self._buffer, node)
+
+    def located(self, header: Any) -> SpatialPose:
+        """The frame of a request's header as it lies in the world at the header's stamp; a zero stamp: the latest.
+
+        Raises RequestError for a frame without a name, and for one that tf cannot lead to the world.
+        """
+        if header.frame_id == self.world:
+            return SAME_FRAME
+        if not header.frame_id:
+            raise RequestError("header.frame_id", "", f"the frame of the poses, such as {self.world!r}")
+        if self._tf is None:
+            raise RequestError("header.frame_id", header.frame_id, f"{self.world!r}; tf2_ros is not installed")
+        return self._looked_up(self._tf, header)
+
+    def _looked_up(self, tf: Any, header: Any) -> SpatialPose:
+        try:
+            found = self._buffer.lookup_transform(self.world, header.frame_id, Time.from_msg(header.stamp))
+        except tf.TransformException as error:
+            accepted = f"{self.world!r}, or a frame that tf leads to it: {error}"
+            raise RequestError("header.frame_id", header.frame_id, accepted) from None
+        return pose_of_transform(found.transform)
+
+
+def _imported_tf() -> Any:
+    try:
+        return importlib.import_module("tf2_ros")
+    except ImportError:
+        return None
