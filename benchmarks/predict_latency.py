@@ -1,48 +1,55 @@
 """Round trip of predict_push between two processes, beside that of an empty service in the same run.
 
-    python benchmarks/predict_latency.py [--model FILE] [--calls N] [--domain D]
+    python benchmarks/predict_latency.py [--pin] [--model FILE] [--calls N] [--domain D]
 
-Without --model a VHGP of 1000 simulated windows is trained first (some 10 s). The two servers run at the same time and
-are asked in turns, in short blocks, so that both see the same load of the machine; the load is printed beside the
-numbers.
+Without --model two VHGPs are trained first, of 100 and of 1000 simulated windows (some 20 s), each for a server of its
+own: an answer should take as long of one as of the other. All servers run at the same time and are asked in turns, in
+short blocks, so that all see the same load of the machine, which is printed.
+
+Two empty services: `empty` is a plain rclpy node with a std_srvs/Trigger. `empty, direct` is answered by a thread of
+its own, as predict_push is: what predict_push takes longer than that is the prediction and its larger messages.
+
+Whether client and server share a core changes every time by a factor of two, and the scheduler changes its mind: with
+--pin the client has a core of its own, and the servers another.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from time import perf_counter, sleep
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from server_under_test import (
+    DEPTH,
+    Caller,
+    caller,
+    graph,
+    load,
+    model_files,
+    predict_server,
+    process,
+    single_requests,
+)
 from std_srvs.srv import Trigger
 
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.model_file import load_model, save_model
+from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.served import ServedModel, serve
-from push_predictor.models.train import train_model
+from push_predictor.nodes.direct_service import DirectService
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictPush
 
 BLOCK = 20
 WARM_UP = 200
-DEPTH = QoSProfile(depth=100)
+SIZES = (100, 1000)  # windows
 
 
 class EmptyServer(Node):
@@ -56,64 +63,85 @@ class EmptyServer(Node):
         """Nothing is left to do."""
 
 
+class DirectEmptyServer(Node):
+    """The same, answered as predict_server answers predict_push."""
+
+    def __init__(self, stop: Stop) -> None:
+        super().__init__("direct_empty_server")
+        self._service = DirectService(self, Trigger, "direct", lambda request, response: response, DEPTH)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._service.close()
+
+
+SERVERS: dict[str, Callable[[Stop], EmptyServer | DirectEmptyServer]] = {
+    "empty": EmptyServer,
+    "direct": DirectEmptyServer,
+}
+
+
 def main() -> int:
-    """Measure, or be the empty server that is measured."""
+    """Measure, or be an empty server that is measured."""
     arguments = _arguments()
-    if arguments.serve_empty:
-        return run("empty_server", EmptyServer, ["--ros-args"])
-    os.environ.update(ROS_DOMAIN_ID=str(arguments.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    if arguments.serve:
+        return run(f"{arguments.serve}_server", SERVERS[arguments.serve], ["--ros-args"])
     with ExitStack() as stack:
-        model = arguments.model or _trained(Path(stack.enter_context(tempfile.TemporaryDirectory())))
-        stack.enter_context(_process(__file__, "--serve-empty"))
-        stack.enter_context(
-            _process("-m", "push_predictor.nodes.predict_server", "--ros-args", "-p", f"models:=['{model}']")
-        )
-        _measure(model, arguments.calls)
+        paths = [arguments.model] if arguments.model else stack.enter_context(model_files(*SIZES))
+        models = [load_model(path) for path in paths]
+        cores = os.sched_getaffinity(0)
+        if arguments.pin:
+            os.sched_setaffinity(0, {max(cores)})
+        stack.enter_context(graph(arguments.domain))
+        numbers = [stack.enter_context(process(__file__, "--serve", name)) for name in SERVERS]
+        numbers += [stack.enter_context(predict_server(path, f"/server_{k}")) for k, path in enumerate(paths)]
+        if arguments.pin:  # at once: threads inherit it
+            for number in numbers:
+                os.sched_setaffinity(number, {min(cores)})
+        _measure(stack.enter_context(caller()), models, arguments.calls)
     return 0
 
 
-def _measure(path: Path, calls: int) -> None:
-    rclpy.init()
-    node = Node("latency_client")
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    callback: dict[str, str] = {}
-    node.create_subscription(DiagnosticArray, "/diagnostics", lambda m: callback.update(_values(m)), 10)
-    empty = node.create_client(Trigger, "empty", qos_profile=DEPTH)
-    predict = node.create_client(PredictPush, "predict_push", qos_profile=DEPTH)
-    model = load_model(path)
-    requests = _requests(model, calls + WARM_UP)
-    times: dict[str, list[float]] = {"empty": [], "predict_push": []}
-    try:
-        for client in (empty, predict):
-            if not client.wait_for_service(30.0):
-                raise SystemExit(f"{client.srv_name}: the service did not appear within 30 s")
-        load_before = os.getloadavg()[0]
-        for start in range(0, len(requests), BLOCK):
-            block = requests[start : start + BLOCK]
-            times["empty"] += [_seconds(executor, empty, Trigger.Request()) for _ in block]
-            times["predict_push"] += [_seconds(executor, predict, request) for request in block]
-        _until(executor, lambda: "callback_p50_us" in callback and callback["callback_p50_us"] != "-")
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
-    print(f"{model.name}: {model.kind}, {len(model.training)} windows; {calls} calls of each service, one at a time")
-    print(f"load average {load_before:.1f} before, {os.getloadavg()[0]:.1f} after, {os.cpu_count()} cores")
-    _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in times.items()}, callback)
+def _measure(client: Caller, models: list[PushModel], calls: int) -> None:
+    count = calls + WARM_UP
+    asked: dict[str, tuple[Client, list[Any]]] = {
+        "empty": (client.client(Trigger, "empty"), [Trigger.Request()] * count),
+        "empty, direct": (client.client(Trigger, "direct"), [Trigger.Request()] * count),
+    }
+    for k, model in enumerate(models):
+        asked[f"predict_push, n = {len(model.training)}"] = (
+            client.client(PredictPush, f"/server_{k}/predict_push"),
+            single_requests(model, count),
+        )
+    taken: dict[str, list[float]] = {name: [] for name in asked}
+    before = load()
+    for start in range(0, count, BLOCK):
+        for name, (service, requests) in asked.items():
+            taken[name] += [client.timed(service, request)[0] for request in requests[start : start + BLOCK]]
+    print(f"{calls} calls of each service, one at a time; load average {before} before, {load()} after")
+    _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in taken.items()})
+    for k, model in enumerate(models):
+        told = client.reported(f"/server_{k}/")
+        times = f"p50 {told['callback_p50_us']} us, p99 {told['callback_p99_us']} us"
+        print(f"callback in the server, n = {len(model.training)}: {times}")
+    for model in models:
+        _in_this_process(model)
+
+
+def _report(times: dict[str, np.ndarray]) -> None:
+    rows = {name: np.percentile(values, [50, 95, 99]) for name, values in times.items()}
+    print(f"{'round trip, us':24s}{'p50':>9s}{'p95':>9s}{'p99':>9s}   p50 / empty's   / direct's")
+    for name, row in rows.items():
+        ratios = [row[0] / rows[floor][0] for floor in ("empty", "empty, direct")]
+        print(f"{name:24s}" + "".join(f"{value:9.0f}" for value in row) + f"{ratios[0]:16.2f}{ratios[1]:13.2f}")
+
+
+def _in_this_process(model: PushModel) -> None:
     start = perf_counter()
     served = serve(model)
-    print(f"served: {served.how}; made in {perf_counter() - start:.2f} s")
-    print(f"in this process, p50: served model {_model_time(served):.0f} us, the model {_model_time(model):.0f} us")
-
-
-def _report(times: dict[str, np.ndarray], callback: dict[str, str]) -> None:
-    rows = {name: np.percentile(values, [50, 95, 99]) for name, values in times.items()}
-    print(f"{'us':24s}{'p50':>9s}{'p95':>9s}{'p99':>9s}")
-    for name, row in rows.items():
-        print(f"{name + ' round trip':24s}" + "".join(f"{value:9.0f}" for value in row))
-    print(f"{'ratio':24s}" + "".join(f"{value:9.2f}" for value in rows["predict_push"] / rows["empty"]))
-    print(f"callback in the server: p50 {callback['callback_p50_us']} us, p99 {callback['callback_p99_us']} us")
+    made = perf_counter() - start
+    print(f"{model.name}, {len(model.training)} windows, {served.how}; made in {made:.2f} s")
+    print(f"  in this process, p50: served model {_model_time(served):.0f} us, the model {_model_time(model):.0f} us")
 
 
 def _model_time(model: PushModel | ServedModel) -> float:
@@ -127,71 +155,13 @@ def _model_time(model: PushModel | ServedModel) -> float:
     return float(np.median(times)) * 1e6
 
 
-def _seconds(executor: SingleThreadedExecutor, client: Client, request: Any) -> float:
-    start = perf_counter()
-    future = client.call_async(request)
-    while not future.done():
-        executor.spin_once()  # spin_until_future_complete would leave tasks behind, and slow down
-    elapsed = perf_counter() - start
-    if isinstance(response := future.result(), PredictPush.Response) and not response.success:
-        raise SystemExit(f"predict_push refused: {response.message}")
-    return elapsed
-
-
-def _until(executor: SingleThreadedExecutor, condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    end = perf_counter() + seconds
-    while not condition():
-        if perf_counter() > end:
-            raise SystemExit(f"no diagnostics of the server within {seconds:g} s")
-        executor.spin_once(timeout_sec=0.1)
-
-
-def _requests(model: PushModel, count: int) -> list[PredictPush.Request]:
-    table = model.training
-    rows = np.random.default_rng(0).integers(0, len(table), count)
-    return [
-        PredictPush.Request(velocity=v, contact=c, angle=a, duration=d)
-        for (v, c, a), d in zip(table.inputs[rows].tolist(), table.duration[rows].tolist(), strict=True)
-    ]
-
-
-def _values(message: DiagnosticArray) -> dict[str, str]:
-    return {pair.key: pair.value for status in message.status for pair in status.values}
-
-
-def _trained(folder: Path, count: int = 1000) -> Path:
-    rng = np.random.default_rng(0)
-    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = np.column_stack([np.full(count, 0.02), rng.uniform(0, 1, count), rng.uniform(-1.2, 1.2, count)])
-    duration = np.full(count, 0.2)
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
-    outcomes += rng.normal(size=(count, 3)) * [1e-4, 1e-4, 5e-3] * (0.3 + np.abs(inputs[:, 2:]))
-    table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
-    save_model(train_model(table, rig, "vhgp", name="simulated"), folder / "simulated.model")
-    return folder / "simulated.model"
-
-
-@contextmanager
-def _process(*arguments: str) -> Iterator[None]:
-    environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
-    environment["OPENBLAS_NUM_THREADS"] = "1"
-    root = str(Path(__file__).resolve().parents[1])
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
-    process = subprocess.Popen([sys.executable, *arguments], env=environment)
-    try:
-        sleep(0.1)
-        yield
-    finally:
-        process.terminate()
-        process.wait(10.0)
-
-
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", type=Path, help="a model file (default: train one)")
+    parser.add_argument("--model", type=Path, help="a model file (default: train two)")
     parser.add_argument("--calls", type=int, default=2000, help="calls of each service (default 2000)")
     parser.add_argument("--domain", type=int, default=77, help="ROS domain to run in (default 77)")
-    parser.add_argument("--serve-empty", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--pin", action="store_true", help="client on one core, servers on another")
+    parser.add_argument("--serve", choices=SERVERS, help=argparse.SUPPRESS)
     return parser.parse_args()
 
 

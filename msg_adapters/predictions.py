@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,9 +45,9 @@ def query_to_request(
 def query_to_batch_request(query: PushQuery) -> PredictPushBatch.Request:
     """The request for n pushes."""
     request = PredictPushBatch.Request(model=query.model, duration=float(query.duration))
-    request.velocity, request.contact, request.angle = (column.tolist() for column in query.inputs.T)
+    request.velocity, request.contact, request.angle = map(_doubles, query.inputs.T)
     request.covariate_names = list(query.covariates)
-    request.covariate_values = _push_by_push(query.covariates).ravel().tolist()
+    request.covariate_values = _doubles(_push_by_push(query.covariates))
     return request
 
 
@@ -89,14 +90,17 @@ def refuse(response: Any, reason: str) -> Any:
 
 
 def prediction_from_response(response: Any) -> Prediction:
-    """The predictions of either response; n = 1 for PredictPush. Raises RefusedError with the server's reason."""
+    """The predictions of either response; n = 1 for PredictPush. Raises RefusedError with the server's reason.
+
+    The arrays are the response's own memory.
+    """
     if not response.success:
         raise RefusedError(response.message)
     in_domain = response.in_domain
     return Prediction(
-        np.array(response.mean, dtype=np.float64).reshape(-1, 3),
-        np.array(response.covariance, dtype=np.float64).reshape(-1, 3, 3),
-        np.array(response.process_covariance, dtype=np.float64).reshape(-1, 3, 3),
+        np.asarray(response.mean, dtype=np.float64).reshape(-1, 3),
+        np.asarray(response.covariance, dtype=np.float64).reshape(-1, 3, 3),
+        np.asarray(response.process_covariance, dtype=np.float64).reshape(-1, 3, 3),
         np.array([in_domain] if isinstance(in_domain, bool) else in_domain, dtype=np.bool_),
     )
 
@@ -111,6 +115,11 @@ def _covariates(request: Any, count: int) -> dict[str, Array]:
         raise RequestError("covariate_names", sorted(repeated), "each name once")
     values = np.array(request.covariate_values, dtype=np.float64).reshape(count, len(names))
     return dict(zip(names, values.T, strict=True))
+
+
+def _doubles(values: Array) -> array[float]:
+    """The values, row-major, as messages keep them: from a list they would be taken one by one."""
+    return array("d", np.asarray(values, dtype=np.float64).tobytes())
 
 
 def _push_by_push(covariates: Mapping[str, Array]) -> Array:

@@ -39,4 +39,8 @@ class RequestError(PushPredictorError):
 
     def __init__(self, field: str, value: object, accepted: str) -> None:
         super().__init__(f"{field}: {value!r} is not accepted, give {accepted}")
-        self.field = field
+        self.field, self.value, self.accepted = field, value, accepted
+
+    def within(self, place: str) -> RequestError:
+        """The same of a field in a larger message: `steps[2].angle` of `angle` within `steps[2]`."""
+        return RequestError(f"{place}.{self.field}", self.value, self.accepted)

@@ -24,7 +24,7 @@ NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "push_validator": ("push_validator", tuple(push_validator.PARAMETERS)),
 }
 DOCUMENTS = [REPOSITORY / "README.md", REPOSITORY / "bags" / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
-SERVICES = ("predict_push", "predict_push_batch", "list_models", "load_model")
+SERVICES = ("predict_push", "predict_push_batch", "predict_slider_pose", "rollout_pushes", "list_models", "load_model")
 
 
 def config(node: str) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -246,6 +247,11 @@ def test_a_loaded_model_has_its_kernels(
     assert [r.parameters.choice for r in loaded.body.regressions] == [choice] * 3
 
 
+def independent(model: PushModel) -> PushModel:
+    """Without the correlation of its outputs, which asks for a later version of the format."""
+    return replace(model, body=replace(model.body, correlation=None))
+
+
 def test_a_gp_keeps_its_family(tmp_path: Path) -> None:
     model = train_model(noisy_pushes(60), square_rig(), "gp", name="g", choice=KernelChoice("matern52"))
     save_model(model, tmp_path / "m")
@@ -257,7 +263,7 @@ def test_a_model_that_version_1_can_hold_is_written_as_one(
     models: dict[KernelChoice, PushModel], tmp_path: Path
 ) -> None:
     for choice, model in models.items():
-        save_model(model, tmp_path / "m")
+        save_model(independent(model), tmp_path / "m")
         found = header(tmp_path / "m")
         assert found["format_version"] == (1 if choice == DEFAULT_CHOICE else 2)
         assert ("family" in str(found)) == (choice.family == "matern52")
@@ -269,7 +275,7 @@ def test_an_older_reader_refuses_other_kernels_by_their_version(
 ) -> None:
     monkeypatch.setattr(model_file, "FORMAT_VERSION", 1)
     for choice, model in models.items():
-        save_model(model, tmp_path / "m")
+        save_model(independent(model), tmp_path / "m")
         if choice == DEFAULT_CHOICE:
             load_model(tmp_path / "m")
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from push_predictor.commands.output import (
@@ -28,6 +29,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     parser.add_argument("--model", required=True, choices=("vhgp", "gp", "analytical"), help="which kind")
     parser.add_argument("--n-train", type=int, metavar="N", help="rows, at random; default: all up to 1000, evenly")
+    parser.add_argument(
+        "--inducing",
+        type=int,
+        metavar="M",
+        help="vhgp: a sparse one with M inducing inputs; default: dense up to 2000 rows, beyond that sparse with 100",
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="of the choice of rows")
     parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure")
     parser.add_argument("--stride", type=float, metavar="S", help="s between window starts; default: end to end")
@@ -40,7 +47,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Load, train, save."""
     from push_predictor.models.model_file import save_model
-    from push_predictor.models.train import train_model
+    from push_predictor.models.train import inducing_inputs, train_model, training_rows
     from push_predictor.recordings.load import load_data, load_rig_for
     from push_predictor.recordings.windows import WindowOptions
 
@@ -49,11 +56,16 @@ def run(options: argparse.Namespace) -> None:
     check_output("--out", options.out)
     if options.fit and options.model != "analytical":
         raise RequestError("--fit", options.model, "it with --model analytical only, a learnt model has nothing to fit")
+    if options.inducing is not None and (options.model != "vhgp" or options.inducing < 1):
+        raise RequestError("--inducing", options.inducing, "a number from 1 on, with --model vhgp only")
     if options.stride is not None and not 0.0 < options.stride < float("inf"):
         raise RequestError("--stride", options.stride, "a number above 0, in s")
     rig = load_rig_for(options.data, options.rig)
     with progress("read"):
         table = load_data(options.data, rig, WindowOptions(stride=options.stride))
+    count = len(training_rows(table, options.n_train, options.seed))
+    if m := inducing_inputs(options.model, count, options.inducing):
+        print(f"train vhgp: a sparse one of {count} windows, by up to {m} inducing inputs", file=sys.stderr)
     with progress(f"train {options.model}"):
         model = train_model(
             table,
@@ -64,6 +76,7 @@ def run(options: argparse.Namespace) -> None:
             n_train=options.n_train,
             seed=options.seed,
             fit=options.fit,
+            inducing=options.inducing,
         )
     save_model(model, options.out)
     result = {

@@ -10,15 +10,17 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.correlation import Correlation, covariances
 from push_predictor.models.effects import Effect
 from push_predictor.models.features import push_features
 from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.quadrature import exact_log_density
+from push_predictor.models.sparse_vhgp import SparseVHGP
 from push_predictor.models.vhgp import VHGP
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import INPUTS, OUTPUTS
+from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array
 
 SIDE = "edge"
@@ -53,11 +55,14 @@ class Scaling:
 
 @dataclass(frozen=True, eq=False)
 class LearnedBody:
-    """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV)."""
+    """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV), and how what they
+    leave over goes together; None where it does not.
+    """
 
     rig: Rig
     scaling: Scaling
-    regressions: tuple[GaussianProcess | VHGP, ...]
+    regressions: tuple[GaussianProcess | VHGP | SparseVHGP, ...]
+    correlation: Correlation | None = None
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -66,12 +71,17 @@ class LearnedBody:
 
     def moments(self, push: Push) -> tuple[Array, Array, Array]:
         """See Body. Every outcome takes the duration of the training windows; the caller has checked it."""
-        latent = self.latent(push.inputs)
+        features = scaled_features(self.rig, self.scaling, push.inputs)
+        latent = [regression.predict(features) for regression in self.regressions]
+        return self.moments_of(latent, self.correlation.at(features) if self.correlation else None)
+
+    def moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> tuple[Array, Array, Array]:
+        """See Body.moments, of latent predictions in standardised units and correlation matrices (n, 3, 3)."""
         sd = self.scaling.outcome_sd
         mean = np.column_stack([p.mean for p in latent]) * sd + self.scaling.outcome_mean
-        total = np.column_stack([p.outcome_variance for p in latent]) * sd**2
-        process = np.column_stack([p.process_variance for p in latent]) * sd**2
-        return mean, _diagonal(total), _diagonal(process)
+        of_function = np.column_stack([p.variance for p in latent]) * sd**2
+        of_process = np.column_stack([p.process_variance for p in latent]) * sd**2
+        return mean, *covariances(of_function, of_process, correlation)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Body; None for the standard GP, whose predictive is Gaussian."""
@@ -80,7 +90,7 @@ class LearnedBody:
     @property
     def exact(self) -> bool:
         """Whether the exact predictive is another than the Gaussian of its moments."""
-        return all(isinstance(regression, VHGP) for regression in self.regressions)
+        return all(isinstance(regression, VHGP | SparseVHGP) for regression in self.regressions)
 
     @property
     def outcomes(self) -> Array:
@@ -205,10 +215,3 @@ def scaled_features(rig: Rig, scaling: Scaling, inputs: Array) -> Array:
     """Standardised features (n, D) of inputs (n, 3)."""
     features = push_features(rig.outline, inputs)[:, scaling.columns]
     return np.asarray((features - scaling.feature_mean) / scaling.feature_sd)
-
-
-def _diagonal(variances: Array) -> Array:
-    matrices = np.zeros((len(variances), len(OUTPUTS), len(OUTPUTS)))
-    index = np.arange(len(OUTPUTS))
-    matrices[:, index, index] = variances
-    return matrices

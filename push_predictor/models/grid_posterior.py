@@ -112,6 +112,19 @@ def _of_vhgp(regression: VHGP) -> GridRegression:
     return GridRegression(signal, parameters.noise_mean, noise)
 
 
+def weighted_sums(factors: Sequence[Array], weights: Array) -> Array:
+    """Sums over n rows at the points of a grid, (m_1, ..., m_D, k), of weights (n, k) times the product of the factors.
+
+    factors: for each axis, (m_d, n).
+    """
+    first, *others = factors
+    if not others:
+        return np.asarray(first @ weights)
+    if len(others) == 1:
+        return np.stack([(first * column) @ others[0].T for column in weights.T], axis=-1)
+    return np.stack([weighted_sums(others, weights * row[:, None]) for row in first])
+
+
 def _all_pairs(left: Array, right: Array) -> Array:
     return (left[:, None, :] * right).reshape(-1, left.shape[1])
 

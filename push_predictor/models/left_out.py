@@ -19,27 +19,31 @@ from push_predictor.models.bodies import LearnedBody
 from push_predictor.models.gp import GaussianProcess
 from push_predictor.models.prediction import LatentPrediction
 from push_predictor.models.ridge import factorise
+from push_predictor.models.sparse_left_out import sparse_left_out
+from push_predictor.models.sparse_vhgp import SparseVHGP
 from push_predictor.models.vhgp import VHGP
 from push_predictor.models.vhgp_bound import Bound, VhgpProblem
 from push_predictor.types import Array, IntArray
 
 
 def moments_left_out(body: LearnedBody, block: IntArray) -> tuple[Array, Array, Array]:
-    """What `body.moments` would be at each training row (n,) had the body not seen the row's block; see left_out."""
-    latent, scaling = [left_out(regression, block) for regression in body.regressions], body.scaling
-    mean = np.column_stack([p.mean for p in latent]) * scaling.outcome_sd + scaling.outcome_mean
-    total, process = (
-        np.column_stack(variances)[:, :, None] * np.diag(scaling.outcome_sd**2)
-        for variances in ([p.outcome_variance for p in latent], [p.process_variance for p in latent])
+    """What `body.moments` would be at each training row (n,) had the body not seen the row's block; see left_out.
+
+    The correlation of the outputs at a row is that of the other blocks' rows.
+    """
+    latent = [left_out(regression, block) for regression in body.regressions]
+    return body.moments_of(
+        latent, body.correlation.left_out(body.regressions[0].inputs, block) if body.correlation else None
     )
-    return mean, total, process
 
 
-def left_out(regression: GaussianProcess | VHGP, block: IntArray) -> LatentPrediction:
+def left_out(regression: GaussianProcess | VHGP | SparseVHGP, block: IntArray) -> LatentPrediction:
     """Predict f and g at each of the n training rows, by the rows of all other blocks; hyperparameters as they are.
 
     block (n,): the number of each row's block.
     """
+    if isinstance(regression, SparseVHGP):
+        return sparse_left_out(regression, block)
     return _of_vhgp(regression, block) if isinstance(regression, VHGP) else _of_gp(regression, block)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.correlation_record import correlation_of, correlation_record
 from push_predictor.models.effects_record import cross_of, cross_record, effects_of, effects_record
 from push_predictor.models.gp import GaussianProcess, GpParameters
 from push_predictor.models.kernels import DEFAULT_CHOICE, FAMILIES
@@ -35,6 +36,8 @@ from push_predictor.models.push_model import (
     Scaling,
     scaled_features,
 )
+from push_predictor.models.sparse_record import has_inducing, put_inducing, sparse_regression
+from push_predictor.models.sparse_vhgp import SparseVHGP
 from push_predictor.models.vhgp import VHGP
 from push_predictor.models.vhgp_parameters import VhgpParameters
 from push_predictor.recordings.rig import Rig, rig_from_record
@@ -42,8 +45,9 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
-# 2: other kernels than the squared exponential, and a nugget; 3: effects; 4: effects that share a covariance
-FORMAT_VERSION = 4
+# 2: other kernels than the squared exponential, and a nugget; 3: effects; 4: effects that share a covariance;
+# 5: outputs that go together, and inducing inputs
+FORMAT_VERSION = 5
 LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
 HEADER = "header"
 
@@ -129,7 +133,7 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     body = _body_header(model.body, arrays)
     return {
         "format": FORMAT,
-        "format_version": _version(body),
+        "format_version": 5 if has_inducing(0, arrays) else _version(body),
         "written_by": __version__,
         "name": model.name,
         "kind": model.kind,
@@ -142,6 +146,8 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 def _version(body: dict[str, Any]) -> int:
     """The lowest version whose readers understand a body."""
+    if "correlation" in body.get("base", body):
+        return 5
     if "effects" in body:
         return 4 if "cross" in body else 3
     return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in body.get("regressions", ())) else 1
@@ -208,10 +214,16 @@ def _body_header(body: LearnedBody | AnalyticalBody | ExtendedBody, arrays: dict
     if isinstance(body, AnalyticalBody):
         return {**_physics_header(body.physics), "covariance": body.covariance.tolist()}
     for k, regression in enumerate(body.regressions):
-        if isinstance(regression, VHGP):
+        if isinstance(regression, VHGP | SparseVHGP):
             arrays[f"site_precisions_{k}"] = regression.site_precisions
+        if isinstance(regression, SparseVHGP):
+            put_inducing(regression, k, arrays)
     scaling = {key: np.asarray(value).tolist() for key, value in vars(body.scaling).items()}
-    return {"scaling": scaling, "regressions": [_parameters_header(r) for r in body.regressions]}
+    return {
+        "scaling": scaling,
+        "regressions": [_parameters_header(r) for r in body.regressions],
+        **({"correlation": correlation_record(body.correlation, arrays)} if body.correlation else {}),
+    }
 
 
 def _physics_header(physics: AnalyticalPush) -> dict[str, Any]:
@@ -223,7 +235,7 @@ def _physics_header(physics: AnalyticalPush) -> dict[str, Any]:
     }
 
 
-def _parameters_header(regression: GaussianProcess | VHGP) -> dict[str, Any]:
+def _parameters_header(regression: GaussianProcess | VHGP | SparseVHGP) -> dict[str, Any]:
     """The hyperparameters, without those that version 1 did not know where they are what it took for granted."""
     values = dict(vars(regression.parameters))
     if values["family"] == DEFAULT_CHOICE.family:
@@ -285,22 +297,25 @@ def _learned_body(
     features = scaled_features(rig, scaling, training.inputs)
     scaled = (training.outcomes - scaling.outcome_mean) / scaling.outcome_sd
     regressions = [
-        _regression(kind, features, scaled[:, k], parameters, arrays.get(f"site_precisions_{k}"))
+        _regression(kind, features, scaled[:, k], parameters, k, arrays)
         for k, parameters in enumerate(header["regressions"])
     ]
     if len(regressions) != training.outcomes.shape[1]:
         raise ValueError(f"{len(regressions)} regressions, three are needed")
-    return LearnedBody(rig, scaling, tuple(regressions))
+    correlation = correlation_of(header["correlation"], features, arrays) if "correlation" in header else None
+    return LearnedBody(rig, scaling, tuple(regressions), correlation)
 
 
 def _regression(
-    kind: str, features: Array, column: Array, parameters: dict[str, Any], sites: np.ndarray | None
-) -> GaussianProcess | VHGP:
-    values = _hyperparameters(parameters)
+    kind: str, features: Array, column: Array, parameters: dict[str, Any], output: int, arrays: dict[str, np.ndarray]
+) -> GaussianProcess | VHGP | SparseVHGP:
+    values, sites = _hyperparameters(parameters), arrays.get(f"site_precisions_{output}")
     if kind == "gp":
         return GaussianProcess(features, column, GpParameters(**values))
     if sites is None or sites.shape != column.shape or not np.all(np.isfinite(sites)) or np.any(sites < 0.0):
         raise ValueError(f"site precisions are missing or not {len(column)} finite numbers from 0 on")
+    if has_inducing(output, arrays):
+        return sparse_regression(features, column, VhgpParameters(**values), sites, output, arrays)
     return VHGP(features, column, VhgpParameters(**values), sites)
 
 

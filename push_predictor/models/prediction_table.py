@@ -2,31 +2,36 @@
 
 Per output: the mean and the variance of f, and the log process variance, which is what is smooth: the variance of f has
 narrow dips at the training pushes, of quadratic shape. Each posterior is read at Chebyshev nodes as dense as its own
-lengthscales ask for; all share the knots of one spline.
+lengthscales ask for. The correlation of the outputs, where they have one, is read at the knots themselves, as the three
+numbers of partial_correlation. All share the knots of one spline.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import exp
+from math import exp, sqrt
 
 import numpy as np
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.models.grid_posterior import GridPosterior, GridRegression, grid_regression
+from push_predictor.models.correlation import Correlation, correlations, covariances
+from push_predictor.models.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
 from push_predictor.models.interpolation import Axis, TensorSpline, along
 from push_predictor.models.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.push_chart import Chart, Whole
-from push_predictor.models.push_model import LearnedBody, Scaling
+from push_predictor.models.push_model import LearnedBody
+from push_predictor.models.sparse_grid import sparse_grid_regression
+from push_predictor.models.sparse_vhgp import SparseVHGP
+from push_predictor.models.table_sides import Side, table_sides
 from push_predictor.types import Array
 
-MOST_KNOTS = 1_000_000  # 72 MB
+MOST_KNOTS = 1_000_000  # 96 MB
 MOST_NODES = 150_000  # of one posterior and edge: some seconds
 FEWEST_NODES = 10
 FEWEST_CELLS = 16
-_PATH = 65  # points along which lengthscales are counted
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,7 @@ class Density:
 
 SIGNAL = Density(nodes=4.0, cells=12.0)  # the signal is wanted to a small part of the noise, the noise to one of itself
 NOISE = Density(nodes=2.5, cells=6.0)
+COUPLING_CELLS = 3.0  # a bandwidth of the correlation
 
 
 class TooFineError(PushPredictorError):
@@ -57,17 +63,26 @@ class PredictionTable:
     knots: int
 
     def moments(self, points: Array, box: Whole) -> tuple[Array, Array, Array]:
-        """Mean, outcome variance and process variance, (n, 3) each in SI units, at (n, 3) velocity, place, angle."""
+        """Mean (n, 3), outcome and process covariance (n, 3, 3), SI units, at (n, 3) velocity, place, angle."""
         values = self.spline(points[:, self.columns], box)
-        process = np.exp(values[:, 6:])
-        return values[:, :3], np.maximum(values[:, 3:6], self.least) + process, process
+        coupling = bounded(values[:, 9:]) if values.shape[1] > 9 else None
+        latent, process = np.maximum(values[:, 3:6], self.least), np.exp(values[:, 6:9])
+        return values[:, :3], *covariances(latent, process, coupling)
 
-    def moments_one(self, point: Sequence[float], box: int) -> tuple[list[float], list[float], list[float]]:
-        """The same for one point, in plain numbers."""
+    def moments_one(self, point: Sequence[float], box: int) -> list[float]:
+        """The same for one point, in plain numbers: 3 of the mean, 9 of the outcome's and 9 of the process covariance,
+        row by row.
+        """
         values = self.spline.at(point[self.columns], box).tolist()
-        process = [exp(value) for value in values[6:]]
-        total = [max(v, least) + p for v, least, p in zip(values[3:6], self.least, process, strict=True)]
-        return values[:3], total, process
+        p, q, r = exp(values[6]), exp(values[7]), exp(values[8])
+        u, v, w = (max(value, least) for value, least in zip(values[3:6], self.least, strict=True))
+        mean, a, b, c = values[:3], u + p, v + q, w + r
+        if len(values) == 9:
+            return [*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r]
+        r12, r13, r23 = bounded_one(values[9:])
+        pq, pr, qr = r12 * sqrt(p * q), r13 * sqrt(p * r), r23 * sqrt(q * r)
+        ab, ac, bc = pq + r12 * sqrt(u * v), pr + r13 * sqrt(u * w), qr + r23 * sqrt(v * w)
+        return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
 
 
 def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinement: float = 1.0) -> PredictionTable:
@@ -76,76 +91,33 @@ def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinemen
     refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError, also for kernels
     that are no products over the axes.
     """
-    regressions = [grid_regression(regression) for regression in body.regressions]
+    regressions = [
+        sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
+        for regression in body.regressions
+    ]
     if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in regressions):
         raise TooFineError("only squared exponential kernels are products over the axes of a table")
-    sides = _sides(body.scaling, chart, low, high)
-    axes = [Axis(side.low, side.high, _cells(side, regressions, refinement)) for side in sides]
+    sides = table_sides(body.scaling, chart, low, high)
+    resolved = _resolved(regressions, body.correlation)
+    axes = [Axis(side.low, side.high, _cells(side, resolved, refinement)) for side in sides]
     knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
     if knots > MOST_KNOTS:
         raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are taken")
-    grid = _Grid(sides, axes, refinement)
+    values = _values(_Grid(sides, axes, refinement), body, regressions)
+    values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
+    least = body.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
+    columns = _as_slice([side.column for side in sides])
+    return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
+
+
+def _values(grid: _Grid, body: LearnedBody, regressions: Sequence[GridRegression]) -> Array:
+    """At the knots: means, variances of f, log process variances, SI units, and the correlation's three numbers."""
     outputs = [grid.outputs(regression) for regression in regressions]
     values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
-    values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
     sd, zero = body.scaling.outcome_sd, np.zeros(3)
     values *= np.concatenate([sd, sd**2, np.ones(3)])
     values += np.concatenate([body.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
-    least = (sd**2 * [regression.signal.least_variance for regression in regressions]).tolist()
-    return PredictionTable(TensorSpline(axes, values), _as_slice([side.column for side in sides]), least, knots)
-
-
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One of velocity, place and angle that the model uses: `used` are its columns among the model's features."""
-
-    column: int
-    low: float
-    high: float
-    used: list[int]
-    features: Callable[[Array], Array]  # values (m,) -> standardised features (boxes, m, len(used))
-
-    def lengthscales(self, kernel: ArdKernel) -> float:
-        """How many lengthscales of a kernel lie between low and high; around a closed outline 2 pi at least."""
-        path = self._scaled(kernel, self.features(np.linspace(self.low, self.high, _PATH))[0])
-        length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-        return max(length, 2.0 * np.pi) if len(self.used) > 1 else length
-
-    def correlations(self, posterior: GridPosterior, values: Array) -> Array:
-        """The factor (boxes m, n) of the kernel between values (m,) and the inputs."""
-        points = self._scaled(posterior.kernel, self.features(values)).reshape(-1, 1, len(self.used))
-        inputs = self._scaled(posterior.kernel, posterior.inputs[:, self.used])
-        return np.asarray(np.exp(-0.5 * ((points - inputs) ** 2).sum(axis=2)))
-
-    def _scaled(self, kernel: ArdKernel, features: Array) -> Array:
-        return np.asarray(features / np.exp(kernel.log_lengthscales[self.used]))
-
-
-def _sides(scaling: Scaling, chart: Chart, low: Array, high: Array) -> list[_Side]:
-    groups = ((0,), chart.place_columns, (len(chart.place_columns) + 1,))
-    sides = []
-    for column, (group, features) in enumerate(zip(groups, (_itself, _places(chart), _itself), strict=True)):
-        chosen = [k for k, feature in enumerate(group) if feature in scaling.columns]
-        if chosen:
-            used = [scaling.columns.index(group[k]) for k in chosen]
-            standardised = _standardised(features, chosen, scaling.feature_mean[used], scaling.feature_sd[used])
-            sides.append(_Side(column, float(low[column]), float(high[column]), used, standardised))
-    return sides
-
-
-def _itself(values: Array) -> Array:
-    return values[None, :, None]
-
-
-def _places(chart: Chart) -> Callable[[Array], Array]:
-    """Features (boxes, m, columns) of the places (m,) of every box."""
-    return lambda places: np.stack([np.column_stack(chart.place_features(places, k)) for k in range(chart.boxes)])
-
-
-def _standardised(
-    features: Callable[[Array], Array], chosen: list[int], mean: Array, sd: Array
-) -> Callable[[Array], Array]:
-    return lambda values: (features(values)[:, :, chosen] - mean) / sd
+    return values if body.correlation is None else np.concatenate([values, grid.coupling(body.correlation)], axis=-1)
 
 
 def _as_slice(columns: Sequence[int]) -> slice:
@@ -153,17 +125,23 @@ def _as_slice(columns: Sequence[int]) -> slice:
     return slice(columns[0], columns[-1] + 1, columns[-1] - columns[0] if len(columns) == 2 else 1)
 
 
-def _cells(side: _Side, regressions: Sequence[GridRegression], refinement: float) -> int:
-    wanted = [SIGNAL.cells * side.lengthscales(r.signal.kernel) for r in regressions]
-    wanted += [NOISE.cells * side.lengthscales(r.noise.kernel) for r in regressions if r.noise]
-    return max(FEWEST_CELLS, int(np.ceil(refinement * max(wanted))))
+def _resolved(regressions: Sequence[GridRegression], correlation: Correlation | None) -> list[tuple[ArdKernel, float]]:
+    """What the knots must resolve: kernels, and how many cells a lengthscale of each asks for."""
+    wanted = [(r.signal.kernel, SIGNAL.cells) for r in regressions]
+    wanted += [(r.noise.kernel, NOISE.cells) for r in regressions if r.noise]
+    return wanted + ([(correlation.kernel, COUPLING_CELLS)] if correlation else [])
+
+
+def _cells(side: Side, resolved: Sequence[tuple[ArdKernel, float]], refinement: float) -> int:
+    wanted = max(cells * side.lengthscales(kernel) for kernel, cells in resolved)
+    return max(FEWEST_CELLS, int(np.ceil(refinement * wanted)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
     """The knots of a table."""
 
-    sides: Sequence[_Side]
+    sides: Sequence[Side]
     axes: Sequence[Axis]
     refinement: float
 
@@ -184,15 +162,30 @@ class _Grid:
         if (total := float(np.prod(counts, dtype=np.float64))) > MOST_NODES:
             raise TooFineError(f"{total:.0f} nodes would be needed, at most {MOST_NODES} are taken")
         nodes = [axis.nodes(count) for axis, count in zip(self.axes, counts, strict=True)]
-        factors = [side.correlations(posterior, values) for side, values in zip(self.sides, nodes, strict=True)]
-        mean, variance = posterior.moments(factors)
+        mean, variance = posterior.moments(self._factors(posterior.kernel, posterior.inputs, nodes))
         return self._at_knots(mean, counts), self._at_knots(variance, counts)
 
+    def coupling(self, correlation: Correlation) -> Array:
+        """The three numbers of a correlation at the knots, (boxes, cells_1 + 1, ..., 3)."""
+        knots = [np.linspace(axis.low, axis.high, axis.cells + 1) for axis in self.axes]
+        factors = self._factors(correlation.kernel, correlation.features, knots)
+        sums = weighted_sums(factors, correlation.products)
+        numbers = unbounded(correlations(sums.reshape(-1, sums.shape[-1]), correlation.shrinkage))
+        columns = [_boxes_first(column.reshape(sums.shape[:-1]), [len(knot) for knot in knots]) for column in numbers.T]
+        return np.stack(columns, axis=-1)
+
+    def _factors(self, kernel: ArdKernel, inputs: Array, values: Sequence[Array]) -> list[Array]:
+        return [side.factor(kernel, inputs, places) for side, places in zip(self.sides, values, strict=True)]
+
     def _at_knots(self, values: Array, counts: Sequence[int]) -> Array:
-        """From nodes, the boxes of the place's axis one after the other, to knots with the boxes first."""
-        shape = list(chain(*((size // count, count) for size, count in zip(values.shape, counts, strict=True))))
-        order = [*range(0, len(shape), 2), *range(1, len(shape), 2)]
-        values = values.reshape(shape).transpose(order).reshape(-1, *counts)
+        values = _boxes_first(values, counts)
         for d, (axis, count) in enumerate(zip(self.axes, counts, strict=True)):
             values = along(d + 1, axis.nodes_to_knots(count), values)
         return values
+
+
+def _boxes_first(values: Array, counts: Sequence[int]) -> Array:
+    """From the boxes of the place's axis one after the other, to (boxes, *counts)."""
+    shape = list(chain(*((size // count, count) for size, count in zip(values.shape, counts, strict=True))))
+    order = [*range(0, len(shape), 2), *range(1, len(shape), 2)]
+    return values.reshape(shape).transpose(order).reshape(-1, *counts)

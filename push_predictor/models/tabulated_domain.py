@@ -33,7 +33,7 @@ class TabulatedDomain:
         if not inside.all():
             return inside, None
         points = np.column_stack([velocity, place, angle])
-        return inside, _prediction(*self.table.moments(points, box))
+        return inside, Prediction(*self.table.moments(points, box), inside)
 
     def predict_one(self, push: Sequence[float]) -> Prediction | None:
         """The prediction for one push in the domain, in plain numbers, several times as fast; else None."""
@@ -43,7 +43,9 @@ class TabulatedDomain:
         for feature, (low, high) in zip(features, self._bounds, strict=True):
             if not low <= feature <= high:
                 return None
-        return _prediction_of_one(*self.table.moments_one((velocity, place, angle), box))
+        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
+        covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
+        return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
 
     @cached_property
     def _bounds(self) -> list[tuple[float, float]]:
@@ -59,21 +61,3 @@ def tabulated_domain(model: PushModel, body: LearnedBody, refinement: float = 1.
     least, most = features.min(axis=0), features.max(axis=0)
     margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
     return TabulatedDomain(chart, least - margin, most + margin, tabulate(body, chart, low, high, refinement))
-
-
-def _prediction(mean: Array, total: Array, process: Array) -> Prediction:
-    return Prediction(mean, _diagonal(total), _diagonal(process), np.ones(len(mean), dtype=np.bool_))
-
-
-def _prediction_of_one(mean: list[float], total: list[float], process: list[float]) -> Prediction:
-    (a, b, c), (p, q, r) = total, process
-    numbers = np.array([*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r])
-    covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
-    return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
-
-
-def _diagonal(variances: Array) -> Array:
-    count, size = variances.shape
-    matrices = np.zeros((count, size * size))
-    matrices[:, :: size + 1] = variances
-    return matrices.reshape(count, size, size)

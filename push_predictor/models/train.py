@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from push_predictor import __version__
 from push_predictor.errors import TrainingError
 from push_predictor.models.analytical import AnalyticalPush, fit_analytical
+from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.features import push_features
 from push_predictor.models.gp import GaussianProcess, fit_gp
 from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
@@ -21,6 +23,8 @@ from push_predictor.models.push_model import (
     Scaling,
     scaled_features,
 )
+from push_predictor.models.sparse_fit import DEFAULT_INDUCING, fit_sparse_vhgp
+from push_predictor.models.sparse_vhgp import SparseVHGP
 from push_predictor.models.vhgp import VHGP, fit_vhgp
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -28,6 +32,9 @@ from push_predictor.types import Array, IntArray
 
 DEFAULT_ROWS = 1000
 FEWEST_ROWS = 10
+MOST_DENSE_ROWS = (
+    2000  # a dense VHGP of so many takes half a minute and 200 MB, of twice as many eight and four times it
+)
 CONSTANT = 1e-9  # a feature whose spread is below this part of its size does not vary
 
 
@@ -42,22 +49,37 @@ def train_model(
     seed: int = 0,
     fit: bool = False,
     choice: KernelChoice = DEFAULT_CHOICE,
+    inducing: int | None = None,
 ) -> PushModel:
     """Train a model of one of KINDS on rows of the table.
 
     n_train: that many rows at random by default_rng(seed); None takes all up to 1000, beyond that 1000 drawn evenly
     over the pushes. fit: estimate the analytical model's friction and pressure instead of taking the textbook's.
-    choice: the kernels of a learnt model.
-    Raises TrainingError for an unknown kind, too few rows, or outcomes that do not vary.
+    choice: the kernels of a learnt model. inducing: how many inducing inputs a VHGP is to have; None for a dense one of
+    up to MOST_DENSE_ROWS rows, and for a usual number beyond.
+    Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or inducing inputs where no model
+    has them.
     """
     if kind not in KINDS:
         raise TrainingError(f"model: {kind!r} is not accepted, give one of {', '.join(KINDS)}")
     rows = table.take(training_rows(table, n_train, seed))
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
-    body = _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice)
+    most_inducing = inducing_inputs(kind, len(rows), inducing)
+    body = _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice, most_inducing)
     provenance = Provenance(tuple(sources), len(rows.pushes), seed, __version__)
     return PushModel(name, kind, rig, body, rows, provenance)
+
+
+def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | None:
+    """How many inducing inputs a model of so many rows gets, None for a dense one; see train_model."""
+    if wanted is None:
+        return DEFAULT_INDUCING if kind == "vhgp" and rows > MOST_DENSE_ROWS else None
+    if kind != "vhgp":
+        raise TrainingError(f"inducing: {wanted} is not accepted, only a vhgp has inducing inputs")
+    if wanted < 1:
+        raise TrainingError(f"inducing: {wanted} is not accepted, give 1 or more")
+    return wanted
 
 
 def training_rows(table: PushTable, n_train: int | None, seed: int) -> IntArray:
@@ -81,15 +103,25 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
 
 
-def _learned(rows: PushTable, rig: Rig, kind: str, choice: KernelChoice) -> LearnedBody:
+def _learned(rows: PushTable, rig: Rig, kind: str, choice: KernelChoice, most_inducing: int | None) -> LearnedBody:
     scaling = _scaling(rows, rig)
     features = scaled_features(rig, scaling, rows.inputs)
     scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    return LearnedBody(rig, scaling, tuple(_regression(features, column, kind, choice) for column in scaled.T))
+    regressions = (_regression(features, column, kind, choice, most_inducing) for column in scaled.T)
+    body = LearnedBody(rig, scaling, tuple(regressions))
+    return replace(body, correlation=fit_correlation(body, rows.push_id))
 
 
-def _regression(features: Array, column: Array, kind: str, choice: KernelChoice) -> GaussianProcess | VHGP:
-    return fit_gp(features, column, choice) if kind == "gp" else fit_vhgp(features, column, choice)
+def _regression(
+    features: Array, column: Array, kind: str, choice: KernelChoice, most_inducing: int | None
+) -> GaussianProcess | VHGP | SparseVHGP:
+    if kind == "gp":
+        return fit_gp(features, column, choice)
+    if most_inducing is None:
+        return fit_vhgp(features, column, choice)
+    if choice != DEFAULT_CHOICE:
+        raise TrainingError(f"{choice}: a sparse VHGP has squared exponential kernels and no nugget")
+    return fit_sparse_vhgp(features, column, most_inducing)
 
 
 def _scaling(rows: PushTable, rig: Rig) -> Scaling:

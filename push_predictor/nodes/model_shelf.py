@@ -66,7 +66,9 @@ class ModelShelf:
         name = name or served.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
-        self._models[name], self._files[name] = served, path
+        # A new dictionary: requests are answered by other threads, which may be going through the old one.
+        self._files[name] = path
+        self._models = {**self._models, name: served}
         return name
 
     @property

@@ -1,10 +1,11 @@
-"""The node that serves push models: four services and the action trace_residual (docs/services.md)."""
+"""The node that serves push models: six services and the action trace_residual (docs/services.md)."""
 
 from __future__ import annotations
 
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from functools import partial
 from time import perf_counter
 from typing import Any, TypeAlias
 
@@ -22,13 +23,24 @@ from msg_adapters.predictions import refuse
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
+from push_predictor.nodes.direct_service import DirectService
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
+from push_predictor.nodes.pose_answers import answer_slider_pose
+from push_predictor.nodes.request_frames import RequestFrames
 from push_predictor.nodes.request_log import RequestLog
 from push_predictor.nodes.residual_tracer import ResidualTracer
+from push_predictor.nodes.rollout_answers import answer_rollout
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server_status import NO_MODEL, server_status
-from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
+from push_predictor_interfaces.srv import (
+    ListModels,
+    LoadModel,
+    PredictPush,
+    PredictPushBatch,
+    PredictSliderPose,
+    RolloutPushes,
+)
 
 SERVICE_QOS = QoSProfile(depth=100)  # ten, the default, loses requests of a client with more in flight
 INTROSPECTION = {
@@ -44,6 +56,7 @@ PARAMETERS = (
         "Name of the model that a request without a name gets; empty: the first loaded.",
         read_only=False,
     ),
+    Param("world_frame", "world", "Frame in which sliders lie flat: z points up, poses are read in it."),
     Param("autostart", True, "Configure and activate without a lifecycle manager."),
     Param(
         "introspection",
@@ -77,8 +90,10 @@ class PredictServer(LifecycleNode):
         declare(self, PARAMETERS)
         self._shelf, self._log = ModelShelf(), RequestLog()
         self._problems: list[str] = []
+        self._direct: DirectService | None = None
         self._offered: list[Service] = []
         self._state = "unconfigured"
+        self._frames = RequestFrames(self, self.value("world_frame"))
         self._tracer = ResidualTracer(self, self._deployed, lambda: float(self.value("trace_alpha")))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
@@ -96,6 +111,11 @@ class PredictServer(LifecycleNode):
         self._tracer.close()
         self._publish_diagnostics()
 
+    def destroy_node(self) -> None:
+        """End the thread that answers predict_push, and the node."""
+        self._withdraw()
+        super().destroy_node()
+
     # --- transitions ----------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -112,9 +132,11 @@ class PredictServer(LifecycleNode):
         for problem in self._problems:
             self.get_logger().error(problem)
         self._shelf.choose_default(self.value("default_model"))
+        self._direct = DirectService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
         self._offered = [
-            self.create_service(PredictPush, "predict_push", self._on_push, qos_profile=SERVICE_QOS),
             self.create_service(PredictPushBatch, "predict_push_batch", self._on_batch, qos_profile=SERVICE_QOS),
+            self.create_service(PredictSliderPose, "predict_slider_pose", self._on_pose, qos_profile=SERVICE_QOS),
+            self.create_service(RolloutPushes, "rollout_pushes", self._on_rollout, qos_profile=SERVICE_QOS),
             self.create_service(ListModels, "list_models", self._on_list, qos_profile=SERVICE_QOS),
             self.create_service(LoadModel, "load_model", self._on_load, qos_profile=SERVICE_QOS),
         ]
@@ -147,9 +169,15 @@ class PredictServer(LifecycleNode):
 
     def _give_up(self, state: str) -> None:
         self._tracer.end(f"the node is {state} now")
+        self._withdraw()
+        self._shelf, self._problems, self._state = ModelShelf(), [], state
+
+    def _withdraw(self) -> None:
+        if self._direct is not None:
+            self._direct.close()
+            self._direct = None
         while self._offered:
             self.destroy_service(self._offered.pop())
-        self._shelf, self._problems, self._state = ModelShelf(), [], state
 
     # --- services -------------------------------------------------------------------------------------------
 
@@ -160,6 +188,14 @@ class PredictServer(LifecycleNode):
         self, request: PredictPushBatch.Request, response: PredictPushBatch.Response
     ) -> PredictPushBatch.Response:
         return self._prediction(answer_batch, request, response)
+
+    def _on_pose(
+        self, request: PredictSliderPose.Request, response: PredictSliderPose.Response
+    ) -> PredictSliderPose.Response:
+        return self._prediction(partial(answer_slider_pose, self._frames), request, response)
+
+    def _on_rollout(self, request: RolloutPushes.Request, response: RolloutPushes.Response) -> RolloutPushes.Response:
+        return self._prediction(partial(answer_rollout, self._frames), request, response)
 
     def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
         answer_list(self._shelf, response)
@@ -226,7 +262,8 @@ class PredictServer(LifecycleNode):
                 self._introspect(parameter.value)
 
     def _introspect(self, mode: str) -> None:
-        for service in self._offered:
+        direct = [self._direct.service] if self._direct is not None else []
+        for service in [*direct, *self._offered]:
             service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
 
     def _publish_diagnostics(self) -> None:

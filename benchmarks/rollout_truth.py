@@ -1,0 +1,94 @@
+"""The same push again and again on the rig simulator, and how far a predicted distribution is from what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from push_predictor.geometry.frames import to_body, to_world
+from push_predictor.simulation.batches import run_pushes
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.types import Array
+
+BRAKING = 0.004  # m of a push's travel that no pose is taken from
+DRAWS = 1000  # of the bootstrap over the repeats
+REGIONS = (0.5, 0.9, 0.95)
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """n repeats of one push: poses (n, 3) after `time` (k,) s from the first touch, as poses (k, n, 3) in the slider's
+    body frame at that touch.
+    """
+
+    time: Array
+    poses: Array
+
+
+def repeats(contact: float, angle: float, speed: float, times: Array, count: int, seed: int) -> Repeats:
+    """Simulate; table and slider are those of bags/square_abs_*, all else is drawn anew for every repeat."""
+    travel = speed * float(max(times)) + BRAKING
+    plan = PushPlan(*(np.full(count, value) for value in (contact, angle, speed, travel)))
+    poses = []
+    for batch in run_pushes(SimulationSpec("rect1", "abs", plan, seed=seed)):
+        motion = batch.motion
+        touching = np.hypot(motion.wrench[..., 0], motion.wrench[..., 1]) > 0.0
+        for row, first in enumerate(np.argmax(touching, axis=1)):
+            begin, time = motion.slider[row, first], motion.time[row, first] + times
+            at = np.column_stack([np.interp(time, motion.time[row], column) for column in motion.slider[row].T])
+            poses.append(np.column_stack([to_body(at[:, :2], begin), at[:, 2] - begin[2]]))
+    return Repeats(times, np.stack(poses, axis=1))
+
+
+def in_turn(pushes: Sequence[Array]) -> Array:
+    """Poses (n, 3) after pushes, each (n, 3) relative to the slider at its start, made one after the other.
+
+    Repeats of different pushes are drawn independently of each other, so they may be put together as they come.
+    """
+    at = np.zeros_like(pushes[0])
+    for moved in pushes:
+        at = np.column_stack([to_world(moved[:, :2], at), at[:, 2] + moved[:, 2]])
+    return at
+
+
+class EnergyDistance:
+    """2 E|X - Y| - E|X - X'| - E|Y - Y'| of poses, m: x, y as they are, heading times `arm` (m); 0 for equal laws.
+
+    Unbiased: no draw is compared with itself (Szekely and Rizzo 2013). samples (p, 3) of the model, truth (n, 3).
+    """
+
+    def __init__(self, samples: Array, truth: Array, arm: float) -> None:
+        x, y = (poses * [1.0, 1.0, arm] for poses in (samples, truth))
+        self._within = cdist(x, x).sum() / (len(x) * (len(x) - 1))
+        self._across, self._of_truth = cdist(y, x).mean(axis=1), cdist(y, y)
+
+    def value(self, weight: Array | None = None) -> float:
+        """With weights (n,) of the truth's poses: how often each was drawn."""
+        w = np.ones(len(self._across)) if weight is None else weight
+        of_truth = w @ self._of_truth @ w / (w.sum() ** 2 - w @ w)
+        return float(2.0 * w @ self._across / w.sum() - self._within - of_truth)
+
+
+def weights_of(count: int, seed: int = 0) -> Array:
+    """How often each of `count` repeats comes in DRAWS bootstrap samples, (DRAWS, count)."""
+    rng = np.random.default_rng(seed)
+    return rng.multinomial(count, np.full(count, 1.0 / count), DRAWS).astype(np.float64)
+
+
+def gaussian_divergence(samples: Array, truth: Array) -> float:
+    """KL divergence, nats, of the Gaussian of poses (n, 3) `truth` from that of `samples` (p, 3)."""
+    mean, covariance = truth.mean(axis=0), np.cov(truth.T)
+    off, inverse = mean - samples.mean(axis=0), np.linalg.inv(np.cov(samples.T))
+    ratio = inverse @ covariance
+    return float(0.5 * (np.trace(ratio) - 3.0 - np.log(np.linalg.det(ratio)) + off @ inverse @ off))
+
+
+def inside(samples: Array, truth: Array) -> Array:
+    """Which poses (n, 3) lie in the ellipsoids about the samples' mean that hold REGIONS of the samples: (n, 3)."""
+    mean, inverse = samples.mean(axis=0), np.linalg.inv(np.cov(samples.T))
+    far, from_there = (np.einsum("ni,ij,nj->n", x - mean, inverse, x - mean) for x in (samples, truth))
+    return np.asarray(from_there[:, None] <= np.quantile(far, REGIONS))

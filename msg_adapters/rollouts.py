@@ -1,0 +1,143 @@
+"""RolloutPushes <-> a rollout in the world: the plane out of a pose in space, poses and samples back into its frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovariance
+
+from msg_adapters.slider_poses import FLAT, PLANAR, pose_of_message
+from push_predictor.errors import RequestError
+from push_predictor.geometry.frames import yaw_of_quaternion
+from push_predictor.geometry.spatial import SpatialPose
+from push_predictor.planning.rollout import A_COVARIANCE, MOST_PARTICLES, Rollout, is_covariance
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RolloutQuery:
+    """A request as it was asked, in its own frame: slider with covariance (6, 6), steps (k, 4: velocity m/s, contact,
+    angle rad, duration s), how many samples are wanted, seed. model: a name, empty for the default one.
+    """
+
+    model: str
+    slider: SpatialPose
+    covariance: Array
+    steps: Array
+    samples: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class WorldSlider:
+    """A slider flat in the world: pose in space, planar pose (3,: x, y m, heading rad) and its covariance (3, 3)."""
+
+    pose: SpatialPose
+    planar: Array
+    covariance: Array
+
+
+def query_from_rollout_request(request: Any) -> RolloutQuery:
+    """What a RolloutPushes request asks; its steps are checked by the rollout.
+
+    Raises RequestError for a pose that is not finite, a quaternion not of unit length, and too many particles.
+    """
+    if request.particles > MOST_PARTICLES:
+        raise RequestError("particles", request.particles, f"at most {MOST_PARTICLES}")
+    steps = [(step.velocity, step.contact, step.angle, step.duration) for step in request.steps]
+    return RolloutQuery(
+        request.model,
+        pose_of_message("slider.pose", request.slider.pose),
+        np.array(request.slider.covariance, dtype=np.float64).reshape(6, 6),
+        np.reshape(np.array(steps, dtype=np.float64), (-1, 4)),
+        request.particles,
+        request.seed,
+    )
+
+
+def world_slider(query: RolloutQuery, frame: SpatialPose) -> WorldSlider:
+    """The slider of a query whose frame lies in the world as `frame`.
+
+    Of the covariance x, y and the rotation about z count, in the world's plane. Raises RequestError where the slider
+    does not lie flat or these three have no covariance.
+    """
+    slider = frame @ query.slider
+    if slider.tilt > FLAT:
+        raise RequestError("slider.pose.orientation tilt", round(slider.tilt, 4), f"a slider flat within {FLAT:g} rad")
+    finite = np.all(np.isfinite(query.covariance))
+    covariance = frame.covariance(query.covariance)[PLANAR] if finite else query.covariance[PLANAR]
+    if not (finite and is_covariance(covariance)):
+        accepted = f"{A_COVARIANCE} of x, y and the rotation about z, within (6, 6) finite numbers"
+        raise RequestError("slider.covariance", covariance.tolist(), accepted)
+    planar = np.array([*slider.position[:2], yaw_of_quaternion(*slider.quaternion)])
+    return WorldSlider(slider, planar, covariance)
+
+
+def fill_rollout_response(
+    response: Any, frame: SpatialPose, slider: WorldSlider, rolled: Rollout, samples: int
+) -> None:
+    """Write a rollout in the frame of the request: height and small tilt of the slider stay as they were.
+
+    Covariances are those of x, y and the heading in the world's plane, zero in all else.
+    """
+    to_request = frame.inverse
+    response.poses = [
+        _pose_message(to_request @ _moved(slider, mean), to_request.covariance(_in_space(covariance)))
+        for mean, covariance in zip(rolled.mean, rolled.covariance, strict=True)
+    ]
+    response.samples = seen_from(to_request, slider, rolled.samples[:samples]).ravel().tolist()
+    response.message = remarks(rolled)
+    response.success = True
+
+
+def seen_from(to_request: SpatialPose, slider: WorldSlider, poses: Array) -> Array:
+    """x, y and heading (p, 3) in the request's frame of the slider at planar poses (p, 3) in the world."""
+    height = np.full(len(poses), slider.pose.position[2])
+    place = np.column_stack([poses[:, :2], height]) @ to_request.rotation.T + to_request.position
+    ahead = slider.pose.rotation[:, 0]
+    turn = poses[:, 2] - slider.planar[2]
+    turned = np.column_stack(
+        [
+            np.cos(turn) * ahead[0] - np.sin(turn) * ahead[1],
+            np.sin(turn) * ahead[0] + np.cos(turn) * ahead[1],
+            np.full(len(poses), ahead[2]),
+        ]
+    )
+    forward = turned @ to_request.rotation.T
+    return np.column_stack([place[:, :2], np.arctan2(forward[:, 1], forward[:, 0])])
+
+
+def remarks(rolled: Rollout) -> str:
+    """In words, what a planner should know of a rollout; empty where all went by what the model has learnt."""
+    known, held = rolled.in_domain, rolled.held
+    said = []
+    if beyond := [k for k, share in enumerate(known) if share < 1.0]:
+        first, share = beyond[0], 100.0 * (1.0 - known[-1])
+        said.append(f"{share:.3g} % of the samples leave the domain of the training data, from steps[{first}] on")
+    said += [
+        f"{100.0 * (1.0 - share):.3g} % of them have lost contact when steps[{k}] ends"
+        for k, share in enumerate(held)
+        if share < 1.0
+    ]
+    return "; ".join(said)
+
+
+def _moved(slider: WorldSlider, planar: Array) -> SpatialPose:
+    there = SpatialPose(np.array([*planar[:2], slider.pose.position[2]]), slider.pose.quaternion)
+    return there.turned(float(planar[2] - slider.planar[2]))
+
+
+def _in_space(covariance: Array) -> Array:
+    matrix = np.zeros((6, 6))
+    matrix[PLANAR] = covariance
+    return matrix
+
+
+def _pose_message(pose: SpatialPose, covariance: Array) -> PoseWithCovariance:
+    message = PoseWithCovariance(covariance=covariance.reshape(36))
+    position, turn = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z = pose.position.tolist()
+    turn.x, turn.y, turn.z, turn.w = pose.quaternion.tolist()
+    return message

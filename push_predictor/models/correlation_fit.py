@@ -1,0 +1,93 @@
+"""Learning the correlation of the outputs from pushes left out: both what it is learnt from and what it is judged by.
+
+The regressions predict each push without its windows (left_out.py), and the correlation at a push is smoothed over all
+others. Residuals have heavy tails, and one far out would tell the correlation of its whole neighbourhood; so none
+counts for more than the length that it is expected to have, 3^1/2 standard deviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.bodies import LearnedBody
+from push_predictor.models.correlation import Correlation, correlations, covariances
+from push_predictor.models.left_out import left_out
+from push_predictor.types import Array, IntArray
+
+BANDWIDTHS = (0.2, 0.3, 0.4, 0.6, 0.9, 1.4, 2.5)  # standard deviations of the features
+SHRINKAGES = (2.0, 5.0, 10.0, 20.0, 50.0)  # rows
+LONGEST = 3.0**0.5
+FEWEST_PUSHES = 10
+MOST_ROWS = 2000  # that it is learnt from and keeps, at random: an answer shall not cost more with more rows
+MOST_BLOCKS = 300  # that pushes are left out in
+CLEARLY = 2.0  # standard errors, from push to push
+
+
+def fit_correlation(body: LearnedBody, push_ids: np.ndarray) -> Correlation | None:
+    """The correlation of a body's outputs, from its training rows and the push (n,) that each belongs to.
+
+    Bandwidth and shrinkage are those under which the pushes left out are likeliest. None, independence, where they are
+    not CLEARLY likelier than under independence, or fewer than FEWEST_PUSHES.
+    """
+    pushes, push = np.unique(push_ids, return_inverse=True)
+    if len(pushes) < FEWEST_PUSHES:
+        return None
+    block = np.asarray(push % MOST_BLOCKS, dtype=np.int64)
+    best, gains = max(_candidates(body, block), key=lambda candidate: float(candidate[1].sum()))
+    error = np.sqrt(len(gains)) * gains.std(ddof=1)
+    return best if gains.sum() > CLEARLY * error else None
+
+
+def _candidates(body: LearnedBody, block: IntArray) -> Iterator[tuple[Correlation, Array]]:
+    """Correlations, and by how much each makes the pushes left out likelier than independence, (blocks,) nats."""
+    rows, count = np.sort(np.random.default_rng(0).permutation(len(block))[:MOST_ROWS]), len(block)
+    known, features, block = _left_over(body, block, rows), body.regressions[0].inputs[rows], block[rows]
+    kept = rows if len(rows) < count else None
+    for bandwidth in BANDWIDTHS:
+        smoother = Correlation(features, known.bounded, bandwidth, SHRINKAGES[0])
+        sums = smoother.sums_left_out(features, block)
+        for shrinkage in SHRINKAGES:
+            gains = known.gains(correlations(sums, shrinkage))
+            candidate = replace(smoother, shrinkage=shrinkage, rows=kept)
+            yield candidate, np.asarray(np.bincount(block, gains), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _LeftOver:
+    """What regressions leave over of rows that they have not seen, with the variances that they give: (n, 3) each."""
+
+    residuals: Array
+    of_function: Array
+    of_process: Array
+
+    @property
+    def bounded(self) -> Array:
+        """In units of the prediction, none longer than LONGEST; in the digits that a model file keeps."""
+        scaled = self.residuals / np.sqrt(self.of_function + self.of_process)
+        longest = np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), LONGEST)
+        return (scaled * LONGEST / longest).astype(np.float32).astype(np.float64)
+
+    def gains(self, correlation: Array) -> Array:
+        """Log densities (n,) with correlation matrices (n, 3, 3) less those of independent outputs."""
+        joint, alone = (self._log_density(matrices) for matrices in (correlation, None))
+        return joint - alone
+
+    def _log_density(self, correlation: Array | None) -> Array:
+        covariance, _ = covariances(self.of_function, self.of_process, correlation)
+        lower = np.linalg.cholesky(covariance)
+        z = np.linalg.solve(lower, self.residuals[:, :, None])[:, :, 0]
+        diagonal = np.diagonal(lower, axis1=1, axis2=2)
+        return np.asarray(-0.5 * np.sum(z**2, axis=1) - np.sum(np.log(diagonal), axis=1))
+
+
+def _left_over(body: LearnedBody, block: IntArray, rows: IntArray) -> _LeftOver:
+    latent = [left_out(regression, block) for regression in body.regressions]
+    outputs = [regression.outputs for regression in body.regressions]
+    return _LeftOver(
+        np.column_stack([y - p.mean for y, p in zip(outputs, latent, strict=True)])[rows],
+        np.column_stack([p.variance for p in latent])[rows],
+        np.column_stack([p.process_variance for p in latent])[rows],
+    )

@@ -1,0 +1,38 @@
+"""Correlation matrices of three outputs as three numbers without bounds, which a table may hold.
+
+They are atanh of r12, of r13 and of the partial correlation r23.1. Whatever these are, the matrix that they stand for
+is positive definite, and an error e in one of them changes the variance of no combination of outputs by more than about
+2 e, however close to +-1 the correlation is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt, tanh
+
+import numpy as np
+
+from push_predictor.types import Array
+
+_LARGEST = 1.0 - 1e-12
+_PLACES = np.array([[0, 1, 2], [1, 0, 3], [2, 3, 0]])
+
+
+def unbounded(correlation: Array) -> Array:
+    """The three numbers (m, 3) of correlation matrices (m, 3, 3)."""
+    r12, r13, r23 = correlation[:, 0, 1], correlation[:, 0, 2], correlation[:, 1, 2]
+    partial = (r23 - r12 * r13) / np.sqrt((1.0 - r12**2) * (1.0 - r13**2))
+    return np.arctanh(np.clip(np.column_stack([r12, r13, partial]), -_LARGEST, _LARGEST))
+
+
+def bounded(numbers: Array) -> Array:
+    """Correlation matrices (n, 3, 3) of the three numbers (n, 3)."""
+    r12, r13, partial = np.tanh(numbers.T)
+    r23 = r12 * r13 + partial * np.sqrt((1.0 - r12**2) * (1.0 - r13**2))
+    return np.asarray(np.stack([np.ones(len(numbers)), r12, r13, r23], axis=-1)[:, _PLACES])
+
+
+def bounded_one(numbers: Sequence[float]) -> tuple[float, float, float]:
+    """r12, r13 and r23 of the three numbers."""
+    r12, r13, partial = tanh(numbers[0]), tanh(numbers[1]), tanh(numbers[2])
+    return r12, r13, r12 * r13 + partial * sqrt((1.0 - r12 * r12) * (1.0 - r13 * r13))

@@ -1,0 +1,24 @@
+"""From a slider and a sequence of pushes to poses with covariance: what rollout_pushes does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
+from push_predictor.nodes.model_shelf import ModelShelf
+from push_predictor.nodes.request_frames import RequestFrames
+from push_predictor.planning.rollout import PARTICLES, rollout
+
+
+def answer_rollout(frames: RequestFrames, shelf: ModelShelf, request: Any, response: Any) -> None:
+    """Answer RolloutPushes, in the frame of the request. Raises RequestError.
+
+    At least PARTICLES are carried along, so that the poses do not depend on how many samples are wanted.
+    """
+    query = query_from_rollout_request(request)
+    served = shelf.get(query.model)
+    frame = frames.located(request.header)
+    slider = world_slider(query, frame)
+    particles = max(PARTICLES, query.samples)
+    rolled = rollout(served, slider.planar, slider.covariance, query.steps, particles, query.seed)
+    fill_rollout_response(response, frame, slider, rolled, query.samples)

@@ -1,0 +1,137 @@
+"""How long what a model does not foresee stays with a push: learnt from the windows of its training pushes.
+
+The windows of one push do not scatter independently. How slider and table touch changes only with the way, some of it
+lasts for the whole push, and an error of the learnt function is the same at the next window, which lies close by. Per
+output, residuals standardised by the model's own prediction are taken to correlate over a way s as
+
+    lasting + passing exp(-s / length),     lasting, passing >= 0,   lasting + passing <= 1,
+
+and what is left of the variance is new in every window. lasting, passing and length are fitted by least squares to the
+products of all pairs of windows of a push, no more than LAGS windows apart. For a learnt model the residuals are those
+of predictions without the whole push (left_out.py). They have heavy tails, and the few largest would decide alone, so
+they are replaced by the normal scores of their ranks. Few pushes tell little: the shares are multiplied by
+pushes / (pushes + FEW), towards windows that are independent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.special import ndtri
+from scipy.stats import rankdata
+
+from push_predictor.models.bodies import ExtendedBody, LearnedBody
+from push_predictor.models.left_out import moments_left_out
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, IntArray
+
+LAGS = 10  # windows
+FEW = 5  # pushes; a correlation found in n of them has a standard error of n^-1/2, and is some 0.45
+LENGTHS = np.geomspace(1e-3, 0.05, 18)  # m, tried
+MODELS_REMEMBERED = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Persistence:
+    """lasting (3,), passing (3,): shares of the variance of dx, dy, dtheta; length (3,) in m of the tip's way."""
+
+    lasting: Array
+    passing: Array
+    length: Array
+
+    def correlation(self, way: Array) -> Array:
+        """Correlation (n, 3) of standardised residuals that lie a way (n,) > 0 m of the tip apart."""
+        return np.asarray(self.lasting + self.passing * np.exp(-way[:, None] / self.length))
+
+
+INDEPENDENT = Persistence(np.zeros(3), np.zeros(3), np.ones(3))
+
+
+@lru_cache(MODELS_REMEMBERED)
+def persistence_of(model: PushModel) -> Persistence:
+    """What the model's training pushes show; some tenths of a second for 1000 windows, remembered afterwards."""
+    return fit_persistence(whitened_residuals(model), model.training)
+
+
+def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
+    """Fit to residuals (n, 3) of a table's windows; only their order counts."""
+    first, second, pushes = _pairs(table)
+    if pushes == 0:
+        return INDEPENDENT
+    apart = _way_between(table, first, second)
+    scores = _normal_scores(residuals)
+    products = scores[first] * scores[second] / np.maximum(np.mean(scores**2, axis=0), np.finfo(float).tiny)
+    shares = [_fit(apart, column) for column in products.T]
+    lasting, passing, length = np.array(shares).T
+    trust = pushes / (pushes + FEW)
+    return Persistence(trust * lasting, trust * passing, length)
+
+
+def whitened_residuals(model: PushModel) -> Array:
+    """Residuals (n, 3) of the training rows in units of the root of the covariance predicted without their pushes."""
+    rows = model.training
+    mean, covariance, _ = _moments_unseen(model, Push(rows.inputs, rows.duration, rows.covariates))
+    # A covariance without noise has no inverse.
+    return np.asarray((np.linalg.pinv(root_of(covariance)) @ (rows.outcomes - mean)[:, :, None])[:, :, 0])
+
+
+def root_of(covariance: Array) -> Array:
+    """Roots R (n, 3, 3) of covariances (n, 3, 3), R R' = covariance: standard deviations times the symmetric root of
+    the correlation, so that each standard deviation that R takes stays with its own output, whatever its unit.
+    """
+    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / (sd[:, :, None] * sd[:, None, :]))
+    roots = np.sqrt(np.maximum(values, 0.0))  # below zero by rounding
+    return np.asarray(sd[:, :, None] * ((vectors * roots[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
+
+
+def _moments_unseen(model: PushModel, push: Push) -> tuple[Array, Array, Array]:
+    """The model's moments at its training rows, by a learnt base without their pushes."""
+    body = model.body
+    base = body.base if isinstance(body, ExtendedBody) else body
+    if not isinstance(base, LearnedBody):
+        return body.moments(push)
+    moments = moments_left_out(base, np.unique(model.training.push_id, return_inverse=True)[1])
+    return body.extended(moments, push) if isinstance(body, ExtendedBody) else moments
+
+
+def _normal_scores(residuals: Array) -> Array:
+    return np.asarray(ndtri((rankdata(residuals, axis=0) - 0.5) / len(residuals)))
+
+
+def _way_between(table: PushTable, first: IntArray, second: IntArray) -> Array:
+    """The tip's way (k,) in m from window to window of the same pushes; they lie end to end unless times are known."""
+    if "elapsed_time" in table.covariates:
+        later = table.covariates["elapsed_time"][second] - table.covariates["elapsed_time"][first]
+        return np.abs(later) * 0.5 * (table.inputs[first, 0] + table.inputs[second, 0])
+    driven = np.cumsum(table.inputs[:, 0] * table.duration)
+    return np.asarray(driven[second] - driven[first])
+
+
+def _pairs(table: PushTable) -> tuple[IntArray, IntArray, int]:
+    """Rows of the earlier and the later window (k,) of all pairs within a push, and of how many pushes they are."""
+    number = np.unique(table.push_id, return_inverse=True)[1]
+    order = np.lexsort((table.covariates.get("elapsed_time", np.arange(len(table))), number))
+    number = number[order]
+    lags = [np.flatnonzero(number[:-lag] == number[lag:]) for lag in range(1, min(LAGS, len(number) - 1) + 1)]
+    first = np.concatenate([np.empty(0, dtype=np.int64), *lags])
+    second = np.concatenate([np.empty(0, dtype=np.int64), *(rows + lag for lag, rows in enumerate(lags, 1))])
+    return order[first], order[second], len(np.unique(number[first]))
+
+
+def _fit(apart: Array, products: Array) -> tuple[float, float, float]:
+    """The shares that last and pass, and the length over which the latter pass, that explain products (k,) best."""
+    fits = []
+    for length in LENGTHS.tolist():
+        decay = np.exp(-apart / length)
+        lasting, passing = nnls(np.column_stack([np.ones(len(apart)), decay]), products)[0]
+        if lasting + passing > 1.0:  # then nothing is new in a window
+            lasting = float(np.clip((products - decay) @ (1.0 - decay) / np.sum((1.0 - decay) ** 2), 0.0, 1.0))
+            passing = 1.0 - lasting
+        fits.append((float(np.sum((products - lasting - passing * decay) ** 2)), lasting, passing, length))
+    return min(fits)[1:]

@@ -1,0 +1,130 @@
+"""A sequence of pushes with what is uncertain carried along: samples of the slider's pose, each pushed in its own way.
+
+Every push is relative to the slider as it stands at the push's start: the robot looks before each, and puts the pusher
+at the commanded contact of where the slider is. Within a push it looks no more, the tip drives straight on. So a sample
+that has turned further is met elsewhere, and steps that each have one mode may lead to an outcome that has several.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.errors import RequestError
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.request import check_request
+from push_predictor.models.served import ServedModel
+from push_predictor.planning.particles import OF_THE_POSE, model_of, push_particles, refuse_other_covariates
+from push_predictor.planning.persistence import Persistence, persistence_of, root_of
+from push_predictor.planning.push_windows import windows_of
+from push_predictor.types import Array
+
+PARTICLES = 1000
+MOST_PARTICLES = 100_000
+MOST_WORK = 1_000_000  # particles times windows, some seconds
+A_COVARIANCE = "a symmetric (3, 3) matrix of finite numbers without negative eigenvalues"
+SEMIDEFINITE = 1e-9  # of a covariance's largest eigenvalue: how far below zero another may lie, by rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """mean (k, 3: x m, y m, heading rad) and covariance (k, 3, 3) of the slider's pose after each of k steps; samples
+    (p, 3) of it after the last; held (k,) and in_domain (k,): the share of the samples that the tip still pushed at
+    the end of the step, and of those for which the model has never been asked beyond the domain of its training data.
+
+    The mean of the heading is that on the circle, and covariances are about it, by the shorter way.
+    """
+
+    mean: Array
+    covariance: Array
+    samples: Array
+    held: Array
+    in_domain: Array
+
+
+def rollout(
+    predictor: PushModel | ServedModel,
+    slider_mean: Array,
+    slider_covariance: Array,
+    steps: Array,
+    particles: int = PARTICLES,
+    seed: int = 0,
+    persistence: Persistence | None = None,
+) -> Rollout:
+    """Roll out steps (k, 4: velocity m/s, contact, angle rad, duration s) from a slider at slider_mean (3,) with
+    slider_covariance (3, 3).
+
+    persistence: of what the model does not foresee, within a step; steps are independent of each other. None takes
+    what the model's training pushes show. The same seed gives the same samples. Raises RequestError.
+    """
+    model, steps = model_of(predictor), np.asarray(steps, dtype=np.float64).reshape(-1, 4)
+    _check(model, slider_mean, slider_covariance, steps, particles)
+    persistence = persistence_of(model) if persistence is None else persistence
+    rng = np.random.default_rng(seed)
+    sliders = drawn_poses(slider_mean, slider_covariance, particles, rng)
+    known, rows = np.ones(particles, dtype=np.bool_), []
+    for *inputs, duration in steps.tolist():
+        pushed = push_particles(predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng)
+        sliders, known = pushed.sliders, known & pushed.in_domain
+        rows.append((*moments_of(sliders), pushed.held.mean(), known.mean()))
+    mean, covariance, held, in_domain = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return Rollout(
+        np.reshape(mean, (-1, 3)),
+        np.reshape(covariance, (-1, 3, 3)),
+        _wrapped(sliders),
+        np.array(held, dtype=np.float64),
+        np.array(in_domain, dtype=np.float64),
+    )
+
+
+def drawn_poses(mean: Array, covariance: Array, count: int, rng: np.random.Generator) -> Array:
+    """Poses (count, 3) of a Gaussian; covariance (3, 3) may be singular."""
+    root = root_of(np.asarray(covariance, dtype=np.float64)[None])[0]
+    return np.asarray(mean + rng.standard_normal((count, 3)) @ root.T)
+
+
+def moments_of(poses: Array) -> tuple[Array, Array]:
+    """Mean (3,) and covariance (3, 3) of poses (p, 3): heading on the circle, deviations by the shorter way."""
+    heading = np.arctan2(np.mean(np.sin(poses[:, 2])), np.mean(np.cos(poses[:, 2])))
+    mean = np.array([*poses[:, :2].mean(axis=0), heading])
+    off = _wrapped(poses - mean)
+    return mean, off.T @ off / len(poses)
+
+
+def _wrapped(poses: Array) -> Array:
+    return np.column_stack([poses[:, :2], wrap_angle(poses[:, 2])])
+
+
+def _check(model: PushModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
+    refuse_other_covariates(model)
+    if not np.all(np.isfinite(mean)):
+        raise RequestError("slider_mean", np.asarray(mean).tolist(), "finite numbers: x, y in m, heading in rad")
+    if not is_covariance(np.asarray(covariance)):
+        raise RequestError("slider_covariance", np.asarray(covariance).tolist(), A_COVARIANCE)
+    if not 0 < particles <= MOST_PARTICLES:
+        raise RequestError("particles", particles, f"a number from 1 to {MOST_PARTICLES}")
+    windows = sum(_checked_windows(model, k, step) for k, step in enumerate(steps.tolist()))
+    if windows * particles > MOST_WORK:
+        most = MOST_WORK // particles
+        accepted = f"no more than {most} windows in all to {particles} particles"
+        raise RequestError("steps", f"{windows} windows", accepted)
+
+
+def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
+    try:
+        windows = windows_of(model, step[3])
+        check_request(model, step[0], step[1], step[2], windows.asked, dict.fromkeys(OF_THE_POSE, 0.0))
+    except RequestError as error:
+        raise error.within(f"steps[{index}]") from None
+    return windows.count
+
+
+def is_covariance(matrix: Array) -> bool:
+    """Whether a matrix is (3, 3), finite, symmetric and without negative eigenvalues, to rounding."""
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+        return False
+    values = np.linalg.eigvalsh(matrix)
+    symmetric = np.allclose(matrix, matrix.T, rtol=1e-6, atol=SEMIDEFINITE * max(abs(values[0]), abs(values[-1])))
+    return bool(symmetric and values[0] >= -SEMIDEFINITE * abs(values[-1]))

@@ -1,0 +1,337 @@
+"""The sparse VHGP: the dense one where every row is an inducing input, a bound below it where not; for many rows."""
+
+from __future__ import annotations
+
+import tracemalloc
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import square_rig
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.bodies import LearnedBody
+from push_predictor.models.kernels import KernelChoice
+from push_predictor.models.left_out import left_out
+from push_predictor.models.model_file import load_model, save_model
+from push_predictor.models.served import serve
+from push_predictor.models.sparse_bound import SparseBound, SparseProblem
+from push_predictor.models.sparse_fit import DEFAULT_INDUCING, fit_sparse_vhgp, maximise_over_noise
+from push_predictor.models.sparse_grid import sparse_grid_regression
+from push_predictor.models.sparse_inducing import inducing_rows
+from push_predictor.models.sparse_kernel import InducedKernel
+from push_predictor.models.sparse_left_out import sparse_left_out
+from push_predictor.models.sparse_record import has_inducing, put_inducing, sparse_regression
+from push_predictor.models.sparse_vhgp import SparseVHGP
+from push_predictor.models.train import MOST_DENSE_ROWS, inducing_inputs, train_model
+from push_predictor.models.vhgp import VHGP, fit_vhgp
+from push_predictor.models.vhgp_bound import Bound, Sites, VhgpProblem
+from push_predictor.models.vhgp_inner import maximise_over_noise as dense_maximum
+from push_predictor.models.vhgp_parameters import VhgpParameters
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0)
+
+
+def rows(n: int, seed: int = 0) -> tuple[Array, Array]:
+    """A sine of the first input, with noise whose standard deviation is exp(second input - 1)."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.normal(size=(n, 2))
+    return inputs, np.sin(inputs[:, 0]) + rng.normal(size=n) * np.exp(inputs[:, 1] - 1.0)
+
+
+def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAMETERS) -> SparseProblem:
+    """With the first `signal` rows for inducing inputs of f, the last `noise` for those of g."""
+    inputs, outputs = rows(n)
+    return SparseProblem.of(inputs, outputs, parameters, inputs[:signal], inputs[n - noise :])
+
+
+@cache
+def dense_and_sparse(n: int) -> tuple[VHGP, SparseVHGP]:
+    """The same hyperparameters and sites; as many inducing inputs as tell of all rows."""
+    inputs, outputs = rows(n)
+    dense = fit_vhgp(inputs, outputs)
+    chosen = inducing_rows(dense.parameters.signal, inputs, n), inducing_rows(dense.parameters.noise, inputs, n)
+    return dense, SparseVHGP(inputs, outputs, dense.parameters, dense.site_precisions, *chosen)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> SparseVHGP:
+    return fit_sparse_vhgp(*rows(3000), 40)
+
+
+def test_with_every_row_an_inducing_input_it_is_the_dense_bound() -> None:
+    inputs, outputs = rows(60)
+    sites = np.exp(0.5 * np.random.default_rng(1).normal(size=60) - 0.7)
+    dense = Bound.tied(VhgpProblem.of(inputs, outputs, PARAMETERS), sites)
+    sparse = SparseBound.tied(problem(60, 60, 60), sites)
+    assert sparse.value == pytest.approx(dense.value, abs=1e-6)
+    np.testing.assert_allclose(sparse.signal.optimal_precisions, dense.optimal_precisions, atol=1e-6)
+
+
+def test_and_its_maximum_over_q_is_that_of_the_dense_one() -> None:
+    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-13)
+    sparse = maximise_over_noise(problem(60, 60, 60), [], 1e-13)
+    assert sparse.value == pytest.approx(dense.value, abs=1e-6)
+    np.testing.assert_allclose(sparse.hyperparameter_gradient(), dense.hyperparameter_gradient(), atol=1e-5)
+
+
+def test_fewer_inducing_inputs_never_give_a_higher_bound() -> None:
+    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-10).value
+    values = [maximise_over_noise(problem(60, m, m), [], 1e-10).value for m in (60, 40, 20, 10)]
+    assert values[0] == pytest.approx(dense, abs=1e-6)
+    assert dense > values[1] > values[2] > values[3]
+
+
+@pytest.mark.parametrize(("n", "signal", "noise"), [(60, 20, 30), (4500, 12, 9)])
+def test_gradient_of_every_hyperparameter_equals_finite_differences(n: int, signal: int, noise: int) -> None:
+    """Also across several blocks of rows."""
+
+    def maximum(vector: Array) -> SparseBound:
+        return maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), [], 0.0)
+
+    at, h = PARAMETERS.to_vector(), 1e-3
+    gradient = maximum(at).hyperparameter_gradient()
+    for i, step in enumerate(h * np.eye(7)):
+        near = maximum(at + step).value - maximum(at - step).value
+        far = maximum(at + 2 * step).value - maximum(at - 2 * step).value
+        assert gradient[i] == pytest.approx((8.0 * near - far) / (12.0 * h), abs=1e-7 * np.abs(gradient).max())
+
+
+def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
+    found = problem(200, 20, 15)
+    best = maximise_over_noise(found, [], 1e-12)
+    rng = np.random.default_rng(3)
+    for size in (1e-2, 1e-1, 1.0):
+        precisions = best.sites.precisions * np.exp(size * rng.normal(size=200))
+        potentials = best.sites.potentials + size * rng.normal(size=200)
+        assert SparseBound.at(found, Sites(precisions, potentials)).value < best.value
+
+
+def test_at_the_maximum_one_number_per_row_describes_q() -> None:
+    found = problem(200, 20, 15)
+    best = maximise_over_noise(found, [], 1e-12)
+    np.testing.assert_allclose(best.tied_precisions, best.sites.precisions, atol=1e-5)
+    assert SparseBound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
+
+
+def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
+    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
+    start = maximise_over_noise(problem(200, 20, 15, elsewhere), [], 1e-3).sites
+    fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in ([], [start]))
+    assert warm == pytest.approx(fresh, abs=1e-7)
+
+
+def test_what_is_left_unknown_is_the_diagonal_of_the_dense_kernel_less_what_is_told() -> None:
+    inputs, _ = rows(50)
+    kernel = PARAMETERS.signal
+    induced = InducedKernel.of(kernel, inputs, inputs[:15])
+    cross, between = kernel.cross(inputs, inputs[:15]), kernel.matrix(inputs[:15])
+    told = cross @ np.linalg.solve(between + 1e-9 * kernel.variance * np.eye(15), cross.T)
+    np.testing.assert_allclose(induced.missing, kernel.variance - np.diagonal(told), atol=1e-7)
+    np.testing.assert_allclose(induced.times(inputs[:, 0]), told @ inputs[:, 0], atol=1e-6)
+    weights = np.exp(inputs[:, 1])
+    ridge, precision = induced.regularise(weights), np.linalg.inv(told + np.diag(1.0 / weights))
+    np.testing.assert_allclose(ridge.residual(inputs[:, 0]), precision @ (inputs[:, 0] / weights), atol=1e-6)
+    np.testing.assert_allclose(ridge.posterior_diagonal, np.diagonal(told - told @ precision @ told), atol=1e-6)
+
+
+def test_inducing_inputs_tell_more_than_as_many_random_rows() -> None:
+    inputs, _ = rows(2000)
+    kernel = PARAMETERS.signal
+    chosen = inducing_rows(kernel, inputs, 30)
+    assert len(np.unique(chosen)) == 30
+    at_random = np.random.default_rng(0).permutation(2000)[:30]
+    unknown, then = (InducedKernel.of(kernel, inputs, inputs[z]).missing.max() for z in (chosen, at_random))
+    assert unknown < 0.3 * then
+
+
+def test_where_few_rows_tell_of_all_others_no_more_are_taken() -> None:
+    inputs = np.random.default_rng(0).integers(0, 3, size=(500, 2)).astype(float)
+    chosen = inducing_rows(PARAMETERS.signal, inputs, 100)
+    assert len(chosen) == 9
+    assert len(np.unique(inputs[chosen], axis=0)) == 9
+
+
+def test_the_fit_finds_where_it_is_noisy(fitted: SparseVHGP) -> None:
+    new = np.random.default_rng(9).uniform(-1.2, 1.2, size=(200, 2))
+    prediction = fitted.predict(new)
+    ratio = np.sqrt(prediction.process_variance) / np.exp(new[:, 1] - 1.0)
+    assert np.exp(np.abs(np.log(ratio)).mean()) < 1.1
+    assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.03
+
+
+def test_it_predicts_what_a_dense_model_of_the_same_rows_and_hyperparameters_does() -> None:
+    dense, sparse = dense_and_sparse(300)
+    new = rows(50, seed=3)[0]
+    one, other = dense.predict(new), sparse.predict(new)
+    np.testing.assert_allclose(other.mean, one.mean, atol=2e-4)
+    np.testing.assert_allclose(other.outcome_variance, one.outcome_variance, rtol=2e-3)
+    np.testing.assert_allclose(other.log_noise_variance, one.log_noise_variance, rtol=1e-2, atol=1e-4)
+
+
+def test_more_rows_than_a_dense_model_takes_teach_it_more(fitted: SparseVHGP) -> None:
+    inputs, outputs = rows(3000)
+    new, truth = rows(500, seed=5)[0], np.sin(rows(500, seed=5)[0][:, 0])
+    dense: VHGP = fit_vhgp(inputs[:300], outputs[:300])
+    error, of_dense = (np.mean((m.predict(new).mean - truth) ** 2) for m in (fitted, dense))
+    assert error < 0.5 * of_dense
+
+
+def test_the_same_rows_give_the_same_model(fitted: SparseVHGP) -> None:
+    again = fit_sparse_vhgp(*rows(3000), 40)
+    new = rows(20, seed=4)[0]
+    np.testing.assert_array_equal(again.predict(new).mean, fitted.predict(new).mean)
+    np.testing.assert_array_equal(again.inducing_noise, fitted.inducing_noise)
+
+
+def test_a_model_is_its_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
+    chosen = fitted.inducing_signal, fitted.inducing_noise
+    again = SparseVHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions, *chosen)
+    one, other = fitted.predict(fitted.inputs[:50]), again.predict(fitted.inputs[:50])
+    np.testing.assert_array_equal(one.outcome_variance, other.outcome_variance)
+
+
+def test_one_input_is_predicted_as_in_a_batch(fitted: SparseVHGP) -> None:
+    new = rows(7, seed=1)[0]
+    batch = fitted.predict(new)
+    for i in range(7):
+        single = fitted.predict(new[i : i + 1])
+        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-9)
+        assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-7)
+
+
+def test_left_out_it_says_what_a_dense_model_does_left_out() -> None:
+    dense, sparse = dense_and_sparse(300)
+    block = np.random.default_rng(0).integers(0, 40, size=300)
+    of_dense, of_sparse = left_out(dense, block), sparse_left_out(sparse, block)
+    for name in ("mean", "variance", "log_noise_mean", "log_noise_variance"):
+        np.testing.assert_allclose(getattr(of_sparse, name), getattr(of_dense, name), atol=1e-4, err_msg=name)
+
+
+def test_left_out_a_row_does_not_know_itself() -> None:
+    """A value that no other row would expect moves what is predicted where it is, but not with the row left out."""
+    _, sparse = dense_and_sparse(300)
+    wrong = sparse.outputs.copy()
+    wrong[7] += 3.0
+    chosen = sparse.inducing_signal, sparse.inducing_noise
+    told = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
+    one, other = (sparse_left_out(model, np.arange(300)).mean[7] for model in (sparse, told))
+    assert one == pytest.approx(other, abs=1e-9)
+    assert told.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
+
+
+def test_on_a_grid_it_is_what_it_predicts(fitted: SparseVHGP) -> None:
+    regression = sparse_grid_regression(fitted)
+    axes = np.linspace(-1.0, 1.0, 7), np.linspace(-1.5, 1.0, 5)
+    points = fitted.predict(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
+    assert regression.noise is not None
+    for posterior, prior, mean, variance in (
+        (regression.signal, 0.0, points.mean, points.variance),
+        (regression.noise, regression.log_noise, points.log_noise_mean, points.log_noise_variance),
+    ):
+        scale = np.exp(posterior.kernel.log_lengthscales)
+        factors = [
+            np.exp(-0.5 * ((axis[:, None] - posterior.inputs[:, d]) / scale[d]) ** 2) for d, axis in enumerate(axes)
+        ]
+        on_grid = posterior.moments(factors)
+        np.testing.assert_allclose(on_grid[0].ravel() + prior, mean, atol=1e-9)
+        np.testing.assert_allclose(on_grid[1].ravel(), variance, rtol=1e-7)
+
+
+def test_a_record_gives_the_same_model_again(fitted: SparseVHGP) -> None:
+    arrays: dict[str, np.ndarray] = {}
+    put_inducing(fitted, 1, arrays)
+    assert has_inducing(1, arrays) and not has_inducing(0, arrays)
+    known = fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions
+    again = sparse_regression(*known, 1, arrays)
+    new = rows(20, seed=8)[0]
+    np.testing.assert_array_equal(again.predict(new).outcome_variance, fitted.predict(new).outcome_variance)
+    for wrong in (np.array([3, 3]), np.array([-1]), np.array([3000]), np.array([[1]]), np.empty(0)):
+        with pytest.raises(ValueError, match="different rows out of 3000"):
+            sparse_regression(*known, 1, {**arrays, "inducing_noise_1": wrong})
+
+
+def test_far_from_the_data_the_prior_is_left(fitted: SparseVHGP) -> None:
+    far, parameters = fitted.predict(np.array([[1e6, 1e6]])), fitted.parameters
+    assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
+    assert far.variance[0] == pytest.approx(parameters.signal.variance, rel=1e-5)
+    assert far.log_noise_mean[0] == pytest.approx(parameters.noise_mean)
+    assert far.log_noise_variance[0] == pytest.approx(parameters.noise.variance)
+
+
+def test_memory_is_that_of_the_rows_times_the_inducing_inputs() -> None:
+    inputs, outputs = rows(20_000)
+    chosen = np.arange(0, 20_000, 400)
+    tracemalloc.start()
+    try:
+        SparseVHGP(inputs, outputs, PARAMETERS, np.full(20_000, 0.5), chosen, chosen)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 3.0 * 8 * 20_000 * len(chosen)  # features of f and of g, and blocks
+
+
+@pytest.mark.parametrize("outputs", [np.zeros(200), np.sign(np.arange(200) - 20.0), np.eye(200)[3] * 30.0])
+def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
+    inputs = np.random.default_rng(0).normal(size=(200, 2))
+    prediction = fit_sparse_vhgp(inputs, outputs, 20).predict(inputs)
+    assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
+
+
+def test_repeated_inputs_are_no_obstacle() -> None:
+    inputs, outputs = rows(1200)
+    inputs = inputs[np.arange(1200) // 40 * 40]
+    assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 50).bound)
+
+
+def test_rows_and_kernels_that_cannot_be_learnt_from_are_refused() -> None:
+    with pytest.raises(TrainingError, match="NaN"):
+        fit_sparse_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
+    rough = VhgpParameters.from_vector(PARAMETERS.to_vector(), KernelChoice("matern52"))
+    with pytest.raises(TrainingError, match="Matern52"):
+        SparseProblem.of(*rows(10), rough, np.zeros((1, 2)), np.zeros((1, 2)))
+
+
+def table(n: int) -> PushTable:
+    """Pushes of five windows each, with noise that grows with the angle."""
+    rng = np.random.default_rng(0)
+    inputs = np.column_stack([np.full(n, 0.02), rng.uniform(0.0, 0.25, n), rng.uniform(-0.5, 0.5, n)])
+    noise = rng.normal(size=(n, 3)) * np.exp(2.0 * inputs[:, 2:] - 1.0)
+    outcomes = 1e-3 * (np.column_stack([np.cos(inputs[:, 2]), np.sin(inputs[:, 2]), inputs[:, 1]]) + noise)
+    return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"push-{k // 5}" for k in range(n)]))
+
+
+def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None:
+    assert inducing_inputs("vhgp", MOST_DENSE_ROWS) is None
+    assert inducing_inputs("vhgp", MOST_DENSE_ROWS + 1) == DEFAULT_INDUCING
+    assert inducing_inputs("vhgp", 100, 30) == 30
+    assert inducing_inputs("analytical", 100_000) is None
+    for kind, wanted in (("gp", 30), ("analytical", 30), ("vhgp", 0)):
+        with pytest.raises(TrainingError, match=f"inducing: {wanted} is not accepted"):
+            inducing_inputs(kind, 100, wanted)
+
+
+def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) -> None:
+    rows = table(400)
+    model = train_model(rows, square_rig(), "vhgp", name="sparse", n_train=400, inducing=30)
+    assert isinstance(model.body, LearnedBody)
+    assert all(isinstance(regression, SparseVHGP) for regression in model.body.regressions)
+    save_model(model, tmp_path / "sparse.pushmodel")
+    again = load_model(tmp_path / "sparse.pushmodel")
+    push = rows.inputs[:40], rows.duration[:40]
+    np.testing.assert_array_equal(again.predict(*push).covariance, model.predict(*push).covariance)
+    served = serve(again)
+    assert served.domain is not None, served.how
+    variance = np.diagonal(model.predict(*push).covariance, axis1=1, axis2=2)
+    of_table = np.diagonal(served.predict(*push).covariance, axis1=1, axis2=2)
+    np.testing.assert_allclose(of_table, variance, rtol=1e-2)
+    truth = 1e-6 * np.exp(4.0 * rows.inputs[:40, 2] - 2.0)
+    assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4
+
+
+def test_a_sparse_model_takes_no_other_kernels() -> None:
+    with pytest.raises(TrainingError, match="squared exponential"):
+        train_model(table(50), square_rig(), "vhgp", name="m", inducing=10, choice=KernelChoice("matern52"))
