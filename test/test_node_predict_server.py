@@ -451,6 +451,13 @@ def test_activation_fails_without_a_model():
         assert server.state() == "inactive"
 
 
+def test_the_word_default_stands_for_the_shipped_model_and_it_says_that_it_is_simulated():
+    with server_of(["default"]) as server:
+        assert list(server.list().names) == ["simulated_square_abs"]
+        assert server.push().success
+        assert "simulated square" in server.process.text()
+
+
 def test_parameters_are_described_and_bad_values_refused_with_a_reason(server):
     names = ["models", "default_model", "autostart", "introspection", "diagnostics_period"]
     described = server.call("push_predictor/describe_parameters", DescribeParameters.Request(names=names)).descriptors

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
+from push_predictor.models.default_model import default_model_path
 from push_predictor.models.model_file import is_model_file, load_model
 from push_predictor.models.served import ServedModel, serve
+
+SHIPPED = "default"  # stands for the model that ships with the package
 
 
 class ModelShelf:
@@ -77,11 +80,11 @@ class ModelShelf:
         return [f"{name}: {served.how}" for name, served in self._models.items()]
 
     def load_all(self, places: Iterable[str]) -> list[str]:
-        """Load files and folders of files. Answers what went wrong, a line each; the other models are loaded."""
+        """Load files, folders of files, and for SHIPPED the shipped model. Answers what went wrong, a line each; the other models are loaded."""
         problems = []
         for index, place in enumerate(places):
             try:
-                for path in model_files(Path(place).expanduser()):
+                for path in model_files(_place(place)):
                     problems += self._problem(path)
             except ModelFileError as error:
                 problems.append(f"models[{index}]: {error}")
@@ -109,6 +112,10 @@ class ModelShelf:
         except PushPredictorError as error:
             return [str(error)]
         return []
+
+
+def _place(text: str) -> Path:
+    return default_model_path() if text == SHIPPED else Path(text).expanduser()
 
 
 def model_files(place: Path) -> list[Path]:

@@ -24,7 +24,7 @@ from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
 from push_predictor.nodes.direct_service import DirectService
-from push_predictor.nodes.model_shelf import ModelShelf
+from push_predictor.nodes.model_shelf import SHIPPED, ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.pose_answers import answer_slider_pose
 from push_predictor.nodes.request_frames import RequestFrames
@@ -49,7 +49,11 @@ INTROSPECTION = {
     "contents": ServiceIntrospectionState.CONTENTS,
 }
 PARAMETERS = (
-    Param("models", [""], "Model files, and folders of them, loaded when the node is configured."),
+    Param(
+        "models",
+        [SHIPPED],
+        "Model files, and folders of them, loaded when the node is configured; 'default': the shipped one.",
+    ),
     Param(
         "default_model",
         "",
@@ -131,6 +135,8 @@ class PredictServer(LifecycleNode):
         self._problems = self._shelf.load_all(self.value("models"))
         for problem in self._problems:
             self.get_logger().error(problem)
+        if SHIPPED in self.value("models"):
+            self.get_logger().warning("the shipped model is of a simulated square on ABS: give 'models' for your rig")
         self._shelf.choose_default(self.value("default_model"))
         self._direct = DirectService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
         self._offered = [
