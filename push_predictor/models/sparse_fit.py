@@ -104,8 +104,11 @@ def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_induc
     best = search.best
     if best is None:
         raise TrainingError(f"the variational bound of {len(outputs)} rows is not finite anywhere")
-    bound = maximise_over_noise(search.problem(best.parameters), [best.sites], _FINAL_TOLERANCE * len(outputs))
-    return SparseVHGP(inputs, outputs, best.parameters, bound.tied_precisions, *chosen)
+    try:
+        bound = maximise_over_noise(search.problem(best.parameters), [best.sites], _FINAL_TOLERANCE * len(outputs))
+        return SparseVHGP(inputs, outputs, best.parameters, bound.tied_precisions, *chosen)
+    except (LinAlgError, FloatingPointError) as error:
+        raise TrainingError(f"no sparse VHGP of {len(outputs)} rows is found: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)

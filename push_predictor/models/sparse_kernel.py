@@ -120,9 +120,8 @@ class InducedRidge:
     def _of_inducing(self, told: Array, signed: Array) -> Array:
         """The part of the gradient that goes through K_ZZ, but for its sign."""
         induced, kernel = self.induced, self.induced.kernel
-        weights = blas.dtrsm(
-            1.0, induced.factor, self.inner - np.eye(len(self.inner)) - self.explained, side=1, lower=1
-        )
+        known = self.inner - np.eye(len(self.inner)) - self.explained
+        weights = blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
         weights = blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ told.T
         weights = 0.25 * (weights + weights.T)
         gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)

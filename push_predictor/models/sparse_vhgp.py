@@ -85,11 +85,8 @@ class SparseVHGP:
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (q, D)."""
-        parameters, of_signal, of_noise = (
-            self.parameters,
-            self.parameters.signal.variance,
-            self.parameters.noise.variance,
-        )
+        parameters = self.parameters
+        of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
         mean, explained = self.signal.predict(inputs)
         log_noise, told = self.noise.predict(inputs)
         # As of a VHGP, the jitter is independent of the data.

@@ -80,7 +80,10 @@ class ModelShelf:
         return [f"{name}: {served.how}" for name, served in self._models.items()]
 
     def load_all(self, places: Iterable[str]) -> list[str]:
-        """Load files, folders of files, and for SHIPPED the shipped model. Answers what went wrong, a line each; the other models are loaded."""
+        """Load files, folders of files, and for SHIPPED the shipped model.
+
+        Answers what went wrong, a line each; the other models are loaded.
+        """
         problems = []
         for index, place in enumerate(places):
             try:
