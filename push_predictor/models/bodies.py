@@ -211,6 +211,15 @@ class ExtendedBody:
         return base.log_density(latent, outcomes)
 
 
+def with_independent_outputs(
+    body: LearnedBody | AnalyticalBody | ExtendedBody,
+) -> LearnedBody | AnalyticalBody | ExtendedBody:
+    """The same body without what a learnt one knows of how its outputs go together."""
+    if isinstance(body, ExtendedBody) and isinstance(body.base, LearnedBody):
+        return replace(body, base=replace(body.base, correlation=None))
+    return replace(body, correlation=None) if isinstance(body, LearnedBody) else body
+
+
 def scaled_features(rig: Rig, scaling: Scaling, inputs: Array) -> Array:
     """Standardised features (n, D) of inputs (n, 3)."""
     features = push_features(rig.outline, inputs)[:, scaling.columns]

@@ -1,7 +1,7 @@
 """Hyperparameters of a sparse VHGP, coarse to fine: a dense VHGP of few rows, then the sparse bound of more, of all.
 
 At each stage the inducing inputs are chosen for the hyperparameters that the stage before found, and stay; L-BFGS sees
-the hyperparameters, and q(g) is solved for at every step, as in vhgp_fit.py. There is no prior: it is for few rows.
+the hyperparameters, and q(g) is solved for at every step, as in vhgp_fit.py.
 """
 
 from __future__ import annotations
@@ -33,6 +33,12 @@ _MOST_STEPS = 30
 _SHORTEST_STEP = 1.0 / 64.0
 _REFUSED = 1e10
 _REACH = np.log(30.0)  # by this factor a hyperparameter may change in a stage
+# Gaussian priors of the logarithms of g's lengthscales and standard deviation: those of vhgp_fit.py, as strong for any
+# number of rows as they are for a hundred. Windows of one push are no independent draws: the bound of many takes
+# what differs from push to push for a noise that varies over short lengths, and is too sure between the pushes.
+_LENGTHSCALE, _LENGTHSCALE_SPREAD = -0.7, 0.5
+_SD, _SD_SPREAD = -0.4, 0.3
+_PRIOR_WEIGHT = 0.01  # a row
 _UNIT = 0.1  # of the logarithms: about the length of the first step
 
 
@@ -115,11 +121,11 @@ def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_induc
 class _Found:
     parameters: VhgpParameters
     sites: Sites
-    value: float
+    cost: float
 
 
 class _Search:
-    """The function that L-BFGS sees: minus the bound, in nats. best: the highest bound it has seen."""
+    """The function that L-BFGS sees: minus bound and log prior, in nats. best: the lowest that it has seen."""
 
     def __init__(self, inputs: Array, outputs: Array, chosen: Sequence[IntArray], rough: VHGP | SparseVHGP) -> None:
         self.inputs, self.outputs, self.rough = inputs, outputs, rough
@@ -136,9 +142,11 @@ class _Search:
             bound = maximise_over_noise(problem, self._starts(problem), _SEARCH_TOLERANCE * n)
         except (LinAlgError, FloatingPointError):
             return _REFUSED, np.zeros_like(point)
-        if self.best is None or bound.value > self.best.value:
-            self.best = _Found(parameters, bound.sites, bound.value)
-        return -bound.value, -bound.hyperparameter_gradient() * _UNIT
+        penalty, slope = noise_penalty(point * _UNIT, n)
+        cost = penalty - bound.value
+        if self.best is None or cost < self.best.cost:
+            self.best = _Found(parameters, bound.sites, cost)
+        return cost, (slope - bound.hyperparameter_gradient()) * _UNIT
 
     def _starts(self, problem: SparseProblem) -> list[Sites]:
         if self.best is not None:
@@ -146,3 +154,14 @@ class _Search:
         noise = self.rough.predict(self.inputs)
         signal = SparseSignal.of(problem, noise.log_noise_mean, noise.log_noise_variance)
         return [sites_from(signal.optimal_precisions, noise.log_noise_mean), fresh_sites(problem)]
+
+
+def noise_penalty(vector: Array, n: int) -> tuple[float, Array]:
+    """Minus the log prior of the hyperparameters (2 D + 3,) of n rows, but for a constant, and its gradient."""
+    d = (len(vector) - 3) // 2
+    centre, spread = np.full(d + 1, _LENGTHSCALE), np.full(d + 1, _LENGTHSCALE_SPREAD)
+    centre[-1], spread[-1] = _SD, _SD_SPREAD
+    deviation = (vector[d + 1 : 2 * d + 2] - centre) / spread
+    slope = np.zeros_like(vector)
+    slope[d + 1 : 2 * d + 2] = _PRIOR_WEIGHT * n * deviation / spread
+    return 0.5 * _PRIOR_WEIGHT * n * float(deviation @ deviation), slope

@@ -33,7 +33,7 @@ from push_predictor.types import Array, IntArray
 DEFAULT_ROWS = 1000
 FEWEST_ROWS = 10
 MOST_DENSE_ROWS = (
-    2000  # a dense VHGP of so many takes half a minute and 200 MB, of twice as many eight and four times it
+    2000  # a dense VHGP of so many takes 46 CPU s and 240 MB, one of twice as many eight and four times that
 )
 CONSTANT = 1e-9  # a feature whose spread is below this part of its size does not vary
 

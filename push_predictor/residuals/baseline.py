@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.bodies import ExtendedBody, LearnedBody
+from push_predictor.models.bodies import ExtendedBody, LearnedBody, with_independent_outputs
 from push_predictor.models.left_out import moments_left_out
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
@@ -84,10 +84,11 @@ class Baseline:
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
     """The baseline of a model, from the training windows that it keeps, each push left out of what it is judged by."""
-    table, base = with_inputs(model.training), model.base.body
+    table, body = with_inputs(model.training), with_independent_outputs(model.body)
     push = Push(table.inputs, table.duration, table.covariates)
+    base = body.base if isinstance(body, ExtendedBody) else body
     moments = moments_left_out(base, push_order(table)) if isinstance(base, LearnedBody) else base.moments(push)
-    mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
+    mean, covariance, _ = body.extended(moments, push) if isinstance(body, ExtendedBody) else moments
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
     return Baseline(evidence, inputs_basis(model, table))
 

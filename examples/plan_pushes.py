@@ -1,0 +1,148 @@
+"""A planner that uses the services: bring a square to a goal pose with few pushes. `python -m examples.plan_pushes`.
+
+A model of bags/square_abs_train is served by a process of its own. What thousands of pushes would do is asked once, in
+batches. Then, push by push: choose (planning/choose.py), let rollout_pushes say how sure that is, and carry it out in
+the cell, the simulated rig on which the recording was made. The slider is not put back between pushes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from examples.planner_client import PlannerClient
+from examples.planner_picture import Step, draw_pushes
+from examples.processes import LOGS, node
+from push_predictor.errors import PushPredictorError
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.model_file import load_model
+from push_predictor.models.push_model import PushModel
+from push_predictor.planning.choose import Choice, choose_push
+from push_predictor.planning.goal import Goal
+from push_predictor.planning.persistence import persistence_of
+from push_predictor.planning.repertoire import Repertoire, every_line, repertoire
+from push_predictor.planning.unscented import Tip
+from push_predictor.simulation.one_push import push_once
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.types import Array
+
+ROOT = Path(__file__).resolve().parents[1]
+TRAINING = ROOT / "bags" / "square_abs_train"
+OUT = ROOT / "out" / "planner"
+WINDOW, VELOCITY = 0.2, 0.02  # s, m/s: most of the training pushes
+WINDOWS = (1, 2, 3, 4, 5, 6, 8)  # 4 to 32 mm
+START = np.array([-0.05, -0.02, 0.4])
+GOAL = Goal(np.array([0.03, 0.02, 0.0]), distance=0.002, turn=0.05)
+PROBABILITY = 0.9
+LIMIT = 10  # pushes
+SAMPLES = 500
+
+
+def main(arguments: Sequence[str] = ()) -> int:
+    """Plan and push; the exit status is 0 if the goal is reached."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", type=Path, help="a model of a square; trained on bags/square_abs_train unless given")
+    parser.add_argument("--seed", type=int, default=1, help="of what differs from push to push in the cell")
+    options = parser.parse_args(arguments)
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    for folder in (OUT, LOGS):
+        folder.mkdir(parents=True, exist_ok=True)
+    path = options.model or _trained()
+    print(f"serve {path}", flush=True)
+    model = load_model(path)
+    with node("predict_server", {"models": [str(path)]}, "planner_server"), PlannerClient(WINDOW) as client:
+        pushes = _asked(client, model)
+        steps = list(_pushed(client, pushes, options.seed))
+    reached = bool(GOAL.reached(GOAL.ahead(steps[-1].after)))
+    print(f"{'reached' if reached else 'NOT reached'} with {len(steps)} pushes")
+    _draw(steps, model.rig.outline)
+    return 0 if reached else 1
+
+
+def _trained() -> Path:
+    """The model file, trained now unless an earlier run left it."""
+    path = OUT / "vhgp.pushmodel"
+    if not path.exists():
+        command = ["train", str(TRAINING), "--model", "vhgp", "--n-train", "500", "--out", str(path)]
+        subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
+    return path
+
+
+def _asked(client: PlannerClient, model: PushModel) -> Repertoire:
+    """What the pushes do that the model knows, by the service."""
+    outline = model.rig.outline
+    edges = len(outline.vertices)
+    contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
+    lines = every_line([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
+    lasting = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    client.predict(lines[:1])  # returns when the server is up
+    begun = time.monotonic()
+    pushes = repertoire(client.predict, Tip(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, lasting)
+    print(f"{len(pushes)} pushes stay in the model's domain; asked in {time.monotonic() - begun:.1f} s", flush=True)
+    return pushes
+
+
+def _pushed(client: PlannerClient, pushes: Repertoire, seed: int) -> Iterator[Step]:
+    """Push after push, until the goal is reached or LIMIT are made."""
+    slider = START
+    for count in range(1, LIMIT + 1):
+        choice = choose_push(pushes, slider, GOAL, PROBABILITY)
+        if choice is None:
+            return
+        samples = client.outcomes(slider, choice.push, SAMPLES, seed=count)
+        after = push_once(_spec(choice, 1000 * seed + count), slider[None])[0]
+        _tell(count, slider, choice, samples, after)
+        yield Step(slider, choice, _way(choice), samples, after)
+        slider = after
+
+
+def _spec(choice: Choice, seed: int) -> SimulationSpec:
+    """The chosen push in the cell: the rig of the recording, its slider and its table."""
+    velocity, contact, angle = choice.push.inputs[0]
+    plan = PushPlan(*np.array([[contact], [angle], [velocity], [_way(choice)]]))
+    return SimulationSpec("rect1", "abs", plan, seed=seed)
+
+
+def _way(choice: Choice) -> float:
+    """Of the tip, m."""
+    return float(choice.push.inputs[0, 0] * WINDOW * choice.push.windows[0])
+
+
+def _tell(count: int, before: Array, choice: Choice, samples: Array, after: Array) -> None:
+    _, contact, angle = choice.push.inputs[0]
+    way = 1e3 * _way(choice)
+    print(f"push {count}: {_pose(GOAL.ahead(before))} to go, seen from the slider")
+    print(
+        f"   chosen   contact {contact:.3f}, angle {angle:+.2f} rad, {way:.0f} mm; {choice.expected:.1f} to be expected"
+    )
+    sure = float(GOAL.reached(GOAL.ahead(samples)).mean())
+    print(f"   it reaches the goal with probability {choice.probability:.2f}; rollout_pushes says {sure:.2f}")
+    print(f"   foreseen {_pose(choice.mean)}, sd {_pose(np.sqrt(np.diag(choice.covariance)))}")
+    print(f"   got      {_pose(after)}: {'there' if GOAL.reached(GOAL.ahead(after)) else 'not there yet'}", flush=True)
+
+
+def _pose(pose: Array) -> str:
+    return f"{1e3 * pose[0]:.1f} mm, {1e3 * pose[1]:.1f} mm, {pose[2]:.3f} rad"
+
+
+def _draw(steps: Sequence[Step], outline: Outline) -> None:
+    """Write the picture, if matplotlib is there."""
+    try:
+        path = draw_pushes(OUT / "pushes.png", steps, GOAL, outline)
+    except PushPredictorError as error:
+        print(error)
+    else:
+        print(f"picture: {path}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

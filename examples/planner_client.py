@@ -1,0 +1,87 @@
+"""A planner's end of the services: what it asks predict_server, as arrays."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from msg_adapters.predictions import PushQuery, RefusedError, prediction_from_response, query_to_batch_request
+from push_predictor.geometry.frames import quaternion_of_yaw
+from push_predictor.models.push_model import Prediction
+from push_predictor.planning.repertoire import Pushes
+from push_predictor.types import Array
+from push_predictor_interfaces.msg import PushStep
+from push_predictor_interfaces.srv import PredictPushBatch, RolloutPushes
+
+PATIENCE = 60.0  # s for a service to appear, and for an answer
+
+
+class PlannerClient:
+    """Asks predict_push_batch and rollout_pushes of the default model; window: s, of the model. A context manager."""
+
+    def __init__(self, window: float) -> None:
+        self._window = window
+        self._context = Context()
+
+    def __enter__(self) -> PlannerClient:
+        rclpy.init(context=self._context)
+        self._node = Node("planner", context=self._context)
+        self._batch = self._node.create_client(PredictPushBatch, "predict_push_batch")
+        self._rollout = self._node.create_client(RolloutPushes, "rollout_pushes")
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        self._thread.join()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def predict(self, inputs: Array) -> Prediction:
+        """Mean, covariance and in_domain of one window for inputs (n, 3). Raises RefusedError, SystemExit."""
+        request = query_to_batch_request(PushQuery("", inputs, self._window, {}))
+        return prediction_from_response(_call(self._batch, request))
+
+    def outcomes(self, slider: Array, push: Pushes, samples: int, seed: int) -> Array:
+        """Sampled poses (samples, 3) of a slider at (3,) in the world after a push. Raises RefusedError, SystemExit."""
+        velocity, contact, angle = push.inputs[0].tolist()
+        duration = self._window * int(push.windows[0])
+        step = PushStep(velocity=velocity, contact=contact, angle=angle, duration=duration)
+        request = RolloutPushes.Request(header=Header(frame_id="world"), steps=[step], particles=samples, seed=seed)
+        request.slider = PoseWithCovariance(pose=_pose(slider))
+        response = _call(self._rollout, request)
+        if not response.success:
+            raise RefusedError(response.message)
+        return np.reshape(response.samples, (-1, 3))
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return
+
+
+def _call(client: Any, request: Any) -> Any:
+    if not client.wait_for_service(PATIENCE):
+        raise SystemExit(f"{client.srv_name} is not offered")
+    response = client.call(request, timeout_sec=PATIENCE)
+    if response is None:
+        raise SystemExit(f"{client.srv_name} did not answer within {PATIENCE:g} s")
+    return response
+
+
+def _pose(slider: Array) -> Pose:
+    x, y, heading = slider.tolist()
+    z, w = quaternion_of_yaw(np.array(heading))
+    return Pose(position=Point(x=x, y=y, z=0.0), orientation=Quaternion(z=float(z), w=float(w)))

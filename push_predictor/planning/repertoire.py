@@ -1,0 +1,81 @@
+"""What pushes do, seen from the slider: worked out once, true wherever the slider lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.stats import norm, qmc
+
+from push_predictor.errors import RequestError
+from push_predictor.planning.unscented import FLOOR, Predict, Tip, after_window, at_the_touch, lines_of, moments
+from push_predictor.types import Array, BoolArray, IntArray
+
+DRAWS = 256  # of each outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """n straight pushes: inputs (n, 3: velocity m/s, contact, angle rad) at the touch, windows (n,) they last."""
+
+    inputs: Array
+    windows: IntArray
+
+    def __len__(self) -> int:
+        return len(self.windows)
+
+    def take(self, rows: IntArray | BoolArray) -> Pushes:
+        """The given rows (indices or mask)."""
+        return Pushes(self.inputs[rows], self.windows[rows])
+
+
+def every_line(velocities: Sequence[float], contacts: Array, angles: Array) -> Array:
+    """Inputs (n, 3): every velocity (m/s) with every contact and every angle (rad)."""
+    grids = np.meshgrid(velocities, contacts, angles, indexing="ij")
+    return np.column_stack([grid.ravel() for grid in grids])
+
+
+@dataclass(frozen=True, eq=False)
+class Repertoire:
+    """Pushes with what they do: displacement of the slider in its own body frame before the push.
+
+    mean (n, 3: m, m, rad), covariance (n, 3, 3).
+    """
+
+    pushes: Pushes
+    mean: Array
+    covariance: Array
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+    @cached_property
+    def outcomes(self) -> Array:
+        """Draws (n, DRAWS, 3) that fill each distribution evenly, as do the first 16, 32, 64 of them."""
+        factor = np.linalg.cholesky(self.covariance + FLOOR * np.eye(3))
+        points = norm.ppf(qmc.Sobol(3, seed=0).random(DRAWS))
+        return np.asarray(self.mean[:, None] + points @ np.swapaxes(factor, 1, 2))
+
+
+def repertoire(predict: Predict, tip: Tip, inputs: Array, windows: Sequence[int], lasting: float = 0.0) -> Repertoire:
+    """What straight pushes do that begin with inputs (n, 3), each of them with every number of windows.
+
+    Left out are those that may leave the model's domain, or the slider, before the last window ends. predict: mean,
+    covariance and in_domain of one window for inputs (m, 3); only pushes within +-pi/2 are asked for. lasting: share
+    of a window's covariance that is the same in all windows of a push, 0 to 1 (persistence.py). Raises RequestError if
+    no push is left.
+    """
+    lines = lines_of(tip, inputs)
+    rows, points = np.arange(len(inputs)), at_the_touch(len(inputs))
+    ended: list[tuple[IntArray, IntArray, Array]] = []
+    for window in range(max(windows, default=0)):
+        stays, points = after_window(predict, lines.take(rows), points, window, lasting)
+        rows = rows[stays]
+        if window + 1 in windows:
+            ended.append((rows, np.full(len(rows), window + 1), points[..., :3]))
+    if not sum(len(of_length) for of_length, *_ in ended):
+        raise RequestError("pushes", len(inputs) * len(windows), "at least one that stays in the model's domain")
+    order, lengths, poses = (np.concatenate(column) for column in zip(*ended, strict=True))
+    return Repertoire(Pushes(inputs[order], lengths), *moments(poses))
