@@ -72,6 +72,7 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         paint(figure)
+        figure.draw_without_rendering()  # the layout moves colour bars, whose ticks then change: laid out twice it fits
         figure.savefig(image, format="png")
     write_whole(path, image.getvalue())
     return path
