@@ -12,7 +12,7 @@ from msg_adapters.slider_poses import FLAT, PLANAR, pose_of_message
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import yaw_of_quaternion
 from push_predictor.geometry.spatial import SpatialPose
-from push_predictor.planning.rollout import A_COVARIANCE, MOST_PARTICLES, Rollout, is_covariance
+from push_predictor.planning.rollout import A_COVARIANCE, FARTHEST, MOST_PARTICLES, Rollout, is_covariance
 from push_predictor.types import Array
 
 
@@ -66,11 +66,14 @@ def world_slider(query: RolloutQuery, frame: SpatialPose) -> WorldSlider:
     slider = frame @ query.slider
     if slider.tilt > FLAT:
         raise RequestError("slider.pose.orientation tilt", round(slider.tilt, 4), f"a slider flat within {FLAT:g} rad")
-    finite = np.all(np.isfinite(query.covariance))
-    covariance = frame.covariance(query.covariance)[PLANAR] if finite else query.covariance[PLANAR]
-    if not (finite and is_covariance(covariance)):
-        accepted = f"{A_COVARIANCE} of x, y and the rotation about z, within (6, 6) finite numbers"
+    for index in np.flatnonzero(~np.isfinite(query.covariance.ravel()))[:1]:
+        raise RequestError(f"slider.covariance[{index}]", float(query.covariance.ravel()[index]), "a finite number")
+    covariance = frame.covariance(query.covariance)[PLANAR]
+    if not is_covariance(covariance):
+        accepted = f"{A_COVARIANCE} of x, y and the rotation about z"
         raise RequestError("slider.covariance", covariance.tolist(), accepted)
+    if not np.all(np.abs(slider.position) <= FARTHEST):
+        raise RequestError("slider.pose.position", slider.position.tolist(), f"a place within {FARTHEST:g} m")
     planar = np.array([*slider.position[:2], yaw_of_quaternion(*slider.quaternion)])
     return WorldSlider(slider, planar, covariance)
 

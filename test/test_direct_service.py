@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 import ros_harness as harness
@@ -36,6 +37,7 @@ def thread_name(request: Trigger.Request, response: Trigger.Response) -> Trigger
 
 def test_it_answers_though_nobody_spins_its_node(client_node, server):
     service = DirectService(server, Trigger, "alone", thread_name, DEPTH)
+    service.begin()
     client = client_node.create_client(Trigger, "alone", qos_profile=DEPTH)
     for _ in range(20):
         assert harness.call(client, Trigger.Request()).message == "alone"
@@ -44,6 +46,7 @@ def test_it_answers_though_nobody_spins_its_node(client_node, server):
 
 def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_node, server):
     service = DirectService(server, Trigger, "direct", thread_name, DEPTH)
+    service.begin()
     server.create_service(Trigger, "usual", thread_name, qos_profile=DEPTH)
     clients = {name: client_node.create_client(Trigger, name, qos_profile=DEPTH) for name in ("direct", "usual")}
     executor = SingleThreadedExecutor(context=client_node.context)
@@ -62,11 +65,28 @@ def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_n
 
 def test_requests_that_arrive_together_are_all_answered(client_node, server):
     service = DirectService(server, Trigger, "many", thread_name, DEPTH)
+    service.begin()
     client = client_node.create_client(Trigger, "many", qos_profile=DEPTH)
     harness.call(client, Trigger.Request())
     futures = [client.call_async(Trigger.Request()) for _ in range(30)]
     assert harness.wait_until(lambda: all(future.done() for future in futures), 10.0)
     service.close()
+
+
+def test_requests_wait_until_it_begins_and_those_that_wait_when_it_ends_are_answered(client_node, server):
+    def slow(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        time.sleep(0.05)
+        return thread_name(request, response)
+
+    service = DirectService(server, Trigger, "late", slow, DEPTH)
+    client = client_node.create_client(Trigger, "late", qos_profile=DEPTH)
+    assert client.wait_for_service(harness.START_TIMEOUT)
+    futures = [client.call_async(Trigger.Request()) for _ in range(5)]
+    assert not harness.wait_until(lambda: any(future.done() for future in futures), 0.3)
+    service.begin()
+    assert harness.wait_until(lambda: futures[0].done(), 5.0)
+    service.close()
+    assert harness.wait_until(lambda: all(future.done() for future in futures), 5.0)
 
 
 def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(client_node, server, capfd):
@@ -78,6 +98,7 @@ def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(clien
 
     asked: list[Trigger.Request] = []
     service = DirectService(server, Trigger, "broken", broken_once, DEPTH)
+    service.begin()
     client = client_node.create_client(Trigger, "broken", qos_profile=DEPTH)
     assert client.wait_for_service(harness.START_TIMEOUT)
     unanswered = client.call_async(Trigger.Request())
@@ -90,6 +111,7 @@ def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(clien
 def test_closing_ends_the_thread_and_takes_the_service_off_the_graph(client_node, server):
     for _ in range(3):  # it can be offered again
         service = DirectService(server, Trigger, "passing", thread_name, DEPTH)
+        service.begin()
         client = client_node.create_client(Trigger, "passing", qos_profile=DEPTH)
         assert harness.call(client, Trigger.Request()).success
         service.close()

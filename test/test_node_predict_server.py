@@ -35,7 +35,7 @@ from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.served import serve
 from push_predictor.models.train import train_model
-from push_predictor.nodes import predict_server
+from push_predictor.nodes import answers, predict_server
 from push_predictor.nodes.answers import MOST_PUSHES, answer_batch
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.predict_server import PARAMETERS
@@ -270,18 +270,18 @@ def test_arrays_of_unequal_length_are_refused(server):
 def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
     request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MOST_PUSHES + 1))))
     with pytest.raises(RequestError) as caught:
-        answer_batch(ModelShelf(), request, PredictPushBatch.Response())
+        answer_batch(lambda: None, ModelShelf(), request, PredictPushBatch.Response())
     assert str(caught.value) == "velocity length: 1000001 is not accepted, give at most 1000000 pushes a call"
 
 
 def test_one_push_is_answered_while_a_long_batch_is_computed(server):
-    many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (5000, 1)), 0.2, {}))
+    many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (2500, 1)), 0.2, {}))
     batch = server._clients["predict_push_batch"].call_async(many)
     time.sleep(0.1)  # the server has begun
     assert server.push().success
     assert not batch.done()
     assert harness.wait_until(batch.done)
-    assert len(batch.result().in_domain) == 100_000
+    assert len(batch.result().in_domain) == 50_000
 
 
 def test_covariates_that_no_model_needs_change_nothing(server):
@@ -318,6 +318,44 @@ def test_thirty_requests_in_flight_are_all_answered(server):
     futures = [client.call_async(query_to_request("", push, 0.2)) for push in np.resize(MANY, (30, 3))]
     assert harness.wait_until(lambda: all(future.done() for future in futures), 10.0)
     assert all(future.result().success for future in futures)
+
+
+def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
+    domain = harness.free_domain()
+    with harness.ros_context(domain) as node:
+        client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=100))
+        params = {"models": [str(folder / "gp.model")]}
+        with harness.node_process("predict_server", domain=domain, params=params):
+            end = time.monotonic() + harness.START_TIMEOUT
+            while not client.service_is_ready() and time.monotonic() < end:
+                time.sleep(0.0002)
+            response = harness.call(client, query_to_request("", GOOD, 0.2))
+        assert response.success, response.message
+
+
+def test_a_long_batch_stops_when_the_node_ends(folder):
+    shelf = ModelShelf()
+    shelf.load(folder / "analytical.model")
+    inputs = np.tile(GOOD, (3 * answers.ROWS_AT_ONCE, 1))
+    asked = []
+
+    def go_on():
+        asked.append(len(asked))
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+
+    request = query_to_batch_request(PushQuery("", inputs, 0.2, {}))
+    with pytest.raises(KeyboardInterrupt):
+        answers.answer_batch(go_on, shelf, request, PredictPushBatch.Response())
+    assert len(asked) == 2
+
+
+def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folder):
+    shelf = ModelShelf()
+    shelf.load(folder / "analytical.model")
+    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (answers.MOST_EXACT + 1, 1)), 0.2, {}))
+    with pytest.raises(RequestError, match="50001 pushes without a table"):
+        answers.answer_batch(lambda: None, shelf, request, PredictPushBatch.Response())
 
 
 # --- models -----------------------------------------------------------------------------------------------------

@@ -134,7 +134,7 @@ def test_it_says_when_samples_leave_what_the_model_has_learnt(ask: Ask) -> None:
         ({"steps": [STEPS[0], STEPS[0], [0.02, 0.1, 2.0, 1.0]]}, "steps[2].angle: 2.0 is not accepted, give an angle"),
         ({"steps": [[0.02, 0.1, 0.1, 0.5]]}, "steps[0].duration: 0.5 is not accepted, give 0.18 to 0.22 s"),
         ({"slider": np.array([0.0, np.nan, 0.0])}, "slider.pose.position.y: nan"),
-        ({"covariance": np.diag([1.0, 1.0, np.nan])}, "slider.covariance: "),
+        ({"covariance": np.diag([1.0, 1.0, np.nan])}, "slider.covariance[35]: nan"),
         ({"covariance": np.diag([1.0, -1.0, 1.0])}, "slider.covariance: "),
         ({"particles": 100_001}, "particles: 100001 is not accepted, give at most 100000"),
         ({"model": "other"}, "model: 'other' is not accepted, give one of gp"),

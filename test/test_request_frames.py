@@ -358,12 +358,17 @@ def test_the_world_frame_is_used_as_it_is(no_tf: None) -> None:
     assert RequestFrames(object(), "table").located(header("table")) is SAME_FRAME
 
 
-@pytest.mark.parametrize("frame_id", ["map", "/world", "World"])
+@pytest.mark.parametrize("frame_id", ["map", "World"])
 def test_without_tf_another_frame_is_refused_by_name(no_tf: None, frame_id: str) -> None:
     with pytest.raises(RequestError) as caught:
         RequestFrames(object(), "world").located(header(frame_id))
     expected = f"header.frame_id: {frame_id!r} is not accepted, give 'world'; tf2_ros is not installed"
     assert str(caught.value) == expected
+
+
+def test_a_slash_of_old_habit_is_named(tf: MadeUpTf) -> None:
+    with pytest.raises(RequestError, match="give 'world', without a slash"):
+        RequestFrames(object(), "world").located(header("/world"))
 
 
 def test_a_frame_without_a_name_is_refused(tf: MadeUpTf) -> None:

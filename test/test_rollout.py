@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,9 +22,9 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, Provenance, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.planning.particles import Deviations
-from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, root_of
+from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
-from push_predictor.planning.rollout import MOST_PARTICLES, MOST_WORK, moments_of, rollout
+from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, moments_of, rollout
 from push_predictor.planning.straight_drive import drive_onto
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -282,7 +284,8 @@ def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
         ({"steps": [[0.02, 0.1, 0.0, 0.5]]}, r"steps\[0\]\.duration: 0\.5 .*0\.18 to 0\.22 s, or a number of windows"),
         ({"steps": [[0.02, 0.1, 0.0, np.inf]]}, r"steps\[0\]\.duration: inf"),
         ({"steps": [[0.02, 0.1, 0.0, -1.0]]}, r"steps\[0\]\.duration: -1\.0"),
-        ({"steps": [[0.02, 0.1, 0.0, 0.2 * MOST_WORK]]}, r"steps: .* windows.*no more than 100000 windows in all"),
+        ({"steps": [[0.02, 0.1, 0.0, 1e300]]}, r"steps\[0\]\.duration: 1e\+300 .*at most 2000 s, 10000 windows"),
+        ({"steps": [[0.02, 0.1, 0.0, 400.0]], "particles": 100}, r"steps: '2000 windows'.*no more than 1000 windows"),
         ({"particles": 0}, r"particles: 0 .*1 to 100000"),
         ({"particles": MOST_PARTICLES + 1}, r"particles: 100001"),
         ({"slider_mean": [0.0, np.nan, 0.0]}, r"slider_mean: \[0\.0, nan, 0\.0\]"),
@@ -290,12 +293,46 @@ def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
         ({"slider_covariance": np.diag([1.0, -1e-3, 1.0])}, r"slider_covariance: .*without negative"),
         ({"slider_covariance": [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, r"slider_covariance"),
         ({"slider_covariance": np.eye(2)}, r"slider_covariance"),
+        ({"slider_covariance": np.diag([-5e-9, 1e-9, 10.0])}, r"slider_covariance"),
+        ({"slider_covariance": np.diag([1e300, 1e-6, 1e-6])}, r"slider_covariance"),
+        ({"slider_mean": [1e300, 0.0, 0.0]}, r"slider_mean: \[1e\+300"),
     ],
 )
 def test_what_cannot_be_rolled_out_is_refused_in_words(learnt, change, message) -> None:
     asked = {"slider_mean": AT_REST, "slider_covariance": CERTAIN, "steps": [PUSH], "particles": 10, **change}
     with pytest.raises(RequestError, match=message):
         rollout(learnt, **asked)
+
+
+def test_a_covariance_from_single_precision_is_one() -> None:
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
+    near_isotropic = np.diag(np.array([1.0e-6, 1.1e-6, 1e-4], dtype=np.float32))
+    matrix = (turn @ near_isotropic @ turn.T).astype(np.float64)
+    matrix[0, 1] *= 1.0 + 1e-7
+    assert is_covariance(matrix)
+    rollout(model_with(CERTAIN), AT_REST, matrix, np.empty((0, 4)), 5)
+
+
+def test_a_model_that_nobody_uses_any_more_is_not_kept_for_its_persistence() -> None:
+    model = model_with(NOISY)
+    persistence_of(model)
+    there = weakref.ref(model)
+    del model
+    gc.collect()
+    assert there() is None
+
+
+def test_a_rollout_that_is_not_wanted_any_more_stops_between_windows() -> None:
+    asked = []
+
+    def go_on() -> None:
+        asked.append(len(asked))
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.1, 0.0, 3.0]], 5, go_on=go_on)
+    assert len(asked) == 3
 
 
 def test_a_singular_covariance_of_the_start_is_accepted() -> None:

@@ -79,6 +79,10 @@ class ServedModel:
         moments = body.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
+    def exact_count(self, inputs: Array) -> int:
+        """How many of the pushes (n, 3) are answered by the model itself, not from a table."""
+        return len(inputs) if self.domain is None else int(np.sum(~self.model.base.in_domain(inputs)))
+
     @cached_property
     def _quick(self) -> PushModel:
         """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""

@@ -19,11 +19,14 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
+PATIENCE = 5.0  # s that the end waits for an answer
+PAUSE = 0.1  # s after an error before it goes on
+
 
 class DirectService:
     """A service of a node whose callback runs in a thread of its own, so beside the node's other callbacks.
 
-    The node lists it among its services, but its executor leaves it alone.
+    The node lists it among its services, but its executor leaves it alone. Requests wait until `begin`.
     """
 
     def __init__(
@@ -36,14 +39,19 @@ class DirectService:
         with node.context.handle:
             self._wake = rclpy_implementation.GuardCondition(node.context.handle)
         self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
-        self._thread.start()
+
+    def begin(self) -> None:
+        """Answer from now on; once."""
+        if not self._thread.is_alive():
+            self._thread.start()
 
     def close(self) -> None:
-        """End the thread after the answer that it is at, and take the service off the graph."""
+        """Answer what has arrived, end the thread, and take the service off the graph."""
         self._ending.set()
-        with self._wake:
-            self._wake.trigger_guard_condition()
-        self._thread.join()
+        if self._thread.is_alive():
+            with self._wake:
+                self._wake.trigger_guard_condition()
+            self._thread.join(PATIENCE)
         self._wake.destroy_when_not_in_use()
         self._node.destroy_service(self.service)
 
@@ -54,20 +62,26 @@ class DirectService:
                 held.enter_context(handle)
             wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 1, 0, context.handle)
             while context.ok() and not self._ending.is_set():
-                wait_set.clear_entities()
-                wait_set.add_service(self.service.handle)
-                wait_set.add_guard_condition(self._wake)
-                wait_set.wait(-1)
-                self._answer()
+                try:
+                    wait_set.clear_entities()
+                    wait_set.add_service(self.service.handle)
+                    wait_set.add_guard_condition(self._wake)
+                    wait_set.wait(-1)
+                    self._answer()
+                except Exception:  # a thread that ended would leave a service that never answers
+                    self._node.get_logger().error(traceback.format_exc())
+                    self._ending.wait(PAUSE)
+            while context.ok() and self._answer():
+                pass
 
-    def _answer(self) -> None:
-        try:
-            request, header = self.service.handle.service_take_request(self.service.srv_type.Request)
-            if header is not None:  # it was no wake-up
-                response = self.service.callback(request, self.service.srv_type.Response())
-                self.service.send_response(response, header)
-        except Exception:  # nobody would join the thread to hear of it
-            self._node.get_logger().error(traceback.format_exc())
+    def _answer(self) -> bool:
+        """Answer a request if one waits; says whether one did."""
+        request, header = self.service.handle.service_take_request(self.service.srv_type.Request)
+        if header is None:
+            return False
+        response = self.service.callback(request, self.service.srv_type.Response())
+        self.service.send_response(response, header)
+        return True
 
 
 class _NotTheExecutors(CallbackGroup):

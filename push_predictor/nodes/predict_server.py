@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
+from threading import Event
 from time import perf_counter
 from typing import Any, TypeAlias
 
@@ -42,7 +44,7 @@ from push_predictor_interfaces.srv import (
     RolloutPushes,
 )
 
-SERVICE_QOS = QoSProfile(depth=100)  # ten, the default, loses requests of a client with more in flight
+SERVICE_QOS = QoSProfile(depth=1000)  # ten, the default, loses requests of a client with more in flight
 INTROSPECTION = {
     "disabled": ServiceIntrospectionState.OFF,
     "metadata": ServiceIntrospectionState.METADATA,
@@ -95,6 +97,8 @@ class PredictServer(LifecycleNode):
         self._shelf, self._log = ModelShelf(), RequestLog()
         self._problems: list[str] = []
         self._direct: DirectService | None = None
+        self._ending = Event()  # long answers stop
+        self._starting = False
         self._offered: list[Service] = []
         self._state = "unconfigured"
         self._frames = RequestFrames(self, self.value("world_frame"))
@@ -106,12 +110,20 @@ class PredictServer(LifecycleNode):
         self.add_post_set_parameters_callback(self._apply_parameters)
 
     def start(self) -> None:
-        """Configure and activate, as a lifecycle manager would; without a model the node stays inactive."""
+        """Configure and activate, as a lifecycle manager would; without a model the node stays inactive.
+
+        Whoever sees the services may ask: none is answered before the node is active, or stays inactive.
+        """
+        self._starting = True
         if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             self.trigger_activate()
+        self._starting = False
+        if self._direct is not None:
+            self._direct.begin()
 
     def close(self) -> None:
-        """End a trace, publish the last counts."""
+        """End a trace and long answers, publish the last counts."""
+        self._ending.set()
         self._tracer.close()
         self._publish_diagnostics()
 
@@ -128,6 +140,7 @@ class PredictServer(LifecycleNode):
             self._configure()
         except Exception:  # rclpy would drop it without a word
             self.get_logger().error(traceback.format_exc())
+            self._withdraw()
             return TransitionCallbackReturn.ERROR
         return super().on_configure(state)
 
@@ -148,6 +161,8 @@ class PredictServer(LifecycleNode):
         ]
         self._introspect(self.value("introspection"))
         self._state = "inactive"
+        if not self._starting:
+            self._direct.begin()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer predictions from now on. Fails while no model is loaded: the node stays inactive."""
@@ -174,9 +189,11 @@ class PredictServer(LifecycleNode):
         return super().on_shutdown(state)
 
     def _give_up(self, state: str) -> None:
+        self._state = state
         self._tracer.end(f"the node is {state} now")
         self._withdraw()
-        self._shelf, self._problems, self._state = ModelShelf(), [], state
+        self._shelf, self._problems = ModelShelf(), []
+        gc.collect()  # models sit in cycles, of many MB each
 
     def _withdraw(self) -> None:
         if self._direct is not None:
@@ -193,7 +210,7 @@ class PredictServer(LifecycleNode):
     def _on_batch(
         self, request: PredictPushBatch.Request, response: PredictPushBatch.Response
     ) -> PredictPushBatch.Response:
-        return self._prediction(answer_batch, request, response)
+        return self._prediction(partial(answer_batch, self._go_on), request, response)
 
     def _on_pose(
         self, request: PredictSliderPose.Request, response: PredictSliderPose.Response
@@ -201,7 +218,7 @@ class PredictServer(LifecycleNode):
         return self._prediction(partial(answer_slider_pose, self._frames), request, response)
 
     def _on_rollout(self, request: RolloutPushes.Request, response: RolloutPushes.Response) -> RolloutPushes.Response:
-        return self._prediction(partial(answer_rollout, self._frames), request, response)
+        return self._prediction(partial(answer_rollout, self._go_on, self._frames), request, response)
 
     def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
         answer_list(self._shelf, response)
@@ -213,6 +230,7 @@ class PredictServer(LifecycleNode):
         if not response.success:
             return response
         self.get_logger().info(response.message)
+        gc.collect()
         if request.make_default:
             self.set_parameters([Parameter("default_model", value=response.name)])
         if awaited and self.value("autostart"):
@@ -224,6 +242,11 @@ class PredictServer(LifecycleNode):
         response = self._guarded(answer if self._state == "active" else self._inactive, request, response)
         self._log.add(perf_counter() - start, None if response.success else response.message)
         return response
+
+    def _go_on(self) -> None:
+        """What a long answer calls now and then. Raises InactiveError when the node ends."""
+        if self._ending.is_set():
+            raise InactiveError("the node ends")
 
     def _inactive(self, shelf: ModelShelf, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")

@@ -35,6 +35,8 @@ class RequestFrames:
             return SAME_FRAME
         if not header.frame_id:
             raise RequestError("header.frame_id", "", f"the frame of the poses, such as {self.world!r}")
+        if header.frame_id.lstrip("/") == self.world:
+            raise RequestError("header.frame_id", header.frame_id, f"{self.world!r}, without a slash")
         if self._tf is None:
             raise RequestError("header.frame_id", header.frame_id, f"{self.world!r}; tf2_ros is not installed")
         return self._looked_up(self._tf, header)

@@ -57,8 +57,9 @@ def choose_push(repertoire: Repertoire, slider: Array, goal: Goal, probability: 
 
     Raises RequestError for a probability outside (0, 1) and a slider whose pose is not finite.
     """
-    if np.shape(slider) != (3,) or not np.all(np.isfinite(slider)):
-        raise RequestError("slider", np.asarray(slider).tolist(), "three finite numbers x, y in m, heading in rad")
+    slider = np.asarray(slider, dtype=np.float64)
+    if slider.shape != (3,) or not np.all(np.isfinite(slider)):
+        raise RequestError("slider", slider.tolist(), "three finite numbers x, y in m, heading in rad")
     if not 0.0 < probability < 1.0:
         raise RequestError("probability", probability, "a number between 0 and 1")
     ahead = goal.ahead(slider)

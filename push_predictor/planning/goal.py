@@ -25,8 +25,9 @@ class Goal:
     symmetry: int = 1
 
     def __post_init__(self) -> None:
-        if np.shape(self.pose) != (3,) or not np.all(np.isfinite(self.pose)):
-            raise RequestError("goal pose", np.asarray(self.pose).tolist(), "three finite numbers x, y in m, heading")
+        object.__setattr__(self, "pose", np.asarray(self.pose, dtype=np.float64))
+        if self.pose.shape != (3,) or not np.all(np.isfinite(self.pose)):
+            raise RequestError("goal pose", self.pose.tolist(), "three finite numbers x, y in m, heading")
         if not 0.0 < self.distance < np.inf:
             raise RequestError("goal distance", self.distance, "a finite number above 0, in m")
         if self.turn is not None and not 0.0 < self.turn < np.inf:

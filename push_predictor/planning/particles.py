@@ -6,6 +6,7 @@ in the second and later windows follows from where it is and where the sample ha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,10 +43,12 @@ def push_particles(
     duration: float,
     persistence: Persistence,
     rng: np.random.Generator,
+    go_on: Callable[[], None] | None = None,
 ) -> Pushed:
     """Push sliders (p, 3), each by inputs (p, 3: velocity m/s, contact, angle rad) of its own, for duration s.
 
-    Raises RequestError for a duration that the model cannot answer for; of the rest the caller has made sure.
+    go_on: called before every window. Raises RequestError for a duration that the model cannot answer for; of the rest
+    the caller has made sure.
     """
     model = model_of(predictor)
     windows, rig = windows_of(model, duration), model.rig
@@ -53,6 +56,8 @@ def push_particles(
     deviations = Deviations(persistence, windows.duration * inputs[:, 0], rng)
     in_domain = np.ones(len(sliders), dtype=np.bool_)
     for window in range(windows.count):
+        if go_on is not None:
+            go_on()
         if window:
             meeting = drive.meet(sliders, meeting, window * windows.duration, windows.duration)
         moved, known = _displacements(predictor, sliders, meeting, windows, deviations.next())

@@ -16,7 +16,7 @@ pushes / (pushes + FEW), towards windows that are independent.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.optimize import nnls
@@ -33,7 +33,6 @@ from push_predictor.types import Array, IntArray
 LAGS = 10  # windows
 FEW = 5  # pushes; a correlation found in n of them has a standard error of n^-1/2, and is some 0.45
 LENGTHS = np.geomspace(1e-3, 0.05, 18)  # m, tried
-MODELS_REMEMBERED = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +51,14 @@ class Persistence:
 INDEPENDENT = Persistence(np.zeros(3), np.zeros(3), np.ones(3))
 
 
-@lru_cache(MODELS_REMEMBERED)
+_KNOWN: WeakKeyDictionary[PushModel, Persistence] = WeakKeyDictionary()  # a model that is given up is not kept for it
+
+
 def persistence_of(model: PushModel) -> Persistence:
     """What the model's training pushes show; some tenths of a second for 1000 windows, remembered afterwards."""
-    return fit_persistence(whitened_residuals(model), model.training)
+    if model not in _KNOWN:
+        _KNOWN[model] = fit_persistence(whitened_residuals(model), model.training)
+    return _KNOWN[model]
 
 
 def fit_persistence(residuals: Array, table: PushTable) -> Persistence:

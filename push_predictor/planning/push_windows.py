@@ -9,6 +9,8 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 
+MOST_WINDOWS = 10_000
+
 
 @dataclass(frozen=True)
 class PushWindows:
@@ -32,6 +34,8 @@ def windows_of(model: PushModel, duration: float) -> PushWindows:
     if not (np.isfinite(duration) and duration > 0.0):
         raise RequestError("duration", duration, "a finite number above 0, in s")
     usual = float(np.median(model.training.duration))
+    if duration > MOST_WINDOWS * usual:
+        raise RequestError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
     if model.kind == "analytical":
         count = max(1, round(duration / usual))
         return PushWindows(count, duration / count, duration / count, 1.0)

@@ -64,9 +64,13 @@ def repertoire(predict: Predict, tip: Tip, inputs: Array, windows: Sequence[int]
 
     Left out are those that may leave the model's domain, or the slider, before the last window ends. predict: mean,
     covariance and in_domain of one window for inputs (m, 3); only pushes within +-pi/2 are asked for. lasting: share
-    of a window's covariance that is the same in all windows of a push, 0 to 1 (persistence.py). Raises RequestError if
-    no push is left.
+    of a window's covariance that is the same in all windows of a push, 0 to 1 (persistence.py). Raises RequestError for
+    inputs that are not finite, for another share, and if no push is left.
     """
+    if not np.all(np.isfinite(inputs)):
+        raise RequestError("inputs", "NaN or infinite", "finite velocities, contacts and angles")
+    if not 0.0 <= lasting <= 1.0:
+        raise RequestError("lasting", lasting, "a share from 0 to 1")
     lines = lines_of(tip, inputs)
     rows, points = np.arange(len(inputs)), at_the_touch(len(inputs))
     ended: list[tuple[IntArray, IntArray, Array]] = []

@@ -7,6 +7,7 @@ that has turned further is met elsewhere, and steps that each have one mode may 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,10 @@ from push_predictor.types import Array
 PARTICLES = 1000
 MOST_PARTICLES = 100_000
 MOST_WORK = 1_000_000  # particles times windows, some seconds
+MOST_EXACT_WORK = 100_000  # where no table answers
+FARTHEST = 1e6  # m, also of a standard deviation: beyond it nothing is left of millimetres
 A_COVARIANCE = "a symmetric (3, 3) matrix of finite numbers without negative eigenvalues"
-SEMIDEFINITE = 1e-9  # of a covariance's largest eigenvalue: how far below zero another may lie, by rounding
+ROUNDING = 1e-6  # of a correlation: messages are often filled from single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,21 +55,23 @@ def rollout(
     particles: int = PARTICLES,
     seed: int = 0,
     persistence: Persistence | None = None,
+    go_on: Callable[[], None] | None = None,
 ) -> Rollout:
     """Roll out steps (k, 4: velocity m/s, contact, angle rad, duration s) from a slider at slider_mean (3,) with
     slider_covariance (3, 3).
 
     persistence: of what the model does not foresee, within a step; steps are independent of each other. None takes
-    what the model's training pushes show. The same seed gives the same samples. Raises RequestError.
+    what the model's training pushes show. The same seed gives the same samples. go_on: called before every window, to
+    raise where the rollout is not wanted any more. Raises RequestError.
     """
     model, steps = model_of(predictor), np.asarray(steps, dtype=np.float64).reshape(-1, 4)
-    _check(model, slider_mean, slider_covariance, steps, particles)
+    _check(predictor, slider_mean, slider_covariance, steps, particles)
     persistence = persistence_of(model) if persistence is None else persistence
     rng = np.random.default_rng(seed)
     sliders = drawn_poses(slider_mean, slider_covariance, particles, rng)
     known, rows = np.ones(particles, dtype=np.bool_), []
     for *inputs, duration in steps.tolist():
-        pushed = push_particles(predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng)
+        pushed = push_particles(predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng, go_on)
         sliders, known = pushed.sliders, known & pushed.in_domain
         rows.append((*moments_of(sliders), pushed.held.mean(), known.mean()))
     mean, covariance, held, in_domain = zip(*rows, strict=True) if rows else ((), (), (), ())
@@ -81,7 +86,8 @@ def rollout(
 
 def drawn_poses(mean: Array, covariance: Array, count: int, rng: np.random.Generator) -> Array:
     """Poses (count, 3) of a Gaussian; covariance (3, 3) may be singular."""
-    root = root_of(np.asarray(covariance, dtype=np.float64)[None])[0]
+    matrix = np.asarray(covariance, dtype=np.float64)
+    root = root_of(0.5 * (matrix + matrix.T)[None])[0]
     return np.asarray(mean + rng.standard_normal((count, 3)) @ root.T)
 
 
@@ -97,17 +103,20 @@ def _wrapped(poses: Array) -> Array:
     return np.column_stack([poses[:, :2], wrap_angle(poses[:, 2])])
 
 
-def _check(model: PushModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
+def _check(predictor: PushModel | ServedModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
+    model = model_of(predictor)
     refuse_other_covariates(model)
-    if not np.all(np.isfinite(mean)):
-        raise RequestError("slider_mean", np.asarray(mean).tolist(), "finite numbers: x, y in m, heading in rad")
+    if not np.all(np.abs(mean) <= FARTHEST):
+        accepted = f"numbers up to {FARTHEST:g}: x, y in m, heading in rad"
+        raise RequestError("slider_mean", np.asarray(mean).tolist(), accepted)
     if not is_covariance(np.asarray(covariance)):
         raise RequestError("slider_covariance", np.asarray(covariance).tolist(), A_COVARIANCE)
     if not 0 < particles <= MOST_PARTICLES:
         raise RequestError("particles", particles, f"a number from 1 to {MOST_PARTICLES}")
     windows = sum(_checked_windows(model, k, step) for k, step in enumerate(steps.tolist()))
-    if windows * particles > MOST_WORK:
-        most = MOST_WORK // particles
+    tabulated = isinstance(predictor, ServedModel) and predictor.tabulated
+    if windows * particles > (work := MOST_WORK if tabulated else MOST_EXACT_WORK):
+        most = work // particles
         accepted = f"no more than {most} windows in all to {particles} particles"
         raise RequestError("steps", f"{windows} windows", accepted)
 
@@ -122,9 +131,18 @@ def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
 
 
 def is_covariance(matrix: Array) -> bool:
-    """Whether a matrix is (3, 3), finite, symmetric and without negative eigenvalues, to rounding."""
+    """Whether a matrix is (3, 3), finite, symmetric and without negative eigenvalues, in units of its own deviations
+    and to rounding.
+    """
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
         return False
-    values = np.linalg.eigvalsh(matrix)
-    symmetric = np.allclose(matrix, matrix.T, rtol=1e-6, atol=SEMIDEFINITE * max(abs(values[0]), abs(values[-1])))
-    return bool(symmetric and values[0] >= -SEMIDEFINITE * abs(values[-1]))
+    variances = np.diagonal(matrix)
+    if np.any(variances < 0.0) or np.any(variances > FARTHEST**2):
+        return False
+    sd = np.sqrt(variances)
+    scale = np.outer(sd, sd)
+    if not np.all(np.abs(matrix - matrix.T) <= ROUNDING * scale):
+        return False
+    unit = np.where(sd > 0.0, sd, 1.0)
+    smallest = np.linalg.eigvalsh(0.5 * (matrix + matrix.T) / np.outer(unit, unit))[0]
+    return bool(np.all(np.abs(matrix) <= (1.0 + ROUNDING) * scale) and smallest >= -ROUNDING)
