@@ -20,6 +20,7 @@ ARGUMENTS = (
     ("params_file", "", "YAML file with parameters, such as those in config/; other arguments that are given win."),
     ("use_sim_time", "false", "Nodes take /clock, which the replay publishes, for their time."),
     ("log_level", "info", "debug, info, warn, error or fatal."),
+    ("enclaves", "", "SROS 2: run each node in its enclave below this path, /push_predictor (docs/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false leaves that to a lifecycle manager."),
     ("recording", "", "Recording to replay: rosbag2 folder or .mcap file; empty: none, sensors are live."),
     ("bag", "", "The same as recording."),
@@ -76,13 +77,14 @@ def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
 
 def _node(executable: str, name: str, given: dict[str, str], parameters: dict[str, Any]) -> Node:
     files = [given["params_file"]] if given["params_file"] else []
+    enclave = ["--enclave", f"{given['enclaves'].rstrip('/')}/{executable}"] if given["enclaves"] else []
     return Node(
         package="push_predictor",
         executable=executable,
         name=name,
         namespace=given["namespace"],
         parameters=[*files, {**_switch(given, "use_sim_time", default=False), **parameters}],
-        arguments=["--ros-args", "--log-level", given["log_level"]],
+        arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
         output="screen",
     )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import runpy
 import sys
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -78,6 +79,7 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "params_file",
         "use_sim_time",
         "log_level",
+        "enclaves",
         "autostart",
         "recording",
         "bag",
@@ -141,6 +143,15 @@ def test_the_executables_are_those_that_are_installed_under_their_node_names(lau
         assert (REPOSITORY / "scripts" / "run" / executable).exists()
         assert (node["package"], node["namespace"]) == ("push_predictor", "cell")
         assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
+
+
+def test_every_node_runs_in_its_enclave_of_the_policy_if_that_is_wanted(launch_file):
+    policy = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
+    enclaves = {enclave.attrib["path"] for enclave in policy.iter("enclave")}
+    started = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
+    assert {node["arguments"][-1] for node in started.values()} == enclaves
+    for executable, node in started.items():
+        assert node["arguments"][-2:] == ["--enclave", f"/push_predictor/{executable}"]
 
 
 def test_without_a_recording_nothing_is_replayed_and_bag_is_another_word_for_it(launch_file):

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, qos_profile_system_default
@@ -26,6 +25,7 @@ from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
 from push_predictor.nodes.direct_service import DirectService
+from push_predictor.nodes.heartbeat import Heartbeat
 from push_predictor.nodes.model_shelf import SHIPPED, ModelShelf
 from push_predictor.nodes.parameters import Param, declare, values_of
 from push_predictor.nodes.pose_answers import answer_slider_pose
@@ -104,8 +104,7 @@ class PredictServer(LifecycleNode):
         self._frames = RequestFrames(self, self.value("world_frame"))
         self._tracer = ResidualTracer(self, self._deployed, lambda: float(self.value("trace_alpha")))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
-        self.create_timer(self.value("diagnostics_period"), self._publish_diagnostics, clock=steady)
+        self._heartbeat = Heartbeat(self.value("diagnostics_period"), self._publish_diagnostics, self._silent)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
 
@@ -125,10 +124,12 @@ class PredictServer(LifecycleNode):
         """End a trace and long answers, publish the last counts."""
         self._ending.set()
         self._tracer.close()
+        self._heartbeat.end()
         self._publish_diagnostics()
 
     def destroy_node(self) -> None:
-        """End the thread that answers predict_push, and the node."""
+        """End the threads, and the node."""
+        self._heartbeat.end()
         self._withdraw()
         super().destroy_node()
 
@@ -294,6 +295,9 @@ class PredictServer(LifecycleNode):
         direct = [self._direct.service] if self._direct is not None else []
         for service in [*direct, *self._offered]:
             service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
+
+    def _silent(self, error: Exception) -> None:
+        self.get_logger().error(f"no diagnostics: {error!r}", throttle_duration_sec=10.0)
 
     def _publish_diagnostics(self) -> None:
         name = self.get_fully_qualified_name()

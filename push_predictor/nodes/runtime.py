@@ -14,10 +14,12 @@ import rclpy
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_predictor.errors import PushPredictorError
+from push_predictor.nodes.strangers import LIMITED, limit_discovery, require_security, security_hint
 
 _GRAPH_ERRORS = (
     rclpy_implementation.RCLError,
@@ -67,16 +69,16 @@ def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | 
     """Make a node, spin it until a signal or Stop, close it; answers the exit status.
 
     A PushPredictorError while the node is made becomes one line on stderr and status 1. threads above 1 takes a
-    MultiThreadedExecutor. make_node must answer a rclpy Node that is Closable.
+    MultiThreadedExecutor. make_node must answer a rclpy Node that is Closable. Other machines do not find the node
+    unless the environment asks for that; it is not made without the security that the environment asks for.
     """
     stop = Stop()
     _handle_signals(stop)
     try:
-        # rclpy's own handlers end the context at once: the last diagnostics could not be published any more.
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node(stop)
+        node = _made(name, make_node, stop, args)
     except (PushPredictorError, *_GRAPH_ERRORS) as error:
-        print(f"{name}: {one_line(error)}", file=sys.stderr)
+        hint = "" if isinstance(error, PushPredictorError) else security_hint()
+        print(f"{name}: {one_line(error)}{hint}", file=sys.stderr)
         rclpy.try_shutdown()
         return 1
     try:
@@ -102,6 +104,16 @@ def share_path(*parts: str) -> Path:
 def one_line(error: BaseException) -> str:
     """The message of an error without line breaks."""
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _made(name: str, make_node: Callable[[Stop], Closable], stop: Stop, args: Sequence[str] | None) -> Closable:
+    limited = limit_discovery()
+    require_security()
+    # rclpy's own handlers end the context at once: the last diagnostics could not be published any more.
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    if limited:
+        get_logger(name).info(LIMITED)
+    return make_node(stop)
 
 
 def _handle_signals(stop: Stop) -> None:

@@ -1,0 +1,170 @@
+"""The checks of `doctor` that need no ROS: Python, packages, a model, a recording, executables, space."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+from push_predictor.commands.doctor_findings import Finding
+from push_predictor.errors import PushPredictorError
+
+PYTHON = ((3, 10), (3, 13))
+NEEDED = {"numpy": "1.24", "scipy": "1.10", "mcap": "1.1", "PyYAML": "5.4"}
+EXTRAS = {
+    "report": (("matplotlib", "joblib"), "the pictures of reports, and `report paper`"),
+    "live": (("rich",), "progress bars and the live table of the demonstration"),
+    "import": (("rosbags", "h5py"), "`import` of ROS 1 bags and of the MIT push data set"),
+}
+NODES = ("predict_server", "push_replay", "push_validator")
+MODULES = {"PyYAML": "yaml"}
+ENOUGH = 200e6  # bytes: a recording of some minutes, a report
+
+
+def python_and_packages() -> Iterator[Finding]:
+    """The interpreter, what the package cannot do without, and what it can."""
+    yield _python()
+    for name, least in NEEDED.items():
+        yield _needed(name, least)
+    for extra, (names, purpose) in EXTRAS.items():
+        yield _extra(extra, names, purpose)
+
+
+def model_predicts(given: Path | None) -> Finding:
+    """A model file, the shipped one if none is given, loads and predicts a push with a proper covariance."""
+    try:
+        import numpy as np
+
+        from push_predictor.models.default_model import default_model_path
+        from push_predictor.models.model_file import load_model
+
+        path = given or default_model_path()
+        model = load_model(path)
+        row = model.training.take(np.array([0]))
+        prediction = model.predict(row.inputs, row.duration, row.covariates)
+        if not (np.isfinite(prediction.mean).all() and np.linalg.eigvalsh(prediction.covariance[0])[0] > 0.0):
+            return _broken("model", f"{path} answers {prediction.mean[0]}", _OF_A_MODEL)
+    except Exception as error:  # half an installation raises anything
+        return _broken("model", _words(error), _OF_A_MODEL)
+    return Finding("model", "ok", f"{path} loads and predicts ({model.kind}, {len(model.training)} windows)")
+
+
+def recording_reads(given: Path | None) -> Finding:
+    """A recording, one simulated here if none is given, reads, and pushes are found in it."""
+    try:
+        from push_predictor.recordings.describe import describe_recording
+
+        with tempfile.TemporaryDirectory(prefix="push_predictor_doctor_") as folder:
+            path = given or _simulated(Path(folder))
+            found = describe_recording(path)
+    except Exception as error:  # as above
+        return _broken("recording", _words(error), _OF_A_RECORDING)
+    source = str(given) if given else "one of two simulated pushes, written here,"
+    if not found.get("windows"):
+        return _broken("recording", f"{source} has no push", f"push_predictor info {source} tells what it has")
+    return Finding("recording", "ok", f"{source} reads: {found['pushes']} pushes, {found['windows']} windows")
+
+
+def executables() -> Finding:
+    """Where the nodes' executables are: on the path, or where `ros2 run` looks."""
+    paths = {name: shutil.which(name) for name in NODES}
+    if all(paths.values()):
+        return Finding("executables", "ok", ", ".join(str(path) for path in paths.values()))
+    prefixes = [Path(text) for text in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if text]
+    for prefix in prefixes:
+        if all((prefix / "lib" / "push_predictor" / name).exists() for name in NODES):
+            return Finding("executables", "ok", f"in {prefix}: ros2 run push_predictor {NODES[0]}")
+    beside = Path(sys.executable).parent
+    if all((beside / name).exists() for name in NODES):
+        remedy = f"export PATH={beside}:$PATH"
+    else:
+        remedy = ". install/setup.sh (colcon), or python -m push_predictor.nodes.NAME"
+    missing = ", ".join(name for name, path in paths.items() if path is None)
+    return Finding("executables", "note", f"{missing}: not on PATH", "the nodes cannot be started by name", remedy)
+
+
+def room() -> Finding:
+    """Can files be written where temporary ones go?"""
+    place = tempfile.gettempdir()
+    try:
+        with tempfile.TemporaryFile() as file:
+            file.write(b"0")
+        free = shutil.disk_usage(place).free
+    except OSError as error:
+        return _broken("space", f"{place}: {error.strerror}", "bags and keystores are staged there", "export TMPDIR=…")
+    if free < ENOUGH:
+        why = "recordings and reports may not find room"
+        return Finding("space", "note", f"{free / 1e6:.0f} MB free in {place}", why, "make room, or export TMPDIR=…")
+    return Finding("space", "ok", f"{free / 1e9:.1f} GB free in {place}")
+
+
+_OF_A_MODEL = "predict_server serves it where no model is given"
+_OF_A_RECORDING = "training, validation and replay read recordings"
+
+
+def _python() -> Finding:
+    version = ".".join(map(str, sys.version_info[:3]))
+    low, high = (".".join(map(str, bound)) for bound in PYTHON)
+    if sys.version_info[:2] < PYTHON[0]:
+        return _broken("Python", version, f"{low} to {high} is needed", f"python{high} -m venv .venv")
+    if sys.version_info[:2] > PYTHON[1]:
+        return Finding("Python", "note", version, f"newer than what was tested, which is {low} to {high}")
+    return Finding("Python", "ok", f"{version}, {sys.executable}")
+
+
+def _needed(name: str, least: str) -> Finding:
+    remedy = f"pip install '{name}>={least}'"
+    try:
+        importlib.import_module(MODULES.get(name, name))
+        version = metadata.version(name)
+    except (ImportError, metadata.PackageNotFoundError) as error:
+        return _broken(name, f"not found ({error})", "nothing works without it", remedy)
+    if _numbers(version) < _numbers(least):
+        return _broken(name, version, f"{least} or newer is needed", remedy)
+    return Finding(name, "ok", version)
+
+
+def _extra(extra: str, names: tuple[str, ...], purpose: str) -> Finding:
+    missing = [name for name in names if not _there(name)]
+    if missing:
+        found, why = f"not installed: {', '.join(missing)}", f"needed for {purpose}"
+        return Finding(f"extra {extra}", "note", found, why, f"pip install {' '.join(missing)}")
+    return Finding(f"extra {extra}", "ok", ", ".join(f"{name} {metadata.version(name)}" for name in names))
+
+
+def _there(name: str) -> bool:
+    """Installed, as its metadata say: importing them all takes seconds."""
+    try:
+        return bool(metadata.version(name))
+    except metadata.PackageNotFoundError:
+        return False
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(number) for number in re.findall(r"\d+", version)[:3])
+
+
+def _simulated(folder: Path) -> Path:
+    import numpy as np
+
+    from push_predictor.recordings.write import write_recording
+    from push_predictor.simulation.pushes import random_pushes
+    from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
+
+    plan = random_pushes(2, [0.05], 0.03, np.random.default_rng(0))
+    write_recording(folder / "two_pushes", simulate(SimulationSpec("rect1", "abs", plan, name="two_pushes")))
+    return folder / "two_pushes"
+
+
+def _words(error: Exception) -> str:
+    return str(error) if isinstance(error, (PushPredictorError, OSError)) else f"{type(error).__name__}: {error}"
+
+
+def _broken(name: str, found: str, why: str, remedy: str = "") -> Finding:
+    return Finding(name, "missing", " ".join(found.split()), why, remedy)

@@ -1,0 +1,213 @@
+"""What `push_predictor doctor` asks of ROS, in a process of its own: a line of JSON a finding, on stdout.
+
+Every finding is {"name", "state", "found", "why", "remedy"}; {"name"} alone says what is being tried.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+PACKAGES = (
+    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "rcl_interfaces", "rosgraph_msgs",
+    "sensor_msgs", "std_msgs", "std_srvs", "visualization_msgs",
+)  # fmt: skip
+INTERFACES = {
+    "srv.PredictPush.Response": ("mean", "covariance", "process_covariance", "in_domain"),
+    "srv.PredictPushBatch.Response": ("mean", "covariance", "process_covariance", "in_domain"),
+    "srv.PredictSliderPose.Response": ("slider_after", "in_domain"),
+    "srv.RolloutPushes.Response": ("poses", "samples"),
+    "srv.ListModels.Response": ("names", "descriptions", "default_model"),
+    "srv.LoadModel.Response": ("success", "name"),
+    "msg.PushResidual": ("predicted", "covariance", "observed", "standardised"),
+    "msg.PushAlarm": ("push_id", "log10_evidence", "false_alarm_rate"),
+    "action.TraceResidual.Result": ("verdict", "extended_model"),
+}
+WHEELS = "pip install 'ros-jazzy-rclpy[fastrtps]', or . /opt/ros/jazzy/setup.sh"
+BUILD = "pip install ./push_predictor_interfaces, or colcon build && . install/setup.sh"
+PATIENCE = 20.0  # s for predict_server to start and to answer
+PUSH = {"velocity": 0.02, "contact": 0.1, "angle": 0.1, "duration": 0.2}
+
+
+def main() -> int:
+    """Check one thing after the other; what cannot be checked without the one before it is left out."""
+    for name, check in (("rclpy", rclpy_works), ("messages", messages), ("interfaces", interfaces)):
+        if not _said(name, check):
+            return 1
+    well = [_said("middleware", middleware), _said("shared memory", shared_memory), _said("security", security)]
+    return 0 if all(well) and _said("loop-back call", loop_back) else 1
+
+
+def rclpy_works() -> dict[str, str]:
+    """The client library imports, with what lies below it."""
+    try:
+        import rclpy
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+    except Exception as error:  # a library that does not load raises many kinds
+        why = "the nodes need it; learning, prediction and reports do not"
+        return _missing(f"not usable ({error})", why, WHEELS)
+    assert rclpy_implementation
+    distribution = os.environ.get("ROS_DISTRO", "")
+    return _ok(f"{Path(rclpy.__file__).parent}{distribution and f', ROS {distribution}'}")
+
+
+def messages() -> dict[str, str]:
+    """The standard messages that the nodes use."""
+    lost = [package for package in PACKAGES if not _imports(f"{package}.{_kind(package)}")]
+    if lost:
+        return _missing(f"not found: {', '.join(lost)}", "the nodes publish and serve these", WHEELS)
+    return _ok(f"{len(PACKAGES)} packages")
+
+
+def interfaces() -> dict[str, str]:
+    """push_predictor_interfaces is there and has the fields that this version fills."""
+    try:
+        package = importlib.import_module("push_predictor_interfaces")
+        lacking = [
+            f"{name}.{field}" for name, fields in INTERFACES.items() for field in fields if not _has(name, field)
+        ]
+    except Exception as error:  # as above
+        return _missing(f"push_predictor_interfaces is not usable ({error})", "the nodes speak it", BUILD)
+    if lacking:
+        found = f"push_predictor_interfaces has no {', '.join(lacking)}"
+        return _missing(found, "it is of another version than push_predictor", BUILD)
+    return _ok(str(Path(package.__file__ or "").parent))
+
+
+def middleware() -> dict[str, str]:
+    """Which RMW, which domain, and how far it looks for others."""
+    from rclpy.utilities import get_rmw_implementation_identifier
+
+    from push_predictor.nodes.strangers import DISCOVERY, limit_discovery
+
+    told = ", ".join(f"{name}={os.environ[name]}" for name in DISCOVERY if os.environ.get(name))
+    far = "this machine alone, the default of these nodes" if limit_discovery() else told
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    return _ok(f"{get_rmw_implementation_identifier()}, domain {domain}, discovery: {far}")
+
+
+def shared_memory() -> dict[str, str]:
+    """Fast DDS delivers on one machine through /dev/shm."""
+    place = Path("/dev/shm")
+    if os.access(place, os.W_OK) or "UDP" in os.environ.get("FASTDDS_BUILTIN_TRANSPORTS", ""):
+        return _ok(f"{place} may be written to" if os.access(place, os.W_OK) else "not used")
+    remedy = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4"
+    return _finding("note", f"{place} may not be written to", "Fast DDS prints errors, or loses messages", remedy)
+
+
+def security() -> dict[str, str]:
+    """Whether the security that was asked for can be had."""
+    from push_predictor.nodes.strangers import ENABLE, SecurityError, require_security, security_compiled_in
+
+    try:
+        require_security()
+    except SecurityError as error:
+        return _missing(str(error), "the nodes refuse to start", f"unset {ENABLE}, or a middleware with security")
+    if os.environ.get(ENABLE) != "true":
+        return _ok(f"not asked for; the middleware {'has' if security_compiled_in() else 'was built without'} it")
+    if os.environ.get("ROS_SECURITY_STRATEGY") != "Enforce":
+        why = "a node without keys goes on unprotected, without a word"
+        return _finding("note", "asked for, not enforced", why, "export ROS_SECURITY_STRATEGY=Enforce")
+    return _ok("asked for and enforced")
+
+
+def loop_back() -> dict[str, str]:
+    """A predict_server with the shipped model starts and answers predict_push, out of everybody's way."""
+    namespace = f"/push_predictor_doctor_{os.getpid()}"
+    command = [sys.executable, "-m", "push_predictor.nodes.predict_server", "--ros-args", "-r", f"__ns:={namespace}"]
+    with tempfile.TemporaryFile("w+") as log:
+        server = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            begun = time.monotonic()
+            problem = _call(namespace, lambda: server.poll() is None)
+            took = time.monotonic() - begun
+        finally:
+            server.kill()
+            server.wait()
+        if not problem:
+            return _ok(f"predict_push was answered {took:.1f} s after predict_server was started")
+        log.seek(0)
+        last = log.read().strip().splitlines()[-1:]
+        return _missing("; ".join([problem, *last]), "nodes cannot talk to each other here", _OF_A_CALL)
+
+
+_OF_A_CALL = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4, another ROS_DOMAIN_ID; a firewall must let UDP on lo pass"
+
+
+def _call(namespace: str, alive: Callable[[], bool]) -> str:
+    """Ask for one prediction; answers what went wrong, empty if nothing did."""
+    import rclpy
+    from rclpy.node import Node
+
+    from push_predictor_interfaces.srv import PredictPush
+
+    rclpy.init(args=[])
+    try:
+        node = Node("doctor", namespace=namespace)
+        client, deadline = node.create_client(PredictPush, "predict_push"), time.monotonic() + PATIENCE
+        while not client.wait_for_service(0.2):
+            if not alive():
+                return "predict_server ended"
+            if time.monotonic() > deadline:
+                return f"predict_server was not found within {PATIENCE:.0f} s"
+        future = client.call_async(PredictPush.Request(**PUSH))
+        rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE)
+        response = future.result() if future.done() else None
+        if response is None:
+            return f"predict_push did not answer within {PATIENCE:.0f} s"
+        return "" if response.success else f"predict_push was refused: {response.message}"
+    finally:
+        rclpy.try_shutdown()
+
+
+def _said(name: str, check: Callable[[], dict[str, str]]) -> bool:
+    """Run a check and print; answers whether the next one makes sense."""
+    print(json.dumps({"name": name}), flush=True)
+    found = {"name": name, **check()}
+    print(json.dumps(found), flush=True)
+    return found["state"] != "missing"
+
+
+def _kind(package: str) -> str:
+    return "srv" if package == "std_srvs" else "msg"
+
+
+def _imports(module: str) -> bool:
+    try:
+        importlib.import_module(module)
+    except Exception:  # a generated module whose library does not load raises many kinds
+        return False
+    return True
+
+
+def _has(name: str, field: str) -> bool:
+    """Has an interface such as srv.PredictPush.Response this field?"""
+    kind, *path = name.split(".")
+    found: Any = importlib.import_module(f"push_predictor_interfaces.{kind}")
+    for part in path:
+        found = getattr(found, part, None)
+    return found is not None and field in found.get_fields_and_field_types()
+
+
+def _finding(state: str, found: str, why: str = "", remedy: str = "") -> dict[str, str]:
+    return {"state": state, "found": " ".join(found.split()), "why": why, "remedy": remedy}
+
+
+def _ok(found: str) -> dict[str, str]:
+    return _finding("ok", found)
+
+
+def _missing(found: str, why: str, remedy: str) -> dict[str, str]:
+    return _finding("missing", found, why, remedy)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""`push_predictor doctor`: on a sound installation, and on one that lacks something."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ros_harness import REPOSITORY, free_domain, node_environment
+
+from push_predictor.cli import main
+from push_predictor.commands import doctor_checks, doctor_command
+from push_predictor.commands.doctor_checks import (
+    executables,
+    model_predicts,
+    python_and_packages,
+    recording_reads,
+    room,
+)
+from push_predictor.commands.doctor_findings import Finding
+from push_predictor.nodes import doctor_graph
+
+OF_ROS = ["rclpy", "messages", "interfaces", "middleware", "shared memory", "security", "loop-back call"]
+
+
+def doctor(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run as a user would."""
+    return subprocess.run(
+        [sys.executable, "-m", "push_predictor.cli", "doctor", *arguments],
+        env={**node_environment(free_domain()), **environment},
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        timeout=100.0,
+    )
+
+
+def with_module(folder: Path, name: str, code: str) -> str:
+    """PYTHONPATH on which a module of ours is found first."""
+    (folder / f"{name}.py").write_text(code)
+    return os.pathsep.join([str(folder), str(REPOSITORY)])
+
+
+def test_this_installation_is_sound_and_every_part_of_it_was_tried():
+    done = doctor("--json", "-")
+    assert done.returncode == 0, done.stdout + done.stderr
+    said = json.loads(done.stdout)
+    states = {check["name"]: check["state"] for check in said["checks"]}
+    assert said["sound"] and "missing" not in states.values()
+    assert {"Python", "numpy", "scipy", "mcap", "executables", "model", "recording", "space", *OF_ROS} <= states.keys()
+    assert all(states[name] == "ok" for name in ("loop-back call", "interfaces", "model", "recording"))
+
+
+def test_without_ros_it_says_so_and_checks_the_rest(tmp_path: Path):
+    hidden = with_module(tmp_path, "sitecustomize", "import sys\nsys.modules.update(rclpy=None)\n")
+    done = doctor(PYTHONPATH=hidden)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == "push_predictor doctor: missing or broken: rclpy"
+    lines = done.stdout.splitlines()
+    (row,) = (k for k, line in enumerate(lines) if line.startswith("missing"))
+    assert lines[row].split()[1] == "rclpy"
+    assert "the nodes need it" in lines[row + 1] and "pip install 'ros-jazzy-rclpy[fastrtps]'" in lines[row + 2]
+    assert sum(line.startswith("ok       ") and line.split()[1] in ("model", "recording") for line in lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("code", "words"), [("import time; time.sleep(60)", "nothing came within"), ("import os; os.abort()", "ended")]
+)
+def test_a_middleware_that_hangs_or_crashes_is_a_finding(
+    code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("PYTHONPATH", with_module(tmp_path, "rclpy", code))
+    monkeypatch.setattr(doctor_command, "PATIENCE", 2.0 if "sleep" in code else 30.0)
+    (finding,) = doctor_command._of_ros()
+    assert (finding.name, finding.state) == ("rclpy", "missing") and words in finding.found
+
+
+def test_security_that_was_asked_for_and_is_not_there_is_found_before_a_node_is_tried():
+    command = [sys.executable, "-m", "push_predictor.nodes.doctor_graph"]
+    environment = {**node_environment(free_domain()), "ROS_SECURITY_ENABLE": "true"}
+    done = subprocess.run(command, env=environment, cwd=REPOSITORY, capture_output=True, text=True, timeout=60.0)
+    told = [json.loads(line) for line in done.stdout.splitlines()]
+    last = [line for line in told if "state" in line][-1]
+    assert done.returncode == 1 and (last["name"], last["state"]) == ("security", "missing")
+    assert "unset ROS_SECURITY_ENABLE" in last["remedy"]
+
+
+# --- each check by itself --------------------------------------------------------------------------------------------
+
+
+def test_interfaces_of_another_version_are_named_by_field(monkeypatch: pytest.MonkeyPatch):
+    assert doctor_graph.interfaces()["state"] == "ok"
+    monkeypatch.setattr(doctor_graph, "INTERFACES", {"srv.PredictPush.Response": ("mean", "covariance", "skew")})
+    found = doctor_graph.interfaces()
+    assert found["state"] == "missing" and found["found"].endswith("has no srv.PredictPush.Response.skew")
+
+
+def test_interfaces_that_are_not_there_come_with_the_command_that_builds_them(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "push_predictor_interfaces", None)
+    found = doctor_graph.interfaces()
+    assert found["state"] == "missing" and "pip install ./push_predictor_interfaces" in found["remedy"]
+
+
+def test_a_message_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(doctor_graph, "PACKAGES", ("geometry_msgs", "no_such_msgs"))
+    found = doctor_graph.messages()
+    assert (found["state"], found["found"]) == ("missing", "not found: no_such_msgs")
+
+
+def test_what_is_needed_and_what_is_extra_is_what_the_package_declares():
+    setup: dict[str, Any] = {}
+    source = (REPOSITORY / "setup.py").read_text().replace("from setuptools import", "#")
+    exec(source, {"setup": setup.update, "find_packages": lambda **how: []})
+    assert [f"{name}>={least}" for name, least in doctor_checks.NEEDED.items()] == setup["install_requires"]
+    extras = {name: {row.split(">")[0] for row in rows} for name, rows in setup["extras_require"].items()}
+    for name, (packages, _) in doctor_checks.EXTRAS.items():
+        assert set(packages) <= extras[name], name
+
+
+def test_a_package_that_is_too_old_or_missing_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(doctor_checks, "NEEDED", {"numpy": "99.0", "no-such-package": "1.0"})
+    old, gone = (finding for finding in python_and_packages() if finding.state == "missing")
+    assert (old.name, old.why, old.remedy) == ("numpy", "99.0 or newer is needed", "pip install 'numpy>=99.0'")
+    assert gone.name == "no-such-package" and gone.found.startswith("not found")
+
+
+def test_an_extra_that_is_not_installed_is_a_note_with_its_purpose(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(doctor_checks, "EXTRAS", {"report": (("no-such-package",), "the pictures")})
+    (note,) = (finding for finding in python_and_packages() if finding.state == "note")
+    assert (note.found, note.why) == ("not installed: no-such-package", "needed for the pictures")
+
+
+def test_a_model_that_does_not_load_is_named(tmp_path: Path):
+    (tmp_path / "bad.pushmodel").write_text("no model")
+    found = model_predicts(tmp_path / "bad.pushmodel")
+    assert found.state == "missing" and "bad.pushmodel" in found.found
+
+
+def test_a_recording_is_checked_if_one_is_given(tmp_path: Path):
+    assert "120 pushes" in recording_reads(REPOSITORY / "bags" / "square_abs_test").found
+    (tmp_path / "bad.mcap").write_bytes(b"no recording")
+    found = recording_reads(tmp_path / "bad.mcap")
+    assert found.state == "missing" and "bad.mcap" in found.found
+
+
+def test_executables_beside_the_interpreter_are_found_by_the_path_that_is_proposed(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    note = executables()
+    assert note.state == "note" and note.remedy.startswith("export PATH=")
+    monkeypatch.setenv("PATH", note.remedy.removeprefix("export PATH=").removesuffix(":$PATH"))
+    assert executables().state == "ok"
+
+
+def test_no_room_for_temporary_files_is_named(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+    assert room().state == "missing"
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(doctor_checks, "ENOUGH", 1e30)
+    assert room().state == "note"
+
+
+# --- what is printed -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("state", ["ok", "note", "missing"])
+def test_only_what_is_missing_is_a_failure(
+    state: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+):
+    finding = Finding("thing", state, "what was found", "why it matters", "mend it")
+    monkeypatch.setattr(doctor_command, "_findings", lambda model, recording: iter([finding]))
+    assert main(["doctor", "--json", str(tmp_path / "doctor.json")]) == (state == "missing")
+    printed, content = capsys.readouterr(), json.loads((tmp_path / "doctor.json").read_text())
+    assert printed.out.splitlines()[1].split() == [state, "thing", "what", "was", "found"]
+    assert printed.out.splitlines()[2:] == [f"{'':25s}why it matters", f"{'':25s}-> mend it"]
+    assert printed.err == ("push_predictor doctor: missing or broken: thing\n" if state == "missing" else "")
+    assert content["sound"] == (state != "missing") and content["checks"] == [_record(finding)]
+
+
+def _record(finding: Finding) -> Mapping[str, str]:
+    names = ("name", "state", "found", "why", "remedy")
+    return {name: getattr(finding, name) for name in names}
