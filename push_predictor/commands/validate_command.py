@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
     model = load_model(options.model)
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
-        windows, comparison = validate_recording(model, options.recording, rig)
+        windows, comparison = validate_recording(model, options.recording, rig, warn)
         alarm = alarm_about(model, windows_to_table(windows), comparison, options.false_alarm_rate)
         metrics = {**metrics_json(comparison), "alarm": alarm}
     if difference := rig_difference(model, rig):

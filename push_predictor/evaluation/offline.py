@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +15,25 @@ from push_predictor.models.served import serve
 from push_predictor.recordings.bag import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
+from push_predictor.recordings.stream_faults import recording_faults
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.window_finder import find_windows
+from push_predictor.recordings.window_finder import WindowFinder
 from push_predictor.recordings.windows import PushWindow, WindowOptions, windows_to_table
 
 
-def recorded_windows(model: PushModel, path: Path, rig: Rig | None = None) -> tuple[list[PushWindow], PushTable]:
-    """The windows of a recording, as long as the model's training windows. Raises RecordingError if there is none."""
+def recorded_windows(
+    model: PushModel, path: Path, rig: Rig | None = None, tell: Callable[[str], None] | None = None
+) -> tuple[list[PushWindow], PushTable]:
+    """The windows of a recording, as long as the model's training windows. Raises RecordingError if there is none.
+
+    tell: gets every fault of the streams that a good system does not have, in words.
+    """
     recording = read_recording(path, rig=rig)
-    windows = find_windows(recording, require_rig(recording), window_options(model))
+    finder = WindowFinder(require_rig(recording), window_options(model))
+    windows = finder.find(recording)
+    if tell is not None:
+        for fault in recording_faults(recording, finder.counts):
+            tell(fault)
     if not windows:
         raise RecordingError(f"{path}: no push was found in {len(recording.slider)} slider poses")
     return windows, windows_to_table(windows)
@@ -54,9 +64,11 @@ def rig_difference(model: PushModel, rig: Rig) -> str:
     return ""
 
 
-def validate_recording(model: PushModel, path: Path, rig: Rig | None = None) -> tuple[list[PushWindow], Comparison]:
-    """Predict every window of a recording, as a server of the model would."""
-    windows, table = recorded_windows(model, path, rig)
+def validate_recording(
+    model: PushModel, path: Path, rig: Rig | None = None, tell: Callable[[str], None] | None = None
+) -> tuple[list[PushWindow], Comparison]:
+    """Predict every window of a recording, as a server of the model would; tell as for `recorded_windows`."""
+    windows, table = recorded_windows(model, path, rig, tell)
     check_table(model, table)
     prediction = serve(model).predict(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from time import monotonic
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -124,7 +125,7 @@ class SensorInlet:
         """The usable samples since the last call."""
         slider, tip, wrench = (self._inboxes[name].take() for name, *_ in TOPICS)
         for stamp, _ in (slider, tip):
-            self._newest = int(stamp[-1]) if len(stamp) else self._newest
+            self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # one stamp may be of another time
         scalars = self._scalars.take(self._newest)
         return Samples(slider_stream(*slider), tip_stream(*tip), wrench_stream(*wrench), scalars)
 

@@ -69,6 +69,11 @@ class ValidationRun:
         """What the window finder met in the streams."""
         return self._finder.counts
 
+    @property
+    def pace(self) -> StreamPace:
+        """How the streams stand to each other."""
+        return self._pace
+
     def feed(self, samples: Samples) -> None:
         """Take a portion of the streams."""
         self._add_scalars(samples.scalars)

@@ -13,6 +13,7 @@ from push_predictor.nodes.prediction_client import PredictionClient
 from push_predictor.nodes.push_alarm import PushAlarm
 from push_predictor.nodes.sensor_inlet import SensorInlet
 from push_predictor.nodes.validation_run import ValidationRun
+from push_predictor.recordings.stream_faults import fault_words
 
 
 def validator_status(
@@ -32,13 +33,23 @@ def validator_status(
     values: dict[str, object] = {"state": state, **inlet.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
-        values |= {f"streams {kind}": count for kind, count in run.counts.items()} | _scores(run)
+        values |= _stream_figures(run) | _scores(run)
         values |= _alarm(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     return diagnostic_status(name, level, "; ".join(filter(None, [failure, *warnings])) or state, values)
 
 
+def _stream_figures(run: ValidationRun) -> dict[str, object]:
+    """Faults by kind, "streams KIND" of all streams and "slider KIND" of one."""
+    found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
+    found["contact from"] = "geometry and force" if run.pace.with_wrench else "geometry alone: no wrench has come"
+    apart = run.pace.apart()
+    found["streams clocks_apart"] = len(apart)
+    return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}
+
+
 def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
+    found += [*run.pace.problems(), *fault_words(run.counts)]
     if run.refused:
         found.append(f"{run.refused} predictions refused, the last one: {run.last_refusal}")
     if run.table_failure:

@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import to_body
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.track import Track
+from push_predictor.recordings.track import JUMP, Track
 from push_predictor.types import Array, BoolArray
 
 REACH = 0.1  # s that the streams must have passed a sample before it is judged
@@ -18,10 +18,6 @@ FORWARD_SPAN = 0.03  # s after a sample in which the pusher must move already
 FIT_SPAN = 0.020  # s of a window that give its velocity and angle (contract, section 2)
 NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is setting off
 SHORTEST_SPAN = 1e-3  # s; below it a difference says nothing about a speed
-JUMP = 0.005  # m between two samples, beside JUMP_SPEED: a reset of the slider, not a push
-JUMP_SPEED = 1.5  # m/s
-TURN = 0.1  # rad between two samples, beside TURN_SPEED
-TURN_SPEED = 8.0  # rad/s
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: i
     gap, closing = _gaps(rig, slider, pusher, first, last)
     around, after = _speed(pusher, time - NEAR, time + NEAR), _speed(pusher, time, time + FORWARD_SPAN)
     underway = _underway(pusher, time)
-    speed, forces, jumped = np.minimum(around, after), _forces(wrench, time), _jumps(slider, first, last)
+    speed, forces, jumped = np.minimum(around, after), _forces(wrench, time), _jumps(slider, pusher, first, last)
     for k in range(len(time)):
         yield Judged(
             stamp=int(stamp[k]),
@@ -114,9 +110,11 @@ def _speed(pusher: Track, start: Array, end: Array) -> Array:
     return np.asarray(way / np.maximum(end - start, SHORTEST_SPAN))
 
 
-def _jumps(slider: Track, first: int, last: int) -> BoolArray:
+def _jumps(slider: Track, pusher: Track, first: int, last: int) -> BoolArray:
+    """Whether the slider was put elsewhere before each sample: at once, or unseen, farther than the tip can push it."""
     values, time = slider.values[max(first - 1, 0) : last], slider.time[max(first - 1, 0) : last]
-    step, lapse = np.abs(np.diff(values, axis=0)), np.diff(time)
-    moved = np.hypot(step[:, 0], step[:, 1]) > JUMP + JUMP_SPEED * lapse
-    jumped = moved | (step[:, 3] > TURN + TURN_SPEED * lapse)
-    return jumped if first else np.append(False, jumped)
+    way = np.hypot(*np.diff(values[:, :2], axis=0).T)
+    driven = np.hypot(*np.diff(pusher.at(time)[:, :2], axis=0).T)
+    unseen = (np.diff(time) > slider.longest_gap) & (way > JUMP + driven)
+    jumped = slider.torn(values[:-1], values[1:], np.diff(time)) | unseen
+    return np.asarray(jumped if first else np.append(False, jumped))

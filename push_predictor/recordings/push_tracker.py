@@ -17,6 +17,7 @@ TARE_SAMPLES = 30
 NOISE_FACTOR = 5.0
 CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
 LEAST_CLOSING = 0.001  # m/s, below the noise of a tracker
+INSIDE = 0.005  # m; a tip this deep inside the outline is not where it seems: clocks are apart, or frames
 LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
 
 
@@ -25,7 +26,7 @@ class PushTracker:
 
     def __init__(self, options: WindowOptions) -> None:
         self.options = options
-        self.counts = {"dropouts": 0, "resets": 0}
+        self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
         self._start: int | None = None  # of the window being filled
         self._last_good = -np.inf
@@ -35,6 +36,7 @@ class PushTracker:
         self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
         self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # near the slider, before the first push
         self._touching = False
+        self._inside = False
         self._first_touch: int | None = None
         self._last_contact: int | None = None
 
@@ -47,7 +49,7 @@ class PushTracker:
         """Take one sample; returns the windows that end by it."""
         self._note_interruptions(sample)
         self._note_free_force(sample)
-        self._touching = touching = not sample.blind and self._touches(sample)
+        self._touching = touching = not (sample.blind or self._inside) and self._touches(sample)
         if touching and self._first_touch is None:
             self._first_touch = sample.stamp
         if touching and sample.speed >= self.options.least_speed:
@@ -58,10 +60,13 @@ class PushTracker:
     def _note_interruptions(self, sample: Judged) -> None:
         lapse, self._last_time = sample.time - self._last_time, sample.time
         if sample.broken:
-            self.counts["dropouts"] += self._start is not None
             self._start = None
         else:
             self._idle += lapse if np.isfinite(lapse) else 0.0
+        if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.blind:
+            self.counts["inside"] += not self._inside
+            self._start = None
+        self._inside = inside
         if sample.jumped or (sample.broken and lapse > LONGEST_BREAK):
             self.counts["resets"] += sample.jumped
             self._end_push()

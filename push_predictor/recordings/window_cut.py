@@ -14,6 +14,8 @@ from push_predictor.recordings.track import NANOSECOND, Track
 from push_predictor.recordings.windows import PushWindow
 from push_predictor.types import Array
 
+SUNK, SUNK_SHARE = 0.0005, 0.5  # m, and of the tip's way: a tip that goes so far into the slider does not push it
+OUTRAN, OUTRAN_SHARE = 0.002, 1.25  # m, and of the tip's way: a slider that goes farther is moved by something else
 FIT_SAMPLES = 4  # or this many samples, where those take longer
 
 
@@ -59,8 +61,8 @@ def cut_window(
     end: int,
     push: PushContext,
     slid: float,
-) -> PushWindow | None:
-    """Cut the window from start to end (ns), or answer None where the pusher does not push into the slider.
+) -> PushWindow | str:
+    """Cut the window from start to end (ns), or answer why it is none (a kind of stream_faults.FAULTS).
 
     slid: m that the slider has been pushed so far.
     """
@@ -74,7 +76,9 @@ def cut_window(
     angle = float(wrap_angle(np.array(heading - np.arctan2(normal[1], normal[0]))))
     speed = float(np.hypot(*line.velocity))
     if not (abs(angle) < np.pi / 2.0 and speed > 0.0):
-        return None
+        return "not_a_push"
+    if fault := _impossible(rig, tracks, np.array([begin, finish])):
+        return fault
     moved = rotate(pose_after[:2] - pose[:2], np.array(-heading))
     return PushWindow(
         push_id=push.push_id,
@@ -98,6 +102,16 @@ def cut_window(
             **_forces(tracks.wrench, begin, finish, push.tare, normal),
         },
     )
+
+
+def _impossible(rig: Rig, tracks: Tracks, times: Array) -> str:
+    """What cannot be between two times (s) of a push, empty if all can."""
+    poses, tips = tracks.slider.at(times)[:, [0, 1, 3]], tracks.pusher.at(times)[:, :2]
+    driven, moved = np.hypot(*(tips[1] - tips[0])), np.hypot(*(poses[1] - poses[0])[:2])
+    before, after = rig.outline.project(to_body(tips, poses)).distance
+    if before - after > max(SUNK, SUNK_SHARE * driven):
+        return "left_behind"
+    return "outran" if moved > OUTRAN + OUTRAN_SHARE * driven else ""
 
 
 def _conditions(pose: Array, start: int, push: PushContext) -> dict[str, float]:
