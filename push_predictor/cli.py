@@ -26,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         check_json(options)
         options.run(options)
+        sys.stdout.flush()  # a full disk behind a pipe is told now, not when the interpreter ends
     except BrokenPipeError:  # the reader of our output has gone, `| head` for instance
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (PushPredictorError, OSError) as error:

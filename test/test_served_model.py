@@ -347,7 +347,7 @@ def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
     inputs = inside(model, 40)
     inputs[0, 0] = 0.2  # outside the domain
     together, batch = of(expected, inputs), PredictPushBatch.Response()
-    answer_batch(shelf, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
+    answer_batch(lambda: None, shelf, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
     for k, push in enumerate(inputs):
         answer_push(shelf, query_to_request("", push, 0.2), single := PredictPush.Response())
         assert_close(prediction_from_response(single), together, k, 1e-12 if k else 1e-8)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from push_predictor.errors import RecordingError, RequestError
+from push_predictor.recordings.atomic import write_whole
 
 PATIENCE = 2.0  # s before the first word, and between words
 
@@ -51,14 +52,7 @@ def write_json(options: argparse.Namespace, result: Mapping[str, object]) -> boo
 
 def write_text(path: Path, text: str) -> None:
     """Write a file; an older one is replaced when the new one is complete. Raises OSError that names the path."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text)
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise OSError(error.errno, error.strerror, str(path)) from None
+    write_whole(path, text.encode())
 
 
 def warn(text: str) -> None:

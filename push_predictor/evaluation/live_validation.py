@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import json
 import re
-from array import array
+import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from sys import intern
 
 import numpy as np
 
+from push_predictor.evaluation.row_file import RowFile
 from push_predictor.evaluation.running_score import RunningScore
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.evaluation.window_log import Refusal, write_window_log
 from push_predictor.evaluation.window_rows import WindowRows
 from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.windows import PushWindow, windows_to_table
 from push_predictor.types import Array, IntArray
 
 MAIN_RESULT = "validation.json"
+_ANSWER = struct.Struct("<q12d")  # number of the window, mean, covariance
+_NUMBER = struct.Struct("<q")
 
 
 class LiveValidation:
     """Windows in the order they were found, and the predictions of each model as they come in.
 
-    models: by the name they are asked for; the first is the main one, and a model's number is its place.
+    models: by the name they are asked for; the first is the main one, and a model's number is its place. All of it is
+    kept in temporary files: a window takes some twenty bytes of memory until the result is written.
     """
 
     def __init__(self, models: Mapping[str, PushModel]) -> None:
@@ -33,7 +37,7 @@ class LiveValidation:
         self.windows = WindowRows()
         self.scores = tuple(RunningScore(model.training_mean) for model in self.models)
         self._answers = tuple(_Answers() for _ in self.models)
-        self._refused: tuple[dict[int, str], ...] = tuple({} for _ in self.models)
+        self._refused = tuple(RowFile() for _ in self.models)
 
     def add(self, window: PushWindow) -> int:
         """Take a window; returns its number."""
@@ -48,7 +52,7 @@ class LiveValidation:
 
     def refuse(self, model: int, number: int, reason: str) -> None:
         """Take note that a model has no prediction for a window, and why."""
-        self._refused[model][number] = intern(reason)
+        self._refused[model].append(_NUMBER.pack(number) + reason.encode())
 
     def predicted(self, model: int = 0) -> WindowRows:
         """The windows that a model has answered, in order."""
@@ -56,7 +60,7 @@ class LiveValidation:
 
     def refused(self, model: int = 0) -> list[Refusal]:
         """The windows that it has refused, in order."""
-        pairs = sorted(self._refused[model].items())
+        pairs = sorted((*_NUMBER.unpack_from(row), row[_NUMBER.size :].decode()) for row in self._refused[model])
         return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
 
     def unanswered(self, model: int = 0) -> int:
@@ -89,9 +93,7 @@ class LiveValidation:
         comparison, path = self.comparison(model), folder / MAIN_RESULT.replace(".json", f"{suffix}.json")
         windows, refused = self.predicted(model), self.refused(model)
         write_window_log(folder / f"windows{suffix}.json", windows, comparison, refused, self.unanswered(model))
-        temporary = path.with_name(f".{path.name}.part")
-        temporary.write_text(json.dumps(metrics_json(comparison), indent=2, allow_nan=False) + "\n")
-        temporary.replace(path)
+        write_whole(path, (json.dumps(metrics_json(comparison), indent=2, allow_nan=False) + "\n").encode())
         return path
 
 
@@ -99,21 +101,20 @@ class _Answers:
     """Means and covariances by number of window, packed."""
 
     def __init__(self) -> None:
-        self._numbers = array("q")
-        self._values = array("d")
+        self._rows = RowFile()
 
     def __len__(self) -> int:
-        return len(self._numbers)
+        return len(self._rows)
 
     def add(self, number: int, mean: Array, covariance: Array) -> None:
-        self._numbers.append(number)
-        self._values.extend([*mean.tolist(), *covariance.ravel().tolist()])
+        self._rows.append(_ANSWER.pack(number, *mean.tolist(), *covariance.ravel().tolist()))
 
     def sorted(self) -> tuple[IntArray, Array, Array]:
         """Numbers (n,), means (n, 3), covariances (n, 3, 3), by number."""
-        numbers = np.array(self._numbers, dtype=np.int64)
-        values = np.array(self._values, dtype=np.float64).reshape(-1, 12)[np.argsort(numbers)]
-        return np.sort(numbers), values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
+        data = np.frombuffer(b"".join(self._rows), dtype=[("number", "<i8"), ("values", "<f8", 12)])
+        data = data[np.argsort(data["number"])]
+        values = data["values"]
+        return data["number"].copy(), values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
 
 
 def _file_name(name: str) -> str:

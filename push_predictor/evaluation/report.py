@@ -9,7 +9,7 @@ from typing import Any
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation import html
-from push_predictor.evaluation.figures.canvas import Picture, write_whole
+from push_predictor.evaluation.figures.canvas import Picture
 from push_predictor.evaluation.figures.gallery import (
     Validation,
     calibration_pictures,
@@ -20,6 +20,7 @@ from push_predictor.evaluation.figures.gallery import (
 from push_predictor.evaluation.report_tables import metrics_tables
 from push_predictor.evaluation.validation import Comparison, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows import PushWindow
 

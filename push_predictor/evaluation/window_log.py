@@ -9,6 +9,7 @@ from pathlib import Path
 
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.validation import Comparison
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.windows import PushWindow
 
 
@@ -33,16 +34,7 @@ def write_window_log(
     windows: those of the comparison, one a row. refused: windows beside these. unanswered: how many more there were.
     Raises OSError that names the path.
     """
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("w") as stream:
-            stream.writelines(_lines(windows, comparison, refused, unanswered))
-        temporary.replace(path)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, (line.encode() for line in _lines(windows, comparison, refused, unanswered)))
 
 
 def _lines(

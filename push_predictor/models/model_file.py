@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import tempfile
 import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +18,7 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.arrays_record import read_arrays
 from push_predictor.models.correlation_record import correlation_of, correlation_record
 from push_predictor.models.effects_record import cross_of, cross_record, effects_of, effects_record
 from push_predictor.models.gp import GaussianProcess, GpParameters
@@ -40,6 +38,7 @@ from push_predictor.models.sparse_record import has_inducing, put_inducing, spar
 from push_predictor.models.sparse_vhgp import SparseVHGP
 from push_predictor.models.vhgp import VHGP
 from push_predictor.models.vhgp_parameters import VhgpParameters
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig, rig_from_record
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -48,80 +47,64 @@ FORMAT = "push_predictor model"
 # 2: other kernels than the squared exponential, and a nugget; 3: effects; 4: effects that share a covariance;
 # 5: outputs that go together, and inducing inputs
 FORMAT_VERSION = 5
-LARGEST = 1 << 30  # bytes unpacked; a model of 20 000 windows needs a hundredth of it
+PROBES = 5
+LONGEST_WAY = 10.0  # m
+LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
 HEADER = "header"
 
 
 def save_model(model: PushModel, path: Path) -> None:
-    """Write a model file; an older file at that path is replaced only when the new one is complete."""
+    """Write a model file; an older file at that path is replaced only when the new one is complete.
+
+    Raises OSError that names the path.
+    """
     arrays = _table_arrays(model.training)
     header = _header(model, arrays)
     buffer = io.BytesIO()
     arrays[HEADER] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(buffer.getvalue())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    write_whole(path, buffer.getvalue())
 
 
 def load_model(path: Path) -> PushModel:
     """Read a model file. Raises ModelFileError if it is absent, damaged, foreign or of a newer version."""
-    arrays = _read_arrays(path)
+    arrays = read_arrays(path)
     header = _read_header(path, arrays)
     try:
-        return _model(header, arrays, str(path))
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, np.linalg.LinAlgError) as error:
-        raise ModelFileError(f"{path}: the model file is damaged ({type(error).__name__}: {error})") from None
+        with np.errstate(all="ignore"):
+            model = _model(header, arrays, str(path))
+            _check_answers(model)
+        return model
     except PushPredictorError as error:
         raise ModelFileError(f"{path}: the model file is damaged ({error})") from None
+    except Exception as error:  # whatever a file makes the mathematics do, it is the file's fault
+        raise ModelFileError(f"{path}: the model file is damaged ({type(error).__name__}: {error})") from None
 
 
 def is_model_file(path: Path) -> bool:
     """Whether a file looks like one of ours, whatever its version or state."""
     try:
+        with path.open("rb") as stream:
+            start = stream.read(40)
+        if start[:4] == b"PK\3\4" and start[30:] == b"inputs.npy":
+            return True  # cut off further on, perhaps: the list of a zip's members is at its end
         with zipfile.ZipFile(path) as archive:
             return f"{HEADER}.npy" in archive.namelist()
-    except (OSError, zipfile.BadZipFile, ValueError):
+    except Exception:  # zipfile has several kinds of its own
         return False
-
-
-def _read_arrays(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-        if unpacked > LARGEST:
-            raise ModelFileError(f"{path}: unpacks to {unpacked} bytes, at most {LARGEST} are accepted")
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        ValueError,
-        NotImplementedError,  # zipfile's word for a compression that it does not know
-        RuntimeError,  # and for a member that is encrypted
-    ) as error:
-        raise ModelFileError(f"{path}: not a model file, or a damaged one ({error})") from None
-    except OSError as error:
-        raise ModelFileError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
 def _read_header(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     try:
         header = json.loads(arrays.pop(HEADER).tobytes().decode())
         found, version = header["format"], header["format_version"]
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, RecursionError):
         raise ModelFileError(f"{path}: holds no header of a push_predictor model") from None
     if found != FORMAT:
         raise ModelFileError(f"{path}: format {found!r} is not accepted, give a {FORMAT!r}")
-    if not isinstance(version, int) or version > FORMAT_VERSION:
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise ModelFileError(f"{path}: format version {version!r} is not accepted, give 1 to {FORMAT_VERSION}")
+    if version > FORMAT_VERSION:
         raise ModelFileError(
             f"{path}: format version {version!r}, written by push_predictor {header.get('written_by')!r}; "
             f"this is push_predictor {__version__}, which reads up to version {FORMAT_VERSION}: update it"
@@ -164,6 +147,17 @@ def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -
     return PushModel(str(header["name"]), str(header["kind"]), rig, body, training, provenance)
 
 
+def _check_answers(model: PushModel) -> None:
+    """Raise ValueError unless the model gives some of its own training pushes a Gaussian."""
+    rows = model.training.take(np.linspace(0, len(model.training) - 1, PROBES).astype(int))
+    found = model.predict(rows.inputs, rows.duration, rows.covariates)
+    for name, values in (("mean", found.mean), ("covariance", found.covariance)):
+        if not np.all(np.isfinite(values)):
+            raise ValueError(f"the {name} of a training push is not finite")
+    if np.any(np.linalg.eigvalsh(found.covariance) <= 0.0):
+        raise ValueError("the covariance of a training push is not positive definite")
+
+
 # --- the training rows ----------------------------------------------------------------------------------------------
 
 
@@ -185,9 +179,11 @@ def _table_arrays(table: PushTable) -> dict[str, np.ndarray]:
 def _table(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> PushTable:
     covariates = {name: arrays[f"covariate_{k}"].astype(float) for k, name in enumerate(header["covariates"])}
     push_id = arrays["pushes"][arrays["push_of_row"]]
-    return PushTable(
-        _finite(arrays, "inputs"), _finite(arrays, "duration"), _finite(arrays, "outcomes"), push_id, covariates
-    )
+    inputs, duration = _finite(arrays, "inputs"), _finite(arrays, "duration")
+    table = PushTable(inputs, duration, _finite(arrays, "outcomes"), push_id, covariates)
+    if not np.all(np.abs(inputs[:, 0] * duration) < LONGEST_WAY):
+        raise ValueError(f"a training push is longer than {LONGEST_WAY:g} m")
+    return table
 
 
 def _finite(arrays: dict[str, np.ndarray], name: str) -> Array:
@@ -278,6 +274,10 @@ def _extended_body(
 def _physics(header: dict[str, Any], rig: Rig) -> AnalyticalPush:
     x, y = header["centre"]
     support = Support((float(x), float(y)), float(header["length"]))
+    reach = float(np.abs(rig.outline.vertices).max())
+    largest = max(abs(support.centre[0]), abs(support.centre[1]), support.length, rig.pusher_radius)
+    if not (largest < LARGEST_RATIO * reach and support.length > reach / LARGEST_RATIO):
+        raise ValueError("support or pusher are out of all proportion to the outline")  # integrating would never end
     return AnalyticalPush(rig.outline, rig.pusher_radius, float(header["contact_friction"]), support)
 
 

@@ -8,7 +8,7 @@ from math import inf, isfinite, pi
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.models.push_model import PushModel
+from push_predictor.models.push_model import LearnedBody, PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
@@ -27,6 +27,7 @@ UNITS = {
     "normal_force": "N",
     "tangential_force": "N",
 }  # of the covariates that windows have; a recorded topic's is its sender's
+FARTHEST = 1.0  # m a push; mechanics is integrated along the way, some milliseconds for a centimetre
 
 
 def check_request(
@@ -40,6 +41,7 @@ def check_request(
         and abs(angle) < pi / 2.0
         and 0.0 < duration < inf
         and low <= duration <= high
+        and velocity * duration <= _farthest(model)
         and all(map(isfinite, covariates.values()))
         and all(name in covariates for name in model.needs)
     ):
@@ -71,6 +73,15 @@ def _check(
         if name not in covariates:
             raise RequestError(f"covariate {name}", "missing", f"{_meaning(name)}: {model.name} needs it")
     _check_duration(model, duration)
+    if (too_fast := np.flatnonzero(velocity * duration > _farthest(model))).size:
+        place = f"velocity[{too_fast[0]}]" if indexed else "velocity"
+        most = f"at most {FARTHEST / duration:.3g} m/s for {duration:g} s: a way of {FARTHEST:g} m"
+        raise RequestError(place, float(velocity[too_fast[0]]), most)
+
+
+def _farthest(model: PushModel) -> float:
+    """How long (m) a push may be that a model answers for."""
+    return inf if isinstance(model.body, LearnedBody) else FARTHEST
 
 
 def _meaning(covariate: str) -> str:

@@ -61,11 +61,8 @@ class ModelShelf:
         Answers the name. Raises ModelFileError, after which the shelf is as it was; also for a name that is taken
         if `replace` is false.
         """
-        path = path.expanduser().resolve()
-        served = serve(load_model(path))
-        # The first prediction fills what is left of caches; no request should wait for that.
-        first = served.model.training.take(np.arange(1))
-        served.predict(first.inputs, first.duration, first.covariates)
+        path = _located(path)
+        served = _served(path)
         name = name or served.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
@@ -87,10 +84,12 @@ class ModelShelf:
         problems = []
         for index, place in enumerate(places):
             try:
-                for path in model_files(_place(place)):
-                    problems += self._problem(path)
-            except ModelFileError as error:
+                files = model_files(default_model_path() if place == SHIPPED else _located(Path(place)))
+            except PushPredictorError as error:
                 problems.append(f"models[{index}]: {error}")
+                continue
+            for path in files:
+                problems += self._problem(path)
         return problems
 
     def describe(self, name: str) -> str:
@@ -117,15 +116,35 @@ class ModelShelf:
         return []
 
 
-def _place(text: str) -> Path:
-    return default_model_path() if text == SHIPPED else Path(text).expanduser()
+def _located(path: Path) -> Path:
+    """The absolute path. Raises ModelFileError for one that can lead nowhere."""
+    try:
+        return path.expanduser().resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # no such user, a loop of links, a null character
+        raise ModelFileError(f"{str(path)!r}: no such file ({error})") from None
+
+
+def _served(path: Path) -> ServedModel:
+    """The model of a file, ready to answer. Raises ModelFileError, whatever the file makes the mathematics do."""
+    model = load_model(path)
+    try:
+        served = serve(model)
+        # The first prediction fills what is left of caches; no request should wait for that.
+        first = model.training.take(np.arange(1))
+        served.predict(first.inputs, first.duration, first.covariates)
+    except Exception as error:
+        raise ModelFileError(f"{path}: the model cannot be served ({type(error).__name__}: {error})") from None
+    return served
 
 
 def model_files(place: Path) -> list[Path]:
     """The file itself, or the model files in a folder, by name. Raises ModelFileError if there is none."""
-    if not place.is_dir():
-        return [place]
-    files = sorted(path for path in place.iterdir() if path.is_file() and is_model_file(path))
+    try:
+        if not place.is_dir():
+            return [place]
+        files = sorted(path for path in place.iterdir() if path.is_file() and is_model_file(path))
+    except OSError as error:
+        raise ModelFileError(f"{place}: cannot be read ({error.strerror})") from None
     if not files:
         raise ModelFileError(f"{place}: the folder holds no model file, give one that train wrote")
     return files

@@ -56,6 +56,7 @@ class ReportWriter:
 
 def _write(models: list[PushModel], windows: WindowRows, comparisons: list[Comparison], folder: Path) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that unfinished files are removed
     try:
         report_windows(models, windows, comparisons, folder, "online validation")
     except (PushPredictorError, OSError) as error:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.window_table import TABLE
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag_metadata import METADATA_FILE
 from push_predictor.recordings.rig import HOW_TO_GIVE
 from push_predictor.recordings.table_file import ENDINGS, rig_path
@@ -100,6 +101,7 @@ def _serve(connection: Connection, task: TraceTask) -> None:
         shutil.rmtree(task.place, ignore_errors=True)  # the node is gone and cannot do it
     except (PushPredictorError, OSError) as error:
         told = str(error).replace(str(task.place / COPIES), str(task.evidence[0].parent))
+        told = told.replace(str(task.place), str(task.place.parent))  # where the results would have gone
         told = told.replace(HOW_TO_GIVE, "write it there")  # there is no option of that name here
         connection.send(Failed(" ".join(told.split())))
 
@@ -118,7 +120,7 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     found = trace_data(paths, task.model, alpha=task.alpha, covariates=task.covariates or None, watch=watch)
     watch("report", 1.0)
     text = json.dumps(trace_json(found), indent=2, allow_nan=False)
-    (task.place / VERDICT).write_text(text + "\n")
+    write_whole(task.place / VERDICT, f"{text}\n".encode())
     if found.extended is not None:
         save_model(found.extended, task.place / EXTENDED)
     sentences = [verdict_sentence(found), worth_sentence(found), *_report(task.place / REPORT, found)]
@@ -143,12 +145,11 @@ def _settled(path: Path, place: Path) -> Path:
     if path.name != TABLE:
         return path
     copy = place / COPIES / TABLE
-    copy.parent.mkdir()
     try:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
-    copy.write_bytes(data[: data.rfind(b"\n") + 1])
+    write_whole(copy, data[: data.rfind(b"\n") + 1])
     if rig_path(path).exists():
         shutil.copyfile(rig_path(path), rig_path(copy))
     return copy

@@ -22,6 +22,7 @@ from push_predictor.nodes.residual_recorder import residual_message, write_resid
 from push_predictor.nodes.sensor_inlet import Samples
 from push_predictor.nodes.stream_pace import StreamPace
 from push_predictor.nodes.window_table import WindowTable
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.recordings.window_finder import WindowFinder
@@ -98,9 +99,7 @@ class ValidationRun:
         written = [*self.validation.write(folder), write_residuals(self.validation, folder)]
         if self.alarm is not None:
             path = folder / MAIN_RESULT
-            temporary = path.with_name(f".{path.name}.part")
-            temporary.write_text(with_alarm(path.read_text(), self.alarm.json))
-            temporary.replace(path)
+            write_whole(path, with_alarm(path.read_text(), self.alarm.json).encode())
         return written
 
     def _judge(self, last: bool = False) -> None:

@@ -14,7 +14,6 @@ import scipy
 
 from push_predictor import __version__
 from push_predictor.evaluation import html
-from push_predictor.evaluation.figures.canvas import write_whole
 from push_predictor.paper.claims import (
     calibration,
     comparison,
@@ -37,6 +36,7 @@ from push_predictor.paper.repetitions import repeated_grid
 from push_predictor.paper.section import Origin, Section, Table
 from push_predictor.paper.study import Study
 from push_predictor.paper.work import Work, fingerprint
+from push_predictor.recordings.atomic import write_whole
 
 PAPER = "Bauza and Rodriguez, A Probabilistic Data-Driven Model for Planar Pushing, ICRA 2017"
 CLAIMS: tuple[Callable[[Study], Section], ...] = (

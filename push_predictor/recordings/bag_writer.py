@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +13,7 @@ from types import TracebackType
 from mcap.writer import CompressionType, Writer
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag_metadata import METADATA_FILE, TopicInfo, bag_metadata_text, qos_text
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
@@ -45,11 +47,14 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         try:
-            self._stream = self._create().open("wb")
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written ({error.strerror})") from None
+            with self._told():
+                self._stream = self._create().open("wb")
+        except RecordingError:
+            with suppress(OSError):
+                _remove(self._unfinished)
+            raise
         self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
-        self._writer.start(profile="ros2", library="push_predictor")
+        self._writer.start(profile="ros2", library="push_predictor")  # a few bytes, into the stream's buffer
         return self
 
     def __exit__(
@@ -57,11 +62,11 @@ class BagWriter:
     ) -> None:
         try:
             if kind is None:
-                self._finish()
-        except OSError as failure:
-            raise RecordingError(f"{self.path}: cannot be written ({failure.strerror})") from None
+                with self._told():
+                    self._finish()
         finally:
-            self._stream.close()
+            with suppress(OSError):  # what the disk did not take is tried once more, and thrown away
+                self._stream.close()
             _remove(self._unfinished)
 
     def add_topic(
@@ -76,29 +81,46 @@ class BagWriter:
     ) -> None:
         """Announce a topic (reliable, keep last). schema_text: ros2msg, with all definitions it refers to."""
         topic = TopicInfo(absolute(name), type, 0, type_hash, depth, durability)
-        if type not in self._schemas:
-            self._schemas[type] = self._writer.register_schema(type, "ros2msg", schema_text.encode())
         metadata = {"offered_qos_profiles": qos_text(topic), "topic_type_hash": type_hash}
+        with self._told():
+            if type not in self._schemas:
+                self._schemas[type] = self._writer.register_schema(type, "ros2msg", schema_text.encode())
+            self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
         self._topics[topic.name] = topic
         self._counts[topic.name] = 0
-        self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
         """Write an MCAP Metadata record; a folder's metadata.yaml carries it too."""
         self._records[name] = dict(record)
-        self._writer.add_metadata(name, dict(record))
+        with self._told():
+            self._writer.add_metadata(name, dict(record))
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
         """Write a CDR message with stamp (ns) as log and publish time.
 
-        Raises RecordingError for a stamp that MCAP cannot hold, KeyError for a topic that was not added.
+        Raises RecordingError for a stamp that MCAP cannot hold and for a full disk, KeyError for a topic that was not
+        added.
         """
         name = absolute(topic)
         if not 0 <= stamp <= LARGEST_STAMP:
             raise RecordingError(f"{self.path}: {name} stamp {stamp}, give ns from 0 to {LARGEST_STAMP}")
-        self._writer.add_message(self._channels[name], stamp, data, stamp)
+        try:
+            self._writer.add_message(self._channels[name], stamp, data, stamp)
+        except OSError as error:
+            raise self._unwritten(error) from None
         self._counts[name] += 1
         self._first, self._last = min(self._first, stamp), max(self._last, stamp)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """What the disk refuses is told by the name of the bag."""
+        try:
+            yield
+        except OSError as error:
+            raise self._unwritten(error) from None
+
+    def _unwritten(self, error: OSError) -> RecordingError:
+        return RecordingError(f"{self.path}: cannot be written ({error.strerror})")
 
     def _create(self) -> Path:
         """A place for the unfinished file."""
@@ -113,13 +135,12 @@ class BagWriter:
         self._writer.finish()
         self._stream.flush()
         os.fsync(self._stream.fileno())
-        if not self._bare:
-            (self._unfinished / METADATA_FILE).write_text(self._metadata_text(), encoding="utf-8")
-        earlier = self._unfinished.with_suffix(".earlier")
-        if self.path.is_dir():
-            self.path.rename(earlier)
-        self._unfinished.replace(self.path)
-        _remove(earlier)
+        self._stream.close()
+        if self._bare:
+            self._unfinished.replace(self.path)
+            return
+        write_whole(self._unfinished / METADATA_FILE, self._metadata_text().encode())
+        _replace_folder(self.path, self._unfinished)
 
     def _metadata_text(self) -> str:
         topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
@@ -139,6 +160,20 @@ def _check_target(path: Path, bare: bool) -> None:
         return
     if not path.is_dir() or any(p.name != METADATA_FILE and p.suffix != ".mcap" for p in path.iterdir()):
         raise RecordingError(f"{path}: exists and is not a bag, give another name or remove it")
+
+
+def _replace_folder(path: Path, new: Path) -> None:
+    """Let a folder take the place of an earlier one, which is back where that fails."""
+    earlier = new.with_suffix(".earlier")
+    if path.is_dir():
+        path.rename(earlier)
+    try:
+        new.replace(path)
+    except OSError:
+        if earlier.is_dir():
+            earlier.rename(path)
+        raise
+    _remove(earlier)
 
 
 def _remove(path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
 RECORD_NAME = "push_rig"
@@ -99,10 +100,10 @@ def load_rig(path: Path) -> Rig:
 
 
 def save_rig(rig: Rig, path: Path) -> None:
-    """Write NAME.rig.yaml."""
+    """Write NAME.rig.yaml. Raises OSError that names the path."""
     import yaml
 
-    path.write_text(yaml.safe_dump(rig.to_record(), sort_keys=False))
+    write_whole(path, yaml.safe_dump(rig.to_record(), sort_keys=False).encode())
 
 
 def _shape_parameters(semi_axes: tuple[float, float]) -> dict[str, object]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import gzip
 import io
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from push_predictor.errors import TableError
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table import COLUMNS, INPUTS, OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray, TextArray
@@ -49,7 +49,10 @@ def read_table(path: Path) -> PushTable:
 
 
 def write_table(path: Path, table: PushTable) -> None:
-    """Write a CSV, gzip if path ends in .gz: it reads back to the same numbers; one table, one sequence of bytes."""
+    """Write a CSV, gzip if path ends in .gz: it reads back to the same numbers; one table, one sequence of bytes.
+
+    An older file is replaced when the new one is complete. Raises OSError that names the path.
+    """
     path = Path(path)
     columns = [*table.inputs.T, table.duration, *table.outcomes.T]
     columns += table.covariates.values()
@@ -59,10 +62,7 @@ def write_table(path: Path, table: PushTable) -> None:
     writer.writerow([*COLUMNS, *table.covariates])
     writer.writerows(zip(*numbers[:7], table.push_id.tolist(), *numbers[7:], strict=True))
     data = text.getvalue().encode()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
-    unfinished.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
-    os.replace(unfinished, path)
+    write_whole(path, gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
 
 
 def is_recording(path: Path) -> bool:

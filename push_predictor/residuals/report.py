@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from push_predictor.evaluation import html
-from push_predictor.evaluation.figures.canvas import write_whole
+from push_predictor.recordings.atomic import write_whole
 from push_predictor.residuals.advice import separating_words
 from push_predictor.residuals.drivers import CONSTANT
 from push_predictor.residuals.figures.gallery import (
@@ -53,7 +53,6 @@ UNNAMED = (
 def write_trace_report(path: Path, trace: Trace) -> Path:
     """Write the page, pictures in it; returns its path. Raises OSError, or PushPredictorError without matplotlib."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as folder:
         parts = _parts(Path(folder), trace)
     write_whole(path, html.page(f"What {trace.model.name} leaves over", parts).encode())
