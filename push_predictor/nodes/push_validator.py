@@ -27,6 +27,7 @@ from push_predictor.nodes.prediction_client import PredictionClient
 from push_predictor.nodes.push_alarm import PushAlarm as AlarmProcess
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.report_writer import ReportWriter
+from push_predictor.nodes.residual_recorder import ResidualJournal
 from push_predictor.nodes.runtime import Stop, one_line, run
 from push_predictor.nodes.sensor_inlet import SensorInlet
 from push_predictor.nodes.validation_run import ValidationRun
@@ -39,6 +40,7 @@ from push_predictor_interfaces.msg import PushAlarm, PushResidual
 PERIOD = 0.02  # s between two looks at what has arrived
 QUIET = 0.3  # s without samples after which a finished replay has delivered all it will
 CALLER_PATIENCE = 5.0  # s that a caller of ~/finish waits for answers that are missing
+SILENCE = 5.0  # s without samples after which a replay that was not paused must be thought to have died
 LAST_PATIENCE = 2.0  # s that the end of the process waits for them
 ALARM_PATIENCE = 15.0  # s that the end of a score waits for the alarm about the pushes that were answered
 PARAMETERS = (
@@ -97,7 +99,8 @@ class PushValidator(Node):
         self._failure = ""
         self._said: list[str] = []  # problems that were logged
         self._written = False
-        self._finished = False  # the replay said so
+        self._finished = self._paused = False  # the replay said so
+        self._journal: ResidualJournal | None = None  # of the present score
         self._last_sample = monotonic()
         self._closing, self._closed = threading.Event(), threading.Event()
         self._listen()
@@ -142,6 +145,7 @@ class PushValidator(Node):
         self._inlet.drain()
         # With nothing measured it is old news: the state of a replay that ended before this node began.
         self._finished = message.data == "finished" and (self._open or len(self._inlet) > 0)
+        self._paused = message.data == "paused"
 
     # --- the work -------------------------------------------------------------------------------------------
 
@@ -175,13 +179,27 @@ class PushValidator(Node):
             if not (complete or self._closing.is_set() or self._finish.asked()):
                 return
             scalars = self._inlet.scalar_names
-            self._run = ValidationRun(self._rig, models, self._client, self._show, self._alarm, self._output, scalars)
+            self._run = ValidationRun(
+                self._rig, models, self._client, self._on_answer, self._alarm, self._output, scalars
+            )
+            self._journal = ResidualJournal(self._output) if self._output else None
             self._open, self._failure = True, ""
         samples = self._inlet.take()
         if len(samples):
             self._last_sample = monotonic()
         if self._run is not None:
             self._run.feed(samples)
+            self._tell_of_cut_off(self._run)
+
+    def _tell_of_cut_off(self, begun: ValidationRun) -> None:
+        """An earlier score that was cut off lies where the new one is to be: say what was saved, and what it lacks."""
+        if begun.table is None or begun.table.cut_off is None:
+            return
+        self.get_logger().warning(
+            f"an earlier score was cut off: its windows and residuals so far are in {begun.table.cut_off}; it has no "
+            "validation.json, windows.json, bag of residuals or report"
+        )
+        begun.table.cut_off = None
 
     def _rig_changed(self) -> bool:
         """Is the score of another rig than the one that is there now?"""
@@ -256,6 +274,11 @@ class PushValidator(Node):
 
     # --- what is shown --------------------------------------------------------------------------------------
 
+    def _on_answer(self, model: int, window: PushWindow, prediction: Prediction, residual: PushResidual) -> None:
+        if self._journal is not None:
+            self._journal.add(residual)
+        self._show(model, window, prediction, residual)
+
     def _show(self, model: int, window: PushWindow, prediction: Prediction, residual: PushResidual) -> None:
         self._residuals.publish(residual)
         if model == 0 and self._rig is not None and self._markers.get_subscription_count():
@@ -266,7 +289,9 @@ class PushValidator(Node):
         self._alarms.publish(alarm_to_message(state, end, self._values["frame_id"] or "world"))
 
     def _publish_diagnostics(self) -> None:
-        problems = [*filter(None, dict.fromkeys([*self._source.problems, self._hindrance(), self._rig_problem]))]
+        unkept = self._journal.failure if self._journal else ""
+        found = [*self._source.problems, self._hindrance(), self._rig_problem, unkept, self._silence()]
+        problems = [*filter(None, dict.fromkeys(found))]
         if problems != self._said:
             self._said = problems
             for problem in problems:
@@ -281,6 +306,12 @@ class PushValidator(Node):
             self._failure,
         )
         self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
+
+    def _silence(self) -> str:
+        """Has whoever feeds the score fallen silent? In words, empty if not."""
+        if not self._open or self._paused or self._ending or monotonic() - self._last_sample < SILENCE:
+            return ""
+        return f"no sample for over {SILENCE:g} s: the score is kept open, ~/finish has it written"
 
     def _state(self) -> str:
         if self._ending is not None:

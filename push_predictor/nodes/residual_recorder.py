@@ -1,4 +1,6 @@
-"""The recording of residuals that a validator leaves: a bag of push_residual, with the scalars of the windows."""
+"""The residuals that a validator leaves: a bag of push_residual, with the scalars of the windows; until that is written
+a table of them, which is on disk as they come.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,11 @@ from rclpy.serialization import serialize_message
 from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
 from msg_adapters.residuals import ValidatedWindow, residual_to_message
 from push_predictor.evaluation.live_validation import LiveValidation
+from push_predictor.nodes.whole_lines import append_lines
 from push_predictor.recordings.bag_writer import BagWriter
 from push_predictor.recordings.cdr import encode
 from push_predictor.recordings.definitions import FLOAT64, SCALAR_LAYOUTS
+from push_predictor.recordings.table import COLUMNS
 from push_predictor.recordings.windows import PushWindow
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushResidual
@@ -22,11 +26,18 @@ from push_predictor_interfaces.msg import PushResidual
 TOPIC = "push_residual"
 BAG = "residuals"
 SCALAR = "topic:"  # begins the name of a scalar topic's covariate
+JOURNAL = "residuals.csv"  # is there while a score is open, and after one that was cut off
+_AXES = ("dx", "dy", "dtheta")
+_ADDED = (
+    *("model", "window", "end"),
+    *(f"predicted_{name}" for name in _AXES),
+    *(f"covariance_{first}_{second}" for first in _AXES for second in _AXES),
+)
 
 
 def write_residuals(validation: LiveValidation, folder: Path) -> Path:
     """Write FOLDER/residuals, a rosbag2 folder with a message for every answer, and one for every scalar of a window at
-    its start. Raises RecordingError.
+    its start; the journal of these answers goes. Raises RecordingError.
     """
     path = folder / BAG
     names = dict.fromkeys(
@@ -40,7 +51,43 @@ def write_residuals(validation: LiveValidation, folder: Path) -> Path:
             _residuals(validation), _scalars(validation), key=lambda message: message[0]
         ):
             bag.write(topic, time, data)
+    (folder / JOURNAL).unlink(missing_ok=True)
     return path
+
+
+class ResidualJournal:
+    """FOLDER/residuals.csv: a push table of the windows that were answered, with the model and what it predicted.
+
+    Every answer is on disk as soon as it is there, in whole lines, whatever becomes of the validator.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / JOURNAL
+        self.failure = ""  # why no more is kept, in words
+
+    def begin(self) -> None:
+        """The empty table, which says that a score is open. Raises OSError that names the path."""
+        self.path.unlink(missing_ok=True)
+        append_lines(self.path, [",".join((*COLUMNS, *_ADDED))])
+
+    def add(self, residual: PushResidual) -> None:
+        """Append an answer; that the disk takes no more does not end the measurement."""
+        if self.failure:
+            return
+        stamp = residual.header.stamp
+        added = [_quoted(residual.model), residual.window, stamp.sec * 10**9 + stamp.nanosec]
+        inputs = (residual.velocity, residual.contact, residual.angle, residual.duration)
+        numbers = [*residual.observed.tolist(), *residual.predicted.tolist(), *residual.covariance.tolist()]
+        cells = [*map(repr, (*inputs, *numbers[:3])), residual.push_id, *map(str, added), *map(repr, numbers[3:])]
+        try:
+            append_lines(self.path, [",".join(cells)])
+        except OSError as error:
+            self.failure = f"residuals are not kept: {error}"
+
+
+def _quoted(text: str) -> str:
+    """A cell of a CSV: a server may call its models anything."""
+    return '"' + text.replace('"', '""') + '"'
 
 
 def _residuals(validation: LiveValidation) -> Iterator[tuple[int, str, bytes]]:

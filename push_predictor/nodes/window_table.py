@@ -6,11 +6,14 @@ Every window is on disk as soon as it is found, with its covariates, whatever be
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
+from push_predictor.nodes.residual_recorder import JOURNAL, ResidualJournal
+from push_predictor.nodes.whole_lines import append_lines
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import rig_path, write_table
@@ -26,6 +29,7 @@ class WindowTable:
     def __init__(self, folder: Path, rig: Rig) -> None:
         self.path, self._rig = folder / TABLE, rig
         self._names: tuple[str, ...] | None = None
+        self.cut_off: Path | None = None  # where an earlier score was put that did not come to its end
 
     def add(
         self, windows: Sequence[PushWindow], before: Sequence[PushWindow], first: Mapping[str, float] = NOTHING
@@ -46,14 +50,36 @@ class WindowTable:
             raise OSError(error.errno, error.strerror, str(self.path)) from None
 
     def _begin(self, names: tuple[str, ...], before: Sequence[PushWindow], first: Mapping[str, float]) -> None:
+        if self._names is None:
+            self.cut_off = put_aside(self.path.parent)
+            ResidualJournal(self.path.parent).begin()
         self._names = names
         write_table(self.path, _table(before, names, first))
         save_rig(self._rig, rig_path(self.path))
 
     def _append(self, windows: Sequence[PushWindow], first: Mapping[str, float]) -> None:
         assert self._names is not None
-        with self.path.open("a") as stream:
-            stream.writelines(f"{','.join(_cells(window, self._names, first))}\n" for window in windows)
+        append_lines(self.path, (",".join(_cells(window, self._names, first)) for window in windows))
+
+
+def put_aside(folder: Path) -> Path | None:
+    """Keep the windows and residuals of a score that was cut off from being written over: they go to
+    FOLDER/cut_off_DATE (of the last residual, UTC). None where there is no such. Raises OSError.
+    """
+    journal = folder / JOURNAL
+    if not journal.exists():
+        return None
+    date = datetime.fromtimestamp(journal.stat().st_mtime, timezone.utc)
+    place = folder / f"cut_off_{date:%Y%m%dT%H%M%S%f}"
+    place.mkdir(exist_ok=True)
+    for path in (
+        folder / TABLE,
+        rig_path(folder / TABLE),
+        journal,
+    ):  # the journal, which tells, last
+        if path.exists():
+            path.replace(place / path.name)
+    return place
 
 
 def _table(windows: Sequence[PushWindow], names: Sequence[str], first: Mapping[str, float]) -> PushTable:
