@@ -7,8 +7,6 @@ import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
-import zstandard
-
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag_compression import unpack_file, unpack_message
 from push_predictor.recordings.bag_metadata import (
@@ -40,7 +38,6 @@ class Bag:
         self.name = path.name if path.is_dir() else path.stem
         self.files = files
         self._described = described
-        self._unreadable = 0
         self._scratch = scratch  # where unpacked files lie as long as the bag lives
 
     @property
@@ -69,8 +66,6 @@ class Bag:
     def notes(self) -> list[str]:
         """What was found damaged or out of order so far, in words."""
         own = [*self._described.notes, *(note for file in self.files for note in file.notes)]
-        if self._unreadable:
-            own.append(f"{self.path}: {self._unreadable} messages cannot be unpacked and were dropped")
         return own + [
             f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which counts"
             for name, record in self._described.custom_data.items()
@@ -78,30 +73,15 @@ class Bag:
         ]
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note.
-
-        Raises RecordingError for a given topic that is not in CDR.
-        """
-        if self._described.compression == "message":
-            yield from self._unpacked(topics)
-            return
+        """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note."""
         for file in self.files:
             yield from file.messages(topics)
-
-    def _unpacked(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
-        self._unreadable = 0
-        for file in self.files:
-            for message in file.messages(topics):
-                try:
-                    yield message._replace(data=unpack_message(message.data))
-                except zstandard.ZstdError:
-                    self._unreadable += 1
 
 
 def open_bag(path: Path) -> Bag:
     """Open a .mcap file, or a folder with .mcap files, with or without metadata.yaml.
 
-    Raises RecordingError if there is none, or if a file is empty or foreign.
+    Raises RecordingError if there is none, or if all files are empty or foreign; one among others becomes a note.
     """
     path = Path(path)
     if not path.is_dir():
@@ -109,11 +89,31 @@ def open_bag(path: Path) -> Bag:
     described = read_bag_metadata(path)
     if not (files := _listed(path, described) or _found(path)):
         raise RecordingError(f"{path}: holds no .mcap file, give an MCAP bag")
-    if described.compression != "file":
-        return Bag(path, [McapFile(file) for file in files], described)
-    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_")
-    unpacked = [unpack_file(file, Path(scratch.name)) for file in files]
-    return Bag(path, [McapFile(file) for file in unpacked], described, scratch)
+    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
+    folder = None if scratch is None else Path(scratch.name)
+    return Bag(path, _opened(files, described, folder), described, scratch)
+
+
+def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[McapFile]:
+    """The files that can be read. Raises the first one's error if none can."""
+    opened: list[McapFile] = []
+    refused: list[RecordingError] = []
+    for file in files:
+        try:
+            opened.append(_open(file, described, scratch))
+        except RecordingError as error:
+            refused.append(error)
+    if not opened:
+        raise refused[0]
+    described.notes.extend(f"{error}; the other files are used" for error in refused)
+    return opened
+
+
+def _open(file: Path, described: BagMetadata, scratch: Path | None) -> McapFile:
+    if scratch is not None:
+        unpacked = unpack_file(file, scratch, described.notes)
+        return McapFile(unpacked, name=str(file) if unpacked == file else f"{file}, unpacked,")
+    return McapFile(file, unpack=unpack_message if described.compression == "message" else None)
 
 
 def _listed(folder: Path, described: BagMetadata) -> list[Path]:

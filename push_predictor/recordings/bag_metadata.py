@@ -13,6 +13,7 @@ from push_predictor.recordings.rig import RECORD_NAME, REQUIRED
 METADATA_FILE = "metadata.yaml"
 VERSION = 9
 _ROOT = "rosbag2_bagfile_information"
+_DAMAGED = (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError)
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -54,7 +55,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         files = tuple(str(name) for name in information.get("relative_file_paths") or ())
     except FileNotFoundError:
         return BagMetadata()
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+    except (*_DAMAGED, yaml.YAMLError) as error:
         reason = str(error).replace("\n", " ")
         return BagMetadata(notes=[f"{path}: cannot be read ({reason}), the .mcap files are taken by name"])
     return BagMetadata(files, _records(information.get("custom_data")), _compression(information, path))
@@ -66,7 +67,7 @@ def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Map
 
     try:
         information = yaml.safe_load(metadata["rosbag2"]["serialized_metadata"])
-    except (KeyError, yaml.YAMLError):
+    except (*_DAMAGED, yaml.YAMLError):
         return {}
     return _records(information.get("custom_data")) if isinstance(information, dict) else {}
 

@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
+from itertools import zip_longest
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, MetadataIndex, Schema, Statistics
+from mcap.records import MetadataIndex
 
 from push_predictor.errors import RecordingError
+from push_predictor.recordings.mcap_described import Described, Wanted
+from push_predictor.recordings.mcap_places import Place, data_checksum_is_wrong, places
 from push_predictor.recordings.mcap_records import (
-    FOOTER_SIZE,
+    CHUNK_HEAD_SIZE,
     HEAD,
     MAGIC,
     MESSAGE,
     UNREADABLE,
-    parse,
+    Bytes,
+    chunk_head,
     split,
-    summary_start,
     unpack_chunk,
 )
+from push_predictor.recordings.mcap_summary import (
+    DATA_END_SIZE,
+    Footer,
+    Summary,
+    read_footer,
+    read_metadata,
+    read_summary,
+)
 
-_SKIPPED = frozenset({Opcode.HEADER, Opcode.ATTACHMENT, Opcode.MESSAGE_INDEX})
-_ENDS = frozenset({Opcode.DATA_END, Opcode.FOOTER})
+MOST_NOTES = 50  # a file can have a million damaged places
 _FOREIGN = {
     b"#ROSBAG": "a ROS 1 bag: `push_predictor import rosbag1` makes a recording of it",
     b"SQLite format 3": "a sqlite3 bag: `ros2 bag convert` makes an MCAP bag of it",
 }
-
-
-_Wanted = dict[int, tuple[str, str]]  # channel id: topic and type
 
 
 class RawMessage(NamedTuple):
@@ -47,173 +54,184 @@ class McapFile:
 
     topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if
     unknown}; metadata: {record name: {key: value}}; notes: damage found so far, with file and byte offset
-    (opening reads the summary, messages() the rest). Raises RecordingError for a file that is empty or not MCAP.
+    (opening reads the summary, messages() the rest). unpack makes CDR of a message that was packed by itself and
+    raises one of UNREADABLE where it cannot; name is the file's in notes, if not its path.
+
+    Raises RecordingError for a file that is empty or not MCAP.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> None:
         self.path = path
-        self.topics: dict[str, str] = {}
-        self.schemas: dict[str, str] = {}
-        self.qos: dict[str, str] = {}
-        self.metadata: dict[str, dict[str, str]] = {}
+        self._described = described = Described(self._note)
+        self.topics, self.schemas = described.topics, described.schemas
+        self.qos, self.metadata = described.qos, described.metadata
         self.notes: list[str] = []
-        self._types: dict[int, str] = {}
-        self._channels: dict[int, Channel] = {}
+        self._name = name or str(path)
+        self._unpack = unpack
         self._listed: int | None = None  # messages, as the summary counts them
-        self._size = _checked_size(path)
-        if not self._read_summary():
+        self._chunks: list[int] = []  # where they start, if a checksum vouches for it
+        self._compared = False
+        self._size = _checked_size(path, self._name)
+        self._footer: Footer | None = None
+        if not self._read_end():
             for _ in self.messages(topics=()):
                 pass
-        if not (self.notes or self._closed()):
-            self._note(self._size, "the end of the file is missing, the messages before it are whole")
-
-    def _closed(self) -> bool:
-        with self.path.open("rb") as stream:
-            stream.seek(self._size - len(MAGIC))
-            return stream.read() == MAGIC
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note.
 
-        Raises RecordingError for a given topic that is not in CDR.
+        One chunk at a time is in memory, packed and unpacked.
         """
-        wanted: _Wanted = {}
+        wanted = self._described.wanted(topics, self._described.channels.values())
         seen = 0
-        for channel in self._channels.values():
-            self._want(channel, topics, wanted)
-        for opcode, offset, body, whole in self._records():
-            content = self._chunk_content(offset, body, whole) if opcode == Opcode.CHUNK else body
-            seen += yield from self._decoded(content, offset, topics, wanted)
+        chunks: list[int] = []
+        with self.path.open("rb") as stream:
+            for place in places(stream, self._size, self._chunks, self._footer is not None, self._note):
+                if place.opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                    self._compare(stream, place, chunks)
+                    break
+                if place.opcode == Opcode.CHUNK:
+                    chunks.append(place.offset)
+                seen += yield from self._decoded(self._content(stream, place), place, topics, wanted)
         if self._listed not in (None, seen):
             self._note(self._size, f"{seen} messages were found, the summary counts {self._listed}")
 
-    def _chunk_content(self, offset: int, body: bytes, whole: bool) -> bytes:
+    def _content(self, stream: BinaryIO, place: Place) -> Bytes:
+        """The records at a place."""
+        stream.seek(place.offset)
+        if place.opcode != Opcode.CHUNK:
+            return stream.read(HEAD.size + place.length)
         try:
-            return unpack_chunk(body[HEAD.size :], whole)
+            stream.seek(HEAD.size, 1)
+            head = chunk_head(stream.read(min(CHUNK_HEAD_SIZE, place.length)), place.length)
+            stream.seek(place.offset + HEAD.size + head.begin)
+            return unpack_chunk(head, stream.read(head.packed))
         except UNREADABLE as error:
-            self._note(offset, f"a chunk was skipped: {error or type(error).__name__}")
+            self._note(place.offset, f"a chunk was skipped: {error or type(error).__name__}")
             return b""
 
-    def _records(self) -> Iterator[tuple[int, int, bytes, bool]]:
-        """(opcode, offset, record, is it whole) of the data section; only a chunk may be given in part."""
-        with self.path.open("rb") as stream:
-            offset = stream.seek(len(MAGIC))
-            while head := stream.read(HEAD.size):
-                opcode, length = HEAD.unpack(head.ljust(HEAD.size, b"\0"))
-                if opcode in _ENDS:
-                    return
-                end = offset + HEAD.size + length
-                if opcode == 0 or end > self._size:
-                    self._note(offset, f"damaged or cut off, {self._size - offset} bytes from there are lost in part")
-                    if opcode == Opcode.CHUNK:
-                        yield opcode, offset, head + stream.read(), False
-                    return
-                if opcode in _SKIPPED:
-                    stream.seek(end)
-                else:
-                    yield opcode, offset, head + stream.read(length), True
-                offset = end
-        self._note(offset, "the file was not closed, what it holds is used")
-
     def _decoded(
-        self, content: bytes, offset: int, topics: Collection[str] | None, wanted: _Wanted
+        self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
     ) -> Generator[RawMessage, None, int]:
         """The wanted messages in a run of records, and how many messages there are in all.
 
         Channels, schemas and metadata on the way are kept.
         """
-        seen = 0
+        seen = unpackable = 0
+        view = memoryview(content)
         try:
-            for opcode, start, end in split(content):
+            for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
+                    if start + MESSAGE.size > end:
+                        raise ValueError(f"a message of {end - start} bytes")
                     seen += 1
-                    channel, _, log_time, _ = MESSAGE.unpack_from(content, start)
-                    if found := wanted.get(channel):
-                        yield RawMessage(*found, log_time, content[start + MESSAGE.size : end])
-                    elif channel not in self._channels:
-                        self._note(offset, f"channel {channel} is not described, its messages were dropped")
-                elif described := self._register(opcode, content, start, end):
-                    self._want(described, topics, wanted)
+                    number, _, log_time, _ = MESSAGE.unpack_from(content, start)
+                    if found := wanted.get(number):
+                        data = self._unpacked(view[start + MESSAGE.size : end])
+                        if data is None:
+                            unpackable += 1
+                        else:
+                            yield RawMessage(*found, log_time, data)
+                    else:
+                        self._check_unwanted(number, topics, place.offset)
+                elif channel := self._described.register(opcode, content, start, end, place.offset):
+                    wanted.update(self._described.wanted(topics, [channel]))
         except UNREADABLE as error:
-            self._note(offset, f"a record cannot be read ({error or type(error).__name__})")
+            self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
+        if unpackable:
+            self._note(place.offset, f"{unpackable} messages cannot be unpacked and were dropped")
         return seen
 
-    def _want(self, channel: Channel, topics: Collection[str] | None, wanted: _Wanted) -> None:
-        encoding = channel.message_encoding
-        if encoding == "cdr" and (topics is None or channel.topic in topics):
-            wanted[channel.id] = channel.topic, self._types.get(channel.schema_id, "")
-        elif topics and channel.topic in topics:
-            raise RecordingError(f"{self.path}: {channel.topic} is encoded as {encoding!r}, cdr is accepted")
-
-    def _register(self, opcode: int, content: bytes, start: int, end: int) -> Channel | None:
-        """Keep what a record describes; the channel if it is one."""
-        if opcode == Opcode.SCHEMA:
-            schema = parse(Schema, content, start, end)
-            self._types[schema.id] = schema.name
-            self.schemas[schema.name] = schema.data.decode(errors="replace")
-        elif opcode == Opcode.CHANNEL:
-            channel = parse(Channel, content, start, end)
-            self._channels[channel.id] = channel
-            self.topics.setdefault(channel.topic, self._types.get(channel.schema_id, ""))
-            self.qos.setdefault(channel.topic, channel.metadata.get("offered_qos_profiles", ""))
-            return channel
-        elif opcode == Opcode.METADATA:
-            record = parse(Metadata, content, start, end)
-            self.metadata[record.name] = record.metadata
-        return None
-
-    def _read_summary(self) -> bool:
-        """Topics and metadata by the index at the file's end. False if it is absent, damaged or incomplete."""
+    def _unpacked(self, data: memoryview) -> bytes | None:
+        if self._unpack is None:
+            return data.tobytes()
         try:
-            with self.path.open("rb") as stream:
-                stream.seek(max(self._size - FOOTER_SIZE, 0))
-                if not (start := summary_start(stream.read())) or start > self._size:
-                    return False
-                stream.seek(start)
-                return self._use_summary(stream.read())
+            return self._unpack(data.tobytes())
         except UNREADABLE:
-            return False
+            return None
 
-    def _use_summary(self, summary: bytes) -> bool:
-        statistics, places = None, []
-        for opcode, start, end in split(summary):
-            if opcode == Opcode.STATISTICS:
-                statistics = parse(Statistics, summary, start, end)
-            elif opcode == Opcode.METADATA_INDEX:
-                places.append(parse(MetadataIndex, summary, start, end))
-            else:
-                self._register(opcode, summary, start, end)
-        for place in places:
-            self._read_metadata(place.offset)
-        if statistics is None or statistics.channel_count != len(self._channels):
-            return False
-        self._listed = statistics.message_count
-        return bool(statistics.metadata_count == len(places))
+    def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
+        """Nobody asked for the message; or it cannot be given, which must not pass in silence."""
+        if (known := self._described.channels.get(channel)) is None:
+            self._note(offset, f"channel {channel} is not described, its messages were dropped")
+        elif topics and known.topic in topics:
+            self._note(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
 
-    def _read_metadata(self, offset: int) -> None:
+    def _read_end(self) -> bool:
+        """Topics and metadata by the summary. False if it is absent, damaged or incomplete."""
         with self.path.open("rb") as stream:
-            stream.seek(offset)
-            opcode, length = HEAD.unpack(stream.read(HEAD.size))
-            if opcode != Opcode.METADATA or offset + length > self._size:
-                raise ValueError("the metadata index points elsewhere")
-            body = stream.read(length)
-            self._register(opcode, body, 0, length)
+            self._footer = footer = read_footer(stream, self._size)
+            if footer is None:
+                self._note(self._size, "the end of the file is missing or damaged")
+                return False
+            try:
+                if not footer.start:
+                    footer.check(b"")
+                    return False
+                return self._use(stream, read_summary(stream, footer, footer.start))
+            except UNREADABLE as error:
+                self._note(footer.start or footer.offset, f"{error or type(error).__name__}, the file is read through")
+                return False
+
+    def _use(self, stream: BinaryIO, summary: Summary) -> bool:
+        """Keep what a summary tells. Is that all that a reader must know?"""
+        if (statistics := summary.statistics) is not None:
+            self._listed = statistics.message_count
+        if statistics is None or not summary.verified:  # the descriptions before the data are as good or better
+            return False
+        self._chunks = summary.chunks
+        for schema in summary.schemas:
+            self._described.add_schema(schema)
+        for channel in summary.channels:
+            self._described.add_channel(channel, self._size)
+        read = sum(self._use_metadata(stream, place) for place in summary.metadata)
+        complete = statistics.channel_count == len(self._described.channels)
+        return bool(complete and statistics.metadata_count == read)
+
+    def _use_metadata(self, stream: BinaryIO, place: MetadataIndex) -> bool:
+        try:
+            record = read_metadata(stream, place, self._size)
+        except UNREADABLE as error:
+            self._note(place.offset, f"{error or type(error).__name__}, a metadata record should be there")
+            return False
+        self.metadata[record.name] = record.metadata
+        return True
+
+    def _compare(self, stream: BinaryIO, place: Place, chunks: list[int]) -> None:
+        """At the data's end: is all there that the checksum and the summary tell of?"""
+        if self._compared or place.opcode != Opcode.DATA_END:
+            return
+        end = place.offset
+        self._compared = True
+        if data_checksum_is_wrong(stream, end):
+            self._note(end, "the checksum of all that stands before is wrong, it is damaged somewhere")
+        if self._footer is None or self._footer.start in (0, end + DATA_END_SIZE):
+            return
+        try:  # bytes were lost or came in: the summary still tells where the chunks were
+            listed = read_summary(stream, self._footer, end + DATA_END_SIZE).chunks
+        except UNREADABLE:
+            return
+        if moved := [place for place, found in zip_longest(listed, chunks) if place != found]:
+            there = f"{len(chunks)} chunks are there, the summary lists {len(listed)}"
+            self._note(moved[0] or self._size, f"a chunk was there that is missing or has moved; {there}")
 
     def _note(self, offset: int, what: str) -> None:
-        text = f"{self.path} at byte {offset}: {what}"
+        text = f"{self._name} at byte {offset}: {what}"
+        if len(self.notes) >= MOST_NOTES:
+            text = f"{self._name}: more is damaged than is told here"
         if text not in self.notes:
             self.notes.append(text)
 
 
-def _checked_size(path: Path) -> int:
+def _checked_size(path: Path, name: str) -> int:
     try:
         with path.open("rb") as stream:
             start = stream.read(16)
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
+        raise RecordingError(f"{name}: cannot be read ({error.strerror})") from None
     if not start:
-        raise RecordingError(f"{path}: the file is empty, give an MCAP recording")
+        raise RecordingError(f"{name}: the file is empty, give an MCAP recording")
     if not start.startswith(MAGIC):
-        what = next((name for magic, name in _FOREIGN.items() if start.startswith(magic)), "not an MCAP file")
-        raise RecordingError(f"{path}: {what} (starts with {start[:8]!r}), MCAP recordings are accepted")
+        what = next((text for magic, text in _FOREIGN.items() if start.startswith(magic)), "not an MCAP file")
+        raise RecordingError(f"{name}: {what} (starts with {start[:8]!r}), MCAP recordings are accepted")
     return path.stat().st_size

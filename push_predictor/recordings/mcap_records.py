@@ -1,4 +1,4 @@
-"""The bytes of MCAP (https://mcap.dev/spec): records, chunks, the summary at a file's end. No file is opened.
+"""The bytes of MCAP (https://mcap.dev/spec): records, chunks, how they are packed. No file is opened.
 
 Little-endian records of one byte opcode, eight bytes length, content; a chunk holds compressed records.
 """
@@ -9,22 +9,26 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import Protocol, TypeVar
+from typing import Final, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import lz4.frame  # type: ignore[import-untyped]  # ships no types
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 MESSAGE = struct.Struct("<HIQQ")
-LARGEST_CHUNK = 1 << 30  # bytes uncompressed: a file from outside must not fill the memory
+LARGEST_CHUNK: Final = 1 << 30  # bytes uncompressed: a file from outside must not fill the memory
 UNREADABLE = (struct.error, UnicodeDecodeError, EndOfFile, zstandard.ZstdError, RuntimeError, ValueError)
+_ALL = frozenset(Opcode)
 _CHUNK = struct.Struct("<QQQII")
-_FOOTER = struct.Struct("<QQI")
-FOOTER_SIZE = HEAD.size + _FOOTER.size + len(MAGIC)
+_LENGTH = struct.Struct("<Q")
+_PACKED_PIECE, _PIECE = 1 << 12, 1 << 15
+_LARGEST_NAME = 32
 
+Bytes: TypeAlias = bytes | bytearray
 Record = TypeVar("Record", covariant=True)
 
 
@@ -32,54 +36,120 @@ class _Readable(Protocol[Record]):
     def read(self, stream: ReadDataStream, /) -> Record: ...
 
 
-def parse(kind: _Readable[Record], data: bytes, start: int, end: int) -> Record:
+class _Strict(ReadDataStream):
+    """The package's stream, but a string that is longer than its record is an error, not a short string."""
+
+    def read(self, length: int) -> bytes:
+        data: bytes = super().read(length)
+        if len(data) < length:
+            raise EndOfFile
+        return data
+
+
+class ChunkHead(NamedTuple):
+    """What stands before a chunk's records; begin and packed: where in the record these start, and their bytes."""
+
+    size: int
+    crc: int
+    compression: str
+    begin: int
+    packed: int
+
+
+CHUNK_HEAD_SIZE = _CHUNK.size + _LARGEST_NAME + _LENGTH.size
+
+
+def parse(kind: _Readable[Record], data: Bytes, start: int, end: int) -> Record:
     """One record's content as the mcap package's class. Raises one of UNREADABLE."""
-    return kind.read(ReadDataStream(BytesIO(data[start:end])))
+    return kind.read(_Strict(BytesIO(data[start:end])))
 
 
-def split(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """(opcode, start, end) of each whole record in data; an incomplete last one is left out."""
+def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
+    """(opcode, start, end) of each record in data. Raises ValueError for what is none.
+
+    So is an incomplete last one, unless data is known not to be whole.
+    """
     position, size = 0, len(data)
     while position + HEAD.size <= size:
         opcode, length = HEAD.unpack_from(data, position)
-        position += HEAD.size
-        if position + length > size:
-            return
-        yield opcode, position, position + length
-        position += length
+        begin = position + HEAD.size
+        if opcode == 0 or begin + length > size:
+            break
+        yield opcode, begin, begin + length
+        position = begin + length
+    if whole and position != size:
+        raise ValueError(f"its records end at byte {position} of {size}")
 
 
-def unpack_chunk(body: bytes, whole: bool) -> bytes:
-    """The records in a chunk; of a chunk cut off by the file's end (not whole), as many bytes as can be had.
+def is_head(head: bytes) -> bool:
+    """Could these bytes begin a record? Random ones hardly ever do, a head that the file's end cuts does."""
+    if len(head) < HEAD.size:
+        return True
+    opcode, length = HEAD.unpack(head)
+    return (opcode in _ALL or opcode >= 0x80) and length < 4 * LARGEST_CHUNK
 
-    Raises one of UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
+
+def chunk_head(start: bytes, length: int) -> ChunkHead:
+    """Read a chunk's first CHUNK_HEAD_SIZE bytes; length is that of the record.
+
+    Raises one of UNREADABLE if its lengths contradict each other or are more than is accepted.
     """
-    _, _, size, crc, name_length = _CHUNK.unpack_from(body)
-    name_end = _CHUNK.size + name_length
-    name = body[_CHUNK.size : name_end].decode()
+    _, _, size, crc, name_length = _CHUNK.unpack_from(start)
+    if name_length > _LARGEST_NAME:
+        raise ValueError("a chunk without a known compression")
+    begin = _CHUNK.size + name_length + _LENGTH.size
+    (packed,) = _LENGTH.unpack_from(start, begin - _LENGTH.size)
+    if begin + packed != length:
+        raise ValueError(f"a chunk of {length} bytes says that {packed} of them are records")
     if size > LARGEST_CHUNK:
         raise ValueError(f"a chunk of {size} bytes, {LARGEST_CHUNK} are accepted")
-    data = _decompressed(name, body[name_end + 8 :], size)
-    if whole and len(data) != size:
-        raise ValueError(f"a chunk holds {len(data)} bytes instead of {size}")
-    if whole and crc and zlib.crc32(data) != crc:
+    if packed > size + size // 64 + 4096:
+        raise ValueError(f"a chunk of {size} bytes takes {packed}")
+    return ChunkHead(size, crc, start[_CHUNK.size : begin - _LENGTH.size].decode(), begin, packed)
+
+
+def unpack_chunk(head: ChunkHead, data: bytes) -> Bytes:
+    """The records in a chunk; of one whose data is cut off, as many bytes as can be had.
+
+    No more memory is taken than the data unpacks to, and the size that the head tells at most. Raises one of
+    UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
+    """
+    whole = len(data) == head.packed
+    found = _unpacked(head.compression, data, head.size, whole)
+    if whole and len(found) != head.size:
+        raise ValueError(f"a chunk does not hold the {head.size} bytes it tells of")
+    if whole and head.crc and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
-    return data
+    return found
 
 
-def summary_start(tail: bytes) -> int:
-    """Where the summary section starts, from the file's last FOOTER_SIZE bytes; 0 where there is none."""
-    if len(tail) != FOOTER_SIZE or not tail.endswith(MAGIC) or HEAD.unpack_from(tail) != (2, _FOOTER.size):
-        return 0
-    start, _, _ = _FOOTER.unpack_from(tail, HEAD.size)
-    return int(start)
-
-
-def _decompressed(name: str, data: bytes, size: int) -> bytes:
+def _unpacked(name: str, data: bytes, size: int, whole: bool) -> Bytes:
+    """At most size bytes, and one piece more where data holds more."""
     if name == "":
         return data
-    if name == "zstd":
-        return bytes(zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True).read(size))
-    if name == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size))
-    raise ValueError(f"chunk compression {name!r}, zstd, lz4 and none are accepted")
+    if name not in ("zstd", "lz4"):
+        raise ValueError(f"chunk compression {name!r}, zstd, lz4 and none are accepted")
+    if name == "zstd" and whole and zstandard.frame_content_size(data) == size:
+        return bytes(zstandard.ZstdDecompressor().decompress(data))
+    found = bytearray()
+    for piece in _zstd_pieces(data) if name == "zstd" else _lz4_pieces(data):
+        found += piece
+        if len(found) > size:
+            break
+    return found
+
+
+def _zstd_pieces(data: bytes) -> Iterator[bytes]:
+    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    while piece := reader.read(_PIECE):
+        yield piece
+
+
+def _lz4_pieces(data: bytes) -> Iterator[bytes]:
+    reader = lz4.frame.LZ4FrameDecompressor()
+    for start in range(0, len(data), _PACKED_PIECE):
+        yield reader.decompress(data[start : start + _PACKED_PIECE], max_length=_PIECE)
+        while not (reader.needs_input or reader.eof):
+            yield reader.decompress(b"", max_length=_PIECE)
+        if reader.eof:
+            return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,6 +71,7 @@ class _Samples:
     layout: Layout
     log_times: list[int] = field(default_factory=list)
     messages: list[bytes] = field(default_factory=list)
+    foreign: Counter[str] = field(default_factory=Counter)  # of other types, by type
 
 
 def _named(bag: Bag, name: str) -> str:
@@ -96,13 +98,22 @@ def _collected(bag: Bag, layouts: dict[str, tuple[str, Layout]]) -> dict[str, _S
     for topic, kind, log_time, data in bag.messages(found):
         samples = found[topic]
         if kind != samples.type:
-            raise RecordingError(f"{bag.path}: topic {topic} is of type {kind!r}, {samples.type} is accepted")
+            samples.foreign[kind] += 1
+            continue
         samples.log_times.append(log_time)
         samples.messages.append(data)
-    for topic, samples in found.items():
-        if samples.type == POSE.name and not samples.messages:
-            raise RecordingError(f"{bag.path}: topic {topic} holds no message that can be read")
+    for samples in found.values():
+        _check_found(bag, samples)
     return found
+
+
+def _check_found(bag: Bag, samples: _Samples) -> None:
+    topic, kind = samples.topic, next(iter(samples.foreign), "")
+    if samples.foreign and not samples.messages:
+        raise RecordingError(f"{bag.path}: topic {topic} is of type {kind!r}, {samples.type} is accepted")
+    if samples.type == POSE.name and not samples.messages:
+        known = "".join(f"; {note}" for note in bag.notes[:3])
+        raise RecordingError(f"{bag.path}: topic {topic} holds no message that can be read{known}")
 
 
 def _slider(samples: _Samples, notes: list[str]) -> PoseStream:
@@ -149,6 +160,8 @@ def _with_samples(scalars: dict[str, ScalarStream]) -> dict[str, ScalarStream]:
 
 def _kept(samples: _Samples, columns: Columns, usable: BoolArray, notes: list[str]) -> BoolArray:
     """Which samples stay; notes tell what was dropped and whose frame is another one."""
+    for kind, count in samples.foreign.items():
+        notes.append(f"{samples.topic}: {count} messages are of type {kind!r}, they were dropped")
     if unreadable := int(np.sum(~columns.valid)):
         notes.append(f"{samples.topic}: {unreadable} messages are not readable CDR and were dropped")
     if useless := int(np.sum(columns.valid & ~usable)):
