@@ -13,13 +13,13 @@ from ros_harness import REPOSITORY
 
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.evaluation.live_validation import MAIN_RESULT
-from push_predictor.nodes import predict_server, push_validator, replay_options
+from push_predictor.nodes import push_validator, replay_options, server_parameters
 from push_predictor.nodes.parameters import Param
 from push_predictor.nodes.scalar_inlet import CLOCK
 from push_predictor.nodes.sensor_inlet import TOPICS
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
-    "predict_server": ("push_predictor", tuple(predict_server.PARAMETERS)),
+    "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
     "push_replay": ("push_replay", tuple(replay_options.PARAMETERS)),
     "push_validator": ("push_validator", tuple(push_validator.PARAMETERS)),
 }

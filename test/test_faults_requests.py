@@ -34,7 +34,7 @@ from push_predictor.models.model_file import save_model
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import FARTHEST, check_request, check_requests
 from push_predictor.models.train import train_model
-from push_predictor.nodes import predict_server, push_validator, replay_options
+from push_predictor.nodes import push_validator, replay_options, server_parameters
 from push_predictor.nodes.answers import answer_batch, answer_push
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.parameters import Param, declare
@@ -43,7 +43,7 @@ from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, Predict
 
 NAN, INF = math.nan, math.inf
 TABLES = {
-    "predict_server": predict_server.PARAMETERS,
+    "predict_server": server_parameters.PARAMETERS,
     "push_validator": push_validator.PARAMETERS,
     "push_replay": replay_options.PARAMETERS,
 }

@@ -418,8 +418,8 @@ def test_one_clock_that_is_set_back_alone_does_not_stop_the_others() -> None:
     for begin in range(0, len(pusher), 100):
         part = slice(begin, begin + 100)
         finder.add_wrench(taken(recording.wrench, part))  # type: ignore[arg-type] # a slice does as well
-        finder.add_pusher(rows(alone, part))  # type: ignore[arg-type]
-        finder.add_slider(rows(recording.slider, part))  # type: ignore[arg-type]
+        finder.add_pusher(rows(alone, part))  # type: ignore[arg-type] # a slice does as well
+        finder.add_slider(rows(recording.slider, part))  # type: ignore[arg-type] # a slice does as well
         windows += finder.take_ready()
         assert sum(len(stamp) for _, stamp, _ in finder._later) < 10_000
     windows += finder.finish()

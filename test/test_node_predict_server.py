@@ -38,8 +38,8 @@ from push_predictor.models.train import train_model
 from push_predictor.nodes import answers, predict_server
 from push_predictor.nodes.answers import MOST_PUSHES, answer_batch
 from push_predictor.nodes.model_shelf import ModelShelf
-from push_predictor.nodes.predict_server import PARAMETERS
 from push_predictor.nodes.runtime import Stop
+from push_predictor.nodes.server_parameters import PARAMETERS
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch

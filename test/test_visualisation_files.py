@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -50,9 +51,12 @@ def published() -> dict[str, list[Any]]:
         node_process("push_validator", domain=domain),
     ):
         wanted = {"/slider/pose", "/push_residual", "/push_markers", "/push_alarm", "/diagnostics", "/pusher/wrench"}
-        names = lambda: {name for name, _ in node.get_topic_names_and_types()}  # noqa: E731
-        assert wait_until(lambda: wanted <= names(), 20.0)
-        return {name: node.get_publishers_info_by_topic(name) for name in names()}
+        assert wait_until(lambda: wanted <= topics_of(node), 20.0)
+        return {name: node.get_publishers_info_by_topic(name) for name in topics_of(node)}
+
+
+def topics_of(node: Node) -> set[str]:
+    return {name for name, _ in node.get_topic_names_and_types()}
 
 
 def displays() -> list[dict[str, Any]]:

@@ -17,7 +17,6 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, qos_profile_system_default
 from rclpy.service import Service
-from rclpy.service_introspection import ServiceIntrospectionState
 
 from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
@@ -27,13 +26,14 @@ from push_predictor.nodes.answers import answer_batch, answer_list, answer_load,
 from push_predictor.nodes.direct_service import DirectService
 from push_predictor.nodes.heartbeat import Heartbeat
 from push_predictor.nodes.model_shelf import SHIPPED, ModelShelf
-from push_predictor.nodes.parameters import Param, declare, values_of
+from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.pose_answers import answer_slider_pose
 from push_predictor.nodes.request_frames import RequestFrames
 from push_predictor.nodes.request_log import RequestLog
 from push_predictor.nodes.residual_tracer import ResidualTracer
 from push_predictor.nodes.rollout_answers import answer_rollout
 from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.server_parameters import INTROSPECTION, PARAMETERS
 from push_predictor.nodes.server_status import NO_MODEL, server_status
 from push_predictor_interfaces.srv import (
     ListModels,
@@ -45,42 +45,6 @@ from push_predictor_interfaces.srv import (
 )
 
 SERVICE_QOS = QoSProfile(depth=1000)  # ten, the default, loses requests of a client with more in flight
-INTROSPECTION = {
-    "disabled": ServiceIntrospectionState.OFF,
-    "metadata": ServiceIntrospectionState.METADATA,
-    "contents": ServiceIntrospectionState.CONTENTS,
-}
-PARAMETERS = (
-    Param(
-        "models",
-        [SHIPPED],
-        "Model files, and folders of them, loaded when the node is configured; 'default': the shipped one.",
-    ),
-    Param(
-        "default_model",
-        "",
-        "Name of the model that a request without a name gets; empty: the first loaded.",
-        read_only=False,
-    ),
-    Param("world_frame", "world", "Frame in which sliders lie flat: z points up, poses are read in it."),
-    Param("autostart", True, "Configure and activate without a lifecycle manager."),
-    Param(
-        "introspection",
-        "disabled",
-        "Service events on NAME/_service_event: none, metadata, or requests and responses too.",
-        choices=tuple(INTROSPECTION),
-        read_only=False,
-    ),
-    Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
-    Param(
-        "trace_alpha",
-        0.01,
-        "Probability, at most, that trace_residual finds an effect where there is none.",
-        low=1e-6,
-        high=0.5,
-        read_only=False,
-    ),
-)
 Answer: TypeAlias = Callable[[ModelShelf, Any, Any], None]  # fills the response, or raises
 
 
