@@ -22,7 +22,7 @@ def test_it_was_trained_on_the_simulators_recording_and_nothing_else():
     assert model.provenance.sources == ("square_abs_train",)
     windows = load_data([ROOT / "bags" / "square_abs_train"])
     rows = windows.take(training_rows(windows, None, model.provenance.seed))
-    np.testing.assert_array_equal(model.training.outcomes, rows.outcomes)
+    np.testing.assert_allclose(model.training.outcomes, rows.outcomes, rtol=1e-9)
     assert model.provenance.pushes == len(rows.pushes)
 
 

@@ -236,7 +236,8 @@ def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
     poses = displaced(np.array([window.slider_start for window in windows]), headings, shown.mean)
     spreads = covariance_in_world(shown.covariance, headings)
     pusher, origin = Track(2), int(recording.pusher.stamp[0])
-    pusher.extend(recording.pusher.stamp, np.column_stack([recording.pusher.x, recording.pusher.y]), origin)
+    tips = np.column_stack([recording.pusher.x, recording.pusher.y])
+    pusher.extend(pusher.order.take(recording.pusher.stamp, tips, True), origin)
     for window, pose, spread, in_domain in zip(windows, poses, spreads, shown.in_domain, strict=True):
         line = pusher_line(pusher, (window.start - origin) * NANOSECOND)
         push = WorldPush(window.slider_start, line.position, line.velocity, window.duration, window.covariates)

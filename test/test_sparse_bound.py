@@ -45,12 +45,21 @@ def test_fewer_inducing_inputs_never_give_a_higher_bound() -> None:
     assert dense > values[1] > values[2] > values[3]
 
 
+def settled(bound: SparseBound) -> SparseBound:
+    """The bound is flat at its maximum, to rounding: only further steps bring the sites there, and with them the
+    gradient, which feels them in the first order.
+    """
+    for _ in range(6):
+        bound = SparseBound.at(bound.problem, bound.optimal_sites)
+    return bound
+
+
 @pytest.mark.parametrize(("n", "signal", "noise"), [(60, 20, 30), (4500, 12, 9)])
 def test_gradient_of_every_hyperparameter_equals_finite_differences(n: int, signal: int, noise: int) -> None:
     """Also across several blocks of rows."""
 
     def maximum(vector: Array) -> SparseBound:
-        return maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), [], 0.0)
+        return settled(maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), [], 0.0))
 
     at, h = PARAMETERS.to_vector(), 1e-3
     gradient = maximum(at).hyperparameter_gradient()
