@@ -69,6 +69,7 @@ class DirectEmptyServer(Node):
     def __init__(self, stop: Stop) -> None:
         super().__init__("direct_empty_server")
         self._service = DirectService(self, Trigger, "direct", lambda request, response: response, DEPTH)
+        self._service.begin()
 
     def close(self) -> None:
         """End the thread."""
