@@ -29,8 +29,8 @@ from typing import Any
 from server_under_test import Caller, caller, graph, load, process
 from vitals import Vitals, growth, vitals
 
-from push_predictor.models.default_model import default_model_path
 from push_predictor.recordings.bag import open_bag
+from push_predictor.share import DEFAULT_MODEL, share_path
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / "bags" / "square_abs_test"
@@ -41,7 +41,7 @@ def main() -> int:
     options = _options()
     stamps = [message.log_time for message in open_bag(options.recording).messages()]
     hours, count = (max(stamps) - min(stamps)) / 3.6e12, len(stamps)
-    model, before = default_model_path(), load()
+    model, before = share_path(*DEFAULT_MODEL), load()
     with ExitStack() as stack:
         output = stack.enter_context(tempfile.TemporaryDirectory(prefix="push_endurance_"))
         stack.enter_context(graph(options.domain))
@@ -68,7 +68,11 @@ def main() -> int:
 def _watched(
     heard: Caller, nodes: Mapping[str, int], options: argparse.Namespace, hours_a_message: float
 ) -> dict[str, list[Vitals]]:
-    """Each process's vitals over time; hours_a_message: how much of the recording a message stands for."""
+    """Each process's vitals over time, from the first window on: until then a node may still be starting.
+
+    hours_a_message: how much of the recording a message stands for.
+    """
+    heard.spin_until(lambda: _windows(heard.diagnostics) > 0)
     begun, covered, looks = monotonic(), 0.0, 0
     seen: dict[str, list[Vitals]] = {}
     while monotonic() - begun < options.minutes * 60.0 and covered < options.hours:
@@ -99,9 +103,13 @@ def _ended(child: int) -> float:
 
 def _figures(told: Mapping[str, Mapping[str, str]]) -> str:
     replay, validator = _of(told, "push_replay"), _of(told, "push_validator")
-    windows = next((value for key, value in validator.items() if key.endswith(" windows") and key[0] != "k"), "0")
     lost = {key: value for key, value in validator.items() if key.endswith(" lost")}
-    return f"behind by {replay.get('behind_s', '?')} s, {windows} windows, validator lost {json.dumps(lost)}"
+    return f"behind by {replay.get('behind_s', '?')} s, {_windows(told)} windows, validator lost {json.dumps(lost)}"
+
+
+def _windows(told: Mapping[str, Mapping[str, str]]) -> int:
+    validator = _of(told, "push_validator")
+    return next((int(value) for key, value in validator.items() if key.endswith(" windows") and key[0] != "k"), 0)
 
 
 def _of(told: Mapping[str, Mapping[str, str]], node: str) -> Mapping[str, str]:

@@ -27,7 +27,7 @@ from load_client import MANY, SINGLE, TIMEOUT
 from server_under_test import caller, graph, load, predict_server
 from vitals import Growth, Vitals, growth, vitals
 
-from push_predictor.models.default_model import default_model_path
+from push_predictor.share import DEFAULT_MODEL, share_path
 
 A_PROCESS = 10  # clients; with a process each, localhost discovery would not find them all
 WARM_UP = 60.0  # s
@@ -41,7 +41,7 @@ def main() -> int:
     seconds, before = options.minutes * 60.0, load()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="push_load_")))
-        server = stack.enter_context(predict_server(default_model_path()))
+        server = stack.enter_context(predict_server(share_path(*DEFAULT_MODEL)))
         counts = [min(A_PROCESS, options.clients - first) for first in range(0, options.clients, A_PROCESS)]
         groups: list[tuple[str, ...]] = [("--deaf",), ("--stopped",)]
         groups += [("--clients", f"{count}", "--seed", f"{k + 1}") for k, count in enumerate(counts)]

@@ -14,7 +14,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.stamps import ns_to_stamp
-from push_predictor.geometry.frames import to_world
+from push_predictor.geometry.frames import to_world, wrap_angle
 from push_predictor.types import Array
 
 CHI2_95_OF_TWO = 5.991464547107979  # -2 log(0.05): the 95 % quantile of chi-squared with two degrees of freedom
@@ -143,7 +143,7 @@ def magnified_markers(
     ellipse = confidence_ellipse(centre, MAGNIFICATION**2 * covariance_world[:2, :2])
     observed = centre + MAGNIFICATION * (observed_pose[:2] - centre)
     spread = min(MAGNIFICATION * NORMAL_95 * float(np.sqrt(max(covariance_world[2, 2], 0.0))), np.pi)
-    turned = ahead + np.clip(MAGNIFICATION * _turn(observed_pose[2] - predicted_pose[2]), -np.pi, np.pi)
+    turned = ahead + np.clip(MAGNIFICATION * wrap_angle(observed_pose[2] - predicted_pose[2]), -np.pi, np.pi)
     low, high, begin, end = reach * np.array(DIAL)
     stroke = _polar(centre, np.array([begin, end]), np.array([turned, turned]))
     return MarkerArray(
@@ -187,8 +187,3 @@ def _band(centre: Array, low: float, high: float, middle: float, spread: float) 
 
 def _polar(centre: Array, radius: Array, angle: Array) -> Array:
     return np.asarray(centre + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-
-
-def _turn(angle: float) -> float:
-    """The same turn in [-pi, pi)."""
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

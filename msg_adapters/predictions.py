@@ -54,7 +54,7 @@ def query_to_batch_request(query: PushQuery) -> PredictPushBatch.Request:
 def query_from_request(request: Any) -> PushQuery:
     """The query of a PredictPush request, n = 1. Raises RequestError if names and values of covariates do not match."""
     inputs = np.array([[request.velocity, request.contact, request.angle]])
-    return PushQuery(request.model, inputs, request.duration, _covariates(request, 1))
+    return PushQuery(request.model, inputs, request.duration, covariates_of(request, 1))
 
 
 def query_from_batch_request(request: Any) -> PushQuery:
@@ -64,7 +64,7 @@ def query_from_batch_request(request: Any) -> PushQuery:
         if (length := len(getattr(request, name))) != count:
             raise RequestError(f"{name} length", length, f"{count} values, as many as velocity has")
     inputs = np.array([request.velocity, request.contact, request.angle], dtype=np.float64).T
-    return PushQuery(request.model, inputs, request.duration, _covariates(request, count))
+    return PushQuery(request.model, inputs, request.duration, covariates_of(request, count))
 
 
 def fill_response(response: PredictPush.Response, prediction: Prediction) -> None:
@@ -105,7 +105,8 @@ def prediction_from_response(response: Any) -> Prediction:
     )
 
 
-def _covariates(request: Any, count: int) -> dict[str, Array]:
+def covariates_of(request: Any, count: int) -> dict[str, Array]:
+    """The covariates (count,) of each push by name. Raises RequestError if values and names do not match."""
     names: Sequence[str] = request.covariate_names
     if not names and not len(request.covariate_values):
         return {}

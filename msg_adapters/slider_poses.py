@@ -9,6 +9,7 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from msg_adapters.poses import NORM_TOLERANCE
+from msg_adapters.predictions import covariates_of
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import yaw_of_quaternion
@@ -49,7 +50,7 @@ def query_from_slider_request(request: Any) -> SliderPoseQuery:
         _vector("pusher", request.pusher),
         _vector("pusher_velocity", request.pusher_velocity),
         request.duration,
-        _covariates(request.covariate_names, request.covariate_values),
+        {name: float(value[0]) for name, value in covariates_of(request, 1).items()},
     )
 
 
@@ -125,11 +126,3 @@ def _vector(field: str, message: Any) -> Array:
         if not np.isfinite(value := getattr(message, axis)):
             raise RequestError(f"{field}.{axis}", value, "a finite number")
     return np.array([getattr(message, axis) for axis in axes], dtype=np.float64)
-
-
-def _covariates(names: Any, values: Any) -> dict[str, float]:
-    if len(names) != len(values):
-        raise RequestError("covariate_values length", len(values), f"{len(names)}, one for each name")
-    if repeated := {name for name in names if names.count(name) > 1}:
-        raise RequestError("covariate_names", sorted(repeated), "each name once")
-    return dict(zip(names, map(float, values), strict=True))

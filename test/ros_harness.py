@@ -14,17 +14,20 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from queue import Empty, Queue
 from typing import IO, Any
 
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 START_TIMEOUT = 20.0
+PATIENCE = 5.0  # s until a call is made again
 _HELD: deque[tuple[int, IO[str]]] = deque()
 _NAMES = itertools.count()
 
@@ -151,12 +154,22 @@ def wait_until(condition: Callable[[], bool], timeout: float = START_TIMEOUT) ->
 def call(client: Client, request: Any, timeout: float = START_TIMEOUT) -> Any:
     """Wait for the service, call it and return the response.
 
+    Asks again now and then: the middleware drops the answer to a client that it has not yet matched after 0.1 s, which
+    happens on a busy machine to a client that has just been made. So the service must bear being asked twice.
     Raises AssertionError if either takes longer than `timeout` (s). Another thread must spin the node.
     """
     assert client.wait_for_service(timeout), f"no service {client.srv_name} after {timeout} s"
-    response = client.call(request, timeout_sec=timeout)
-    assert response is not None, f"{client.srv_name} did not answer within {timeout} s"
-    return response
+    deadline, answers, asked = time.monotonic() + timeout, Queue[Future](), list[Future]()
+    try:
+        while (left := deadline - time.monotonic()) > 0.0:
+            asked.append(client.call_async(request))
+            asked[-1].add_done_callback(answers.put)
+            with suppress(Empty):
+                return answers.get(timeout=min(left, PATIENCE)).result()
+    finally:
+        for future in asked:
+            client.remove_pending_request(future)
+    raise AssertionError(f"{client.srv_name} did not answer within {timeout} s")
 
 
 def wait_for_publisher(node: Node, topic: str, timeout: float = START_TIMEOUT) -> None:

@@ -49,11 +49,11 @@ SERVICES = {
     "predict_push_batch": PredictPushBatch,
     "list_models": ListModels,
     "load_model": LoadModel,
-    "push_predictor/get_state": GetState,
     "push_predictor/change_state": ChangeState,
     "push_predictor/set_parameters": SetParameters,
     "push_predictor/get_parameters": GetParameters,
     "push_predictor/describe_parameters": DescribeParameters,
+    "push_predictor/get_state": GetState,  # last: the node has found all the others when this one is answered
 }
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
 GOOD = np.array([0.02, 0.1, 0.2])

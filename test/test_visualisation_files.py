@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -50,13 +49,11 @@ def published() -> dict[str, list[Any]]:
         node_process("push_replay", domain=domain, params={"recording": RECORDING, "play.start_paused": True}),
         node_process("push_validator", domain=domain),
     ):
-        wanted = {"/slider/pose", "/push_residual", "/push_markers", "/push_alarm", "/diagnostics", "/pusher/wrench"}
-        assert wait_until(lambda: wanted <= topics_of(node), 20.0)
-        return {name: node.get_publishers_info_by_topic(name) for name in topics_of(node)}
-
-
-def topics_of(node: Node) -> set[str]:
-    return {name for name, _ in node.get_topic_names_and_types()}
+        of_replay = {"/slider/pose", "/pusher/pose", "/pusher/wrench", "/replay_status"}
+        of_validator = {"/push_residual", "/push_markers", "/push_alarm"}
+        wanted = of_replay | of_validator | {"/diagnostics"}
+        assert wait_until(lambda: all(node.count_publishers(name) for name in wanted), 20.0)
+        return {name: node.get_publishers_info_by_topic(name) for name, _ in node.get_topic_names_and_types()}
 
 
 def displays() -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from ros_harness import REPOSITORY, NodeProcess, node_process, wait_until
+from ros_harness import REPOSITORY, NodeProcess, call, node_process, wait_until
 from std_srvs.srv import Trigger
 
 from push_predictor.evaluation.offline import validate_recording
@@ -101,8 +101,7 @@ def assert_same_figures(found: Any, expected: Any) -> None:
 
 def finish(node: Node, name: str = "push_validator/finish", timeout: float = 30.0) -> Trigger.Response:
     client = node.create_client(Trigger, name)
-    assert client.wait_for_service(timeout)
-    response = client.call(Trigger.Request(), timeout_sec=timeout)
-    node.destroy_client(client)
-    assert response is not None, f"{name} did not answer within {timeout} s"
-    return response
+    try:
+        return call(client, Trigger.Request(), timeout)
+    finally:
+        node.destroy_client(client)

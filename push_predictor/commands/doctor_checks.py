@@ -41,10 +41,10 @@ def model_predicts(given: Path | None) -> Finding:
     try:
         import numpy as np
 
-        from push_predictor.models.default_model import default_model_path
         from push_predictor.models.model_file import load_model
+        from push_predictor.share import DEFAULT_MODEL, share_path
 
-        path = given or default_model_path()
+        path = given or share_path(*DEFAULT_MODEL)
         model = load_model(path)
         row = model.training.take(np.array([0]))
         prediction = model.predict(row.inputs, row.duration, row.covariates)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
-from push_predictor.models.default_model import default_model_path
 from push_predictor.models.model_file import is_model_file, load_model
 from push_predictor.models.served import ServedModel, serve
+from push_predictor.share import DEFAULT_MODEL, share_path
 
 SHIPPED = "default"  # stands for the model that ships with the package
 
@@ -84,7 +84,7 @@ class ModelShelf:
         problems = []
         for index, place in enumerate(places):
             try:
-                files = model_files(default_model_path() if place == SHIPPED else _located(Path(place)))
+                files = model_files(share_path(*DEFAULT_MODEL) if place == SHIPPED else _located(Path(place)))
             except PushPredictorError as error:
                 problems.append(f"models[{index}]: {error}")
                 continue

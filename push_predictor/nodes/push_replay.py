@@ -28,9 +28,10 @@ from push_predictor.nodes.replay_player import Outlet, ReplayPlayer
 from push_predictor.nodes.replay_report import ReplayReport
 from push_predictor.nodes.replay_source import BagSource
 from push_predictor.nodes.replay_topics import ReplayTopics, Restamper
-from push_predictor.nodes.runtime import Stop, run, share_path
+from push_predictor.nodes.runtime import Stop, run
 from push_predictor.recordings.bag import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
+from push_predictor.share import share_path
 
 _PUSH_TOPICS = ("slider/pose", "pusher/pose", "pusher/wrench")
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Protocol
 
 import rclpy
@@ -85,20 +83,6 @@ def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | 
         return _spin(name, node, stop, threads)
     finally:
         rclpy.try_shutdown()
-
-
-def share_path(*parts: str) -> Path:
-    """A file that the package installs under share/push_predictor; in a checkout, the file of the checkout.
-
-    Raises PushPredictorError if it is in neither place.
-    """
-    checkout = Path(__file__).resolve().parents[2]
-    prefixes = filter(None, [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix])
-    places = [checkout, *(Path(prefix) / "share" / "push_predictor" for prefix in prefixes)]
-    for place in places:
-        if (found := place.joinpath(*parts)).exists():
-            return found
-    raise PushPredictorError(f"{'/'.join(parts)}: not found in {', '.join(map(str, places))}, install the package")
 
 
 def one_line(error: BaseException) -> str:

@@ -1,0 +1,27 @@
+"""Files that ship with the package: models and configuration, installed under share/push_predictor."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from push_predictor.errors import PushPredictorError
+
+DEFAULT_MODEL = ("resource", "simulated_square_abs.pushmodel")  # of a simulated rig: for who gives no other
+
+
+def share_path(*parts: str) -> Path:
+    """A shipped file: of the checkout, else as colcon or pip installed it.
+
+    Raises PushPredictorError, which names the places, if it is in none of them.
+    """
+    prefixes = filter(None, [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix])
+    places = [
+        Path(__file__).resolve().parents[1],
+        *(Path(prefix) / "share" / "push_predictor" for prefix in prefixes),
+    ]
+    for place in places:
+        if (found := place.joinpath(*parts)).is_file():
+            return found
+    raise PushPredictorError(f"{'/'.join(parts)}: not found in {', '.join(map(str, places))}, install the package")
