@@ -36,7 +36,8 @@ def vitals(process: int) -> Vitals:
 @dataclass(frozen=True)
 class Growth:
     """From the first fifth after the warm-up to the last: memory (MB) by their means, and its highest; threads and
-    descriptors by the fewest in each, for a file may be open for a moment.
+    descriptors by the fewest or the most, whichever grew less: a file may be open or closed for a moment; a leak shows
+    in both.
     """
 
     memory: float
@@ -60,6 +61,10 @@ def growth(seen: Sequence[Vitals], warm_up: float) -> Growth:
     return Growth(
         after - before,
         max(v.memory for v in warm) - before,
-        min(v.threads for v in last) - min(v.threads for v in first),
-        min(v.descriptors for v in last) - min(v.descriptors for v in first),
+        _more([v.threads for v in first], [v.threads for v in last]),
+        _more([v.descriptors for v in first], [v.descriptors for v in last]),
     )
+
+
+def _more(first: Sequence[int], last: Sequence[int]) -> int:
+    return min(min(last) - min(first), max(last) - max(first))

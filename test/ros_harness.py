@@ -26,8 +26,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-START_TIMEOUT = 20.0
-PATIENCE = 5.0  # s until a call is made again
+START_TIMEOUT = 30.0
+PATIENCE = 10.0  # s until a call is made again; ~/finish answers within 5 s
 _HELD: deque[tuple[int, IO[str]]] = deque()
 _NAMES = itertools.count()
 

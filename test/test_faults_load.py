@@ -50,7 +50,7 @@ def test_many_clients_beside_a_deaf_and_a_stopped_one_are_all_answered():
         assert asked == answered > 0 and "p99" in line and "lost without an error 0" in line
     served = int(re.findall(r"it answered (\d+)", told)[0])
     answered = sum(map(int, re.findall(r"answered (\d+): p50", told)))
-    assert served >= answered + 100  # the stopped one had asked a hundred times
+    assert served > answered  # also what the deaf and the stopped one asked, as far as it had left them
     assert "threads +0, descriptors +0" in told
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -121,13 +120,6 @@ def test_a_grain_looks_the_same_from_behind_a_slope_does_not(name: str, sign: in
     push = pushes(40)
     here, there = (BY_NAME[name].response(physics_of("hex"), p) for p in (push, altered(push, turn=np.pi)))
     assert there == pytest.approx(sign * here, abs=1e-9)
-
-
-def test_all_mechanisms_together_take_less_than_ten_seconds_for_2400_windows() -> None:
-    push, start = pushes(2400), time.perf_counter()
-    for mechanism in LIBRARY:
-        mechanism.response(physics_of("rect1"), push)
-    assert time.perf_counter() - start < 10.0
 
 
 # --- whole pushes ---------------------------------------------------------------------------------------------------

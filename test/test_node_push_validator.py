@@ -151,7 +151,7 @@ def test_the_running_figures_end_at_those_of_the_result(watched):
             for output, share in shares.items():
                 assert float(values[f"{name} coverage {level} {output}"]) == pytest.approx(share, abs=1e-5)
     running = [int(values["gp windows"]) for _, _, values in heard.status.all if "gp windows" in values]
-    assert running == sorted(running) and 0 < running[len(running) // 2] <= running[-1]
+    assert running == sorted(running) and any(0 < count < running[-1] for count in running)
 
 
 def test_the_ellipse_of_a_window_lies_around_its_predicted_centre(watched, models: dict[str, Path]):

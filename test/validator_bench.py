@@ -25,7 +25,7 @@ WRITTEN = "validation written"
 
 @contextmanager
 def replaying(
-    domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 20.0, **more: Any
+    domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
 ) -> Iterator[NodeProcess]:
     """push_replay, once somebody listens."""
     params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 20.0, **more}
