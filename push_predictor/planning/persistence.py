@@ -20,13 +20,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from push_predictor.models.bodies import ExtendedBody, LearnedBody
 from push_predictor.models.left_out import moments_left_out
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
+from push_predictor.ranks import normal_scores
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
@@ -67,7 +66,7 @@ def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
     if pushes == 0:
         return INDEPENDENT
     apart = _way_between(table, first, second)
-    scores = _normal_scores(residuals)
+    scores = normal_scores(residuals)
     products = scores[first] * scores[second] / np.maximum(np.mean(scores**2, axis=0), np.finfo(float).tiny)
     shares = [_fit(apart, column) for column in products.T]
     lasting, passing, length = np.array(shares).T
@@ -101,10 +100,6 @@ def _moments_unseen(model: PushModel, push: Push) -> tuple[Array, Array, Array]:
         return body.moments(push)
     moments = moments_left_out(base, np.unique(model.training.push_id, return_inverse=True)[1])
     return body.extended(moments, push) if isinstance(body, ExtendedBody) else moments
-
-
-def _normal_scores(residuals: Array) -> Array:
-    return np.asarray(ndtri((rankdata(residuals, axis=0) - 0.5) / len(residuals)))
 
 
 def _way_between(table: PushTable, first: IntArray, second: IntArray) -> Array:

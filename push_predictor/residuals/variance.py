@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from push_predictor.models.forms import Form
 from push_predictor.models.push_model import PushModel
+from push_predictor.ranks import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.baseline import Baseline
 from push_predictor.residuals.drivers import CONSTANT, LOCAL, screening_forms
@@ -129,7 +128,7 @@ def _forms(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, F
 def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: Form) -> list[_Trial]:
     """A driver against the scatter of each output, and against that of all."""
     values = form.values(evidence.table.covariates, len(size))
-    z, block = _normal_scores(size), evidence.block
+    z, block = normal_scores(size), evidence.block
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
     return [_Trial(name, form, output, block_scores(z, on[:, :, None] * values[:, None, :], basis, block),
@@ -143,7 +142,7 @@ def _constant(model: PushModel, evidence: Evidence, left: Array, baseline: Basel
     basis = inputs_basis(model, _inputs_of(tables)).columns
     # As they are: what a base learnt wrongly adds to both alike, and taking it out would not take it out of both alike.
     parts = (_log_squares(left), _log_squares(baseline.evidence.z))
-    z, new = _normal_scores(np.vstack(parts)), np.arange(len(basis)) < len(left)
+    z, new = normal_scores(np.vstack(parts)), np.arange(len(basis)) < len(left)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     return [_Trial(CONSTANT, Form("constant"), output, block_scores(z, (on * new[:, None])[:, :, None], basis, block),
@@ -164,10 +163,6 @@ def _inputs_of(tables: tuple[PushTable, PushTable]) -> PushTable:
 def _outputs(n: int) -> list[tuple[str, Array]]:
     each = [(name, np.tile(np.eye(len(OUTPUTS))[k], (n, 1))) for k, name in enumerate(OUTPUTS)]
     return [(ALL, np.ones((n, len(OUTPUTS)))), *each]
-
-
-def _normal_scores(size: Array) -> Array:
-    return np.asarray(ndtri((rankdata(size, axis=0) - 0.5) / len(size)))
 
 
 def _padded(trial: _Trial, rows: int) -> _Trial:
