@@ -9,8 +9,10 @@ import numpy as np
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 START = 1_600_000_000_000_000_000  # ns
@@ -20,6 +22,16 @@ RADIUS = 0.00475
 def square_rig() -> Rig:
     """The square of the MIT set."""
     return Rig("rect1", shape_outline("rect1"), RADIUS, "plywood", 0.837)
+
+
+def square_pushes(count: int, seed: int = 0) -> tuple[PushTable, Rig]:
+    """Windows of the square on ABS by the analytical model, three a push; noise that grows with the angle."""
+    rng, rig = np.random.default_rng(seed), replace(square_rig(), surface="abs")
+    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    duration = np.full(count, 0.2)
+    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes += rng.standard_normal((count, 3)) * [1e-4, 2e-4, 5e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    return PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(count)])), rig
 
 
 @dataclass(frozen=True)

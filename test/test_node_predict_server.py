@@ -22,6 +22,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from service_msgs.msg import ServiceEventInfo
+from synthetic import square_pushes
 
 from msg_adapters.predictions import (
     PushQuery,
@@ -30,8 +31,6 @@ from msg_adapters.predictions import (
     query_to_request,
 )
 from push_predictor.errors import RequestError
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.served import serve
 from push_predictor.models.train import train_model
@@ -40,8 +39,6 @@ from push_predictor.nodes.answers import MOST_PUSHES, answer_batch
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server_parameters import PARAMETERS
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 SERVICES = {
@@ -60,22 +57,11 @@ GOOD = np.array([0.02, 0.1, 0.2])
 MANY = np.column_stack([np.full(20, 0.02), np.linspace(0.01, 0.99, 20), np.linspace(-0.9, 0.9, 20)])
 
 
-def square_pushes(count: int, seed: int) -> tuple[PushTable, Rig]:
-    """Pushes of the MIT square by the analytical model, with noise that grows with the angle."""
-    rng = np.random.default_rng(seed)
-    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = np.column_stack([np.full(count, 0.02), rng.uniform(0, 1, count), rng.uniform(-1, 1, count)])
-    duration = np.full(count, 0.2)
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
-    outcomes += rng.normal(size=(count, 3)) * [1e-4, 1e-4, 5e-3] * (0.3 + np.abs(inputs[:, 2:]))
-    return PushTable(inputs, duration, outcomes, np.array([f"p{i // 5}" for i in range(count)])), rig
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """Three good model files and a damaged one."""
     place = tmp_path_factory.mktemp("models")
-    table, rig = square_pushes(60, seed=0)
+    table, rig = square_pushes(60)
     for kind in ("analytical", "gp", "vhgp"):
         save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
     whole = (place / "gp.model").read_bytes()
@@ -370,7 +356,7 @@ def test_models_are_listed_with_what_they_were_made_from(server, folder):
         "kind": "vhgp",
         "outline": "rect1",
         "surface": "abs",
-        "pushes": "12",
+        "pushes": "20",
         "windows": "60",
         "covariates": "-",
         "duration": "0.2",

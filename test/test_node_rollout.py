@@ -10,20 +10,17 @@ import numpy as np
 import pytest
 import ros_harness as harness
 from geometry_msgs.msg import PoseWithCovariance
+from synthetic import square_pushes
 
 from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import quaternion_of_yaw, yaw_of_quaternion
-from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
-from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.served import serve
 from push_predictor.models.train import train_model
 from push_predictor.planning.rollout import PARTICLES, rollout
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import RolloutPushes
@@ -38,13 +35,8 @@ Ask = Callable[..., RolloutPushes.Response]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A GP of the square."""
-    place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
-    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = np.column_stack([np.full(60, 0.02), rng.random(60), rng.uniform(-1.0, 1.0, 60)])
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, np.full(60, 0.2))
-    outcomes += rng.standard_normal((60, 3)) * [1e-4, 2e-4, 5e-3]
-    table = PushTable(inputs, np.full(60, 0.2), outcomes, np.array([f"p{k // 3}" for k in range(60)]))
-    save_model(train_model(table, rig, "gp", name="gp"), place / "gp.model")
+    place = tmp_path_factory.mktemp("models")
+    save_model(train_model(*square_pushes(60), "gp", name="gp"), place / "gp.model")
     return place
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +14,12 @@ import pytest
 import ros_harness as harness
 import yaml
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from synthetic import square_pushes
 
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import load_model, save_model
 from push_predictor.models.served import serve
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictSliderPose
 
 EXAMPLE = """{header: {frame_id: world}, slider: {position: {x: 0.3, y: 0.1}, orientation: {w: 1.0}},
@@ -33,12 +31,9 @@ PUSH = WorldPush(np.array([0.3, 0.1, 0.0]), np.array([0.25025, 0.11]), np.array(
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A learnt and an analytical model of the square."""
     place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
-    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = np.column_stack([np.full(60, 0.02), rng.random(60), rng.uniform(-1.0, 1.0, 60)])
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, np.full(60, 0.2))
-    outcomes += (rng.standard_normal((60, 1)) + 0.3 * rng.standard_normal((60, 3))) * [1e-4, 2e-4, 5e-3]
-    inputs[:, 0] += rng.uniform(0.0, 2e-4, 60)
-    table = PushTable(inputs, np.full(60, 0.2), outcomes, np.array([f"p{k // 3}" for k in range(60)]))
+    table, rig = square_pushes(60)
+    shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs go together
+    table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
     for kind in ("gp", "analytical"):
         save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
     return place

@@ -21,21 +21,18 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
+from synthetic import square_pushes
 
 from msg_adapters import MessageError
 from msg_adapters.slider_poses import FLAT, fill_slider_response, query_from_slider_request, world_push
 from push_predictor.errors import PushPredictorError, RequestError
-from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
-from push_predictor.models.analytical import AnalyticalPush
 from push_predictor.models.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.nodes.model_shelf import ModelShelf
 from push_predictor.nodes.pose_answers import answer_slider_pose
 from push_predictor.nodes.request_frames import RequestFrames
 from push_predictor.planning.slider_pose import SliderAfter, slider_after
-from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictSliderPose
 
 COVARIANCE = np.array([[4e-8, 1e-8, 3e-7], [1e-8, 1e-8, 2e-7], [3e-7, 2e-7, 3e-5]])
@@ -223,7 +220,7 @@ def test_a_number_that_is_not_finite_is_refused_by_field(field: str, shown: str,
         ({"pusher__z": 0.05}, "pusher.z: 0.05 is not accepted, give a tip at most 0.02 m above the slider's frame"),
         ({"pusher_velocity__z": -0.01}, "pusher_velocity.z: -0.01 is not accepted, give a velocity within 0.1 rad"),
         ({"pusher_velocity": Vector3(z=0.01)}, "pusher_velocity.z: 0.01"),
-        ({"covariate_names": ["a"]}, "covariate_values length: 0 is not accepted, give 1, one for each name"),
+        ({"covariate_names": ["a"]}, "covariate_values length: 0 is not accepted, give 1, 1 names a push"),
         ({"covariate_values": [1.0]}, "covariate_values length: 1"),
         ({"covariate_names": ["a", "a"], "covariate_values": [1.0, 2.0]}, "covariate_names: ['a']"),
     ],
@@ -397,12 +394,7 @@ def test_what_made_up_tf_says_is_passed_on(tf: MadeUpTf, frame_id: str, sec: int
 
 @cache
 def analytical() -> Any:
-    rng, rig = np.random.default_rng(0), Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-    inputs = np.column_stack([np.full(30, 0.02), rng.random(30), rng.uniform(-1.0, 1.0, 30)])
-    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, np.full(30, 0.2))
-    outcomes += rng.standard_normal((30, 3)) * [1e-4, 2e-4, 5e-3]
-    table = PushTable(inputs, np.full(30, 0.2), outcomes, np.arange(30).astype(str))
-    return train_model(table, rig, "analytical", name="square")
+    return train_model(*square_pushes(30), "analytical", name="square")
 
 
 def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_path: Any) -> None:
