@@ -10,6 +10,7 @@ import sys
 import tracemalloc
 import zlib
 from pathlib import Path
+from random import Random
 
 import pytest
 import zstandard
@@ -94,6 +95,26 @@ def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused_before_it_does(bag
     assert len(messages) > 1000
     assert any(f"at byte {chunk}: a chunk was skipped: a chunk does not hold the " in note for note in notes)
     assert held < 1 << 21  # with the messages that this test keeps
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+def test_reading_holds_hardly_more_than_a_chunk_though_it_does_not_compress(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    path, chunk, rng = tmp_path / "noise.mcap", 1 << 20, Random(0)
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=chunk, compression=compression)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/noise", "cdr", writer.register_schema(POSE, "ros2msg", b""))
+        for step in range(1200):
+            writer.add_message(channel, START + step, rng.randbytes(4000), 0)
+        writer.finish()
+    bag = open_bag(path)
+    tracemalloc.start()
+    assert sum(1 for _ in bag.messages()) == 1200
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert chunk < held < 1.5 * chunk
 
 
 def test_the_messages_of_the_chunk_that_a_cut_goes_through_are_used(bag: Path) -> None:

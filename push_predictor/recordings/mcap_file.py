@@ -80,7 +80,7 @@ class McapFile:
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note.
 
-        One chunk at a time is in memory, packed and unpacked.
+        One chunk at a time is in memory.
         """
         wanted = self._described.wanted(topics, self._described.channels.values())
         seen = 0
@@ -105,7 +105,7 @@ class McapFile:
             stream.seek(HEAD.size, 1)
             head = chunk_head(stream.read(min(CHUNK_HEAD_SIZE, place.length)), place.length)
             stream.seek(place.offset + HEAD.size + head.begin)
-            return unpack_chunk(head, stream.read(head.packed))
+            return unpack_chunk(head, stream)
         except UNREADABLE as error:
             self._note(place.offset, f"a chunk was skipped: {error or type(error).__name__}")
             return b""

@@ -9,7 +9,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import Final, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import IO, BinaryIO, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast
 
 import lz4.frame  # type: ignore[import-untyped]  # ships no types
 import zstandard
@@ -25,7 +25,7 @@ UNREADABLE = (struct.error, UnicodeDecodeError, EndOfFile, zstandard.ZstdError, 
 _ALL = frozenset(Opcode)
 _CHUNK = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
-_PACKED_PIECE, _PIECE = 1 << 12, 1 << 15
+_PIECE: Final = 1 << 15
 _LARGEST_NAME = 32
 
 Bytes: TypeAlias = bytes | bytearray
@@ -108,48 +108,65 @@ def chunk_head(start: bytes, length: int) -> ChunkHead:
     return ChunkHead(size, crc, start[_CHUNK.size : begin - _LENGTH.size].decode(), begin, packed)
 
 
-def unpack_chunk(head: ChunkHead, data: bytes) -> Bytes:
-    """The records in a chunk; of one whose data is cut off, as many bytes as can be had.
+def unpack_chunk(head: ChunkHead, stream: BinaryIO) -> Bytes:
+    """The records in a chunk whose packed ones come next in the stream; of a chunk that is cut off, what can be had.
 
-    No more memory is taken than the data unpacks to, and the size that the head tells at most. Raises one of
-    UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
+    Takes as much memory as they unpack to, an eighth more at most, and never more than the size that the head tells.
+    Raises one of UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
     """
-    whole = len(data) == head.packed
-    found = _unpacked(head.compression, data, head.size, whole)
-    if whole and len(found) != head.size:
+    packed = _Packed(stream, head.packed)
+    found = _unpacked(head, packed)
+    if packed.cut:
+        return found
+    if len(found) != head.size:
         raise ValueError(f"a chunk does not hold the {head.size} bytes it tells of")
-    if whole and head.crc and zlib.crc32(found) != head.crc:
+    if head.crc and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
     return found
 
 
-def _unpacked(name: str, data: bytes, size: int, whole: bool) -> Bytes:
-    """At most size bytes, and one piece more where data holds more."""
-    if name == "":
+class _Packed:
+    """The packed records of a chunk, read as they are wanted. cut: they ended too soon."""
+
+    def __init__(self, stream: BinaryIO, size: int) -> None:
+        self._stream, self._left = stream, size
+        self.cut = False
+
+    def read(self, size: int) -> bytes:
+        """The next bytes, at most so many; none at the end."""
+        wanted = min(size, self._left)
+        data = self._stream.read(wanted)
+        self._left -= len(data)
+        self.cut = self.cut or len(data) < wanted
         return data
-    if name not in ("zstd", "lz4"):
-        raise ValueError(f"chunk compression {name!r}, zstd, lz4 and none are accepted")
-    if name == "zstd" and whole and zstandard.frame_content_size(data) == size:
-        return bytes(zstandard.ZstdDecompressor().decompress(data))
+
+
+def _unpacked(head: ChunkHead, packed: _Packed) -> Bytes:
+    """At most the bytes that the head tells of, and one piece more where there are more."""
+    if head.compression == "":
+        return packed.read(head.packed)
+    if head.compression not in _PIECES:
+        raise ValueError(f"chunk compression {head.compression!r}, zstd, lz4 and none are accepted")
     found = bytearray()
-    for piece in _zstd_pieces(data) if name == "zstd" else _lz4_pieces(data):
+    for piece in _PIECES[head.compression](packed):
         found += piece
-        if len(found) > size:
+        if len(found) > head.size:
             break
     return found
 
 
-def _zstd_pieces(data: bytes) -> Iterator[bytes]:
-    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+def _zstd_pieces(packed: _Packed) -> Iterator[bytes]:
+    reader = zstandard.ZstdDecompressor().stream_reader(cast(IO[bytes], packed), _PIECE, read_across_frames=True)
     while piece := reader.read(_PIECE):
         yield piece
 
 
-def _lz4_pieces(data: bytes) -> Iterator[bytes]:
+def _lz4_pieces(packed: _Packed) -> Iterator[bytes]:
     reader = lz4.frame.LZ4FrameDecompressor()
-    for start in range(0, len(data), _PACKED_PIECE):
-        yield reader.decompress(data[start : start + _PACKED_PIECE], max_length=_PIECE)
+    while not reader.eof and (data := packed.read(_PIECE)):
+        yield reader.decompress(data, max_length=_PIECE)
         while not (reader.needs_input or reader.eof):
             yield reader.decompress(b"", max_length=_PIECE)
-        if reader.eof:
-            return
+
+
+_PIECES = {"zstd": _zstd_pieces, "lz4": _lz4_pieces}
