@@ -25,8 +25,10 @@ from push_predictor.recordings.definitions import SCALAR_LAYOUTS
 
 OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
-_PATIENCE = 1.0  # s a subscriber may hold the replay up before it is left behind
-_FAST = 0.8  # s: a history filled within this time is not overwritten unasked
+_PATIENCE = 5.0  # s a subscriber may hold the replay up before it is left behind
+_AGAIN = 0.05  # s, two heartbeats: so long one that was left behind is waited for
+_PARTS = 4  # of a history: looked at one by one, for a stall of the machine makes the whole look slow
+_FAST = 0.2  # s: where a part fills within this time, the history is not overwritten unasked
 
 
 def message_class(kind: str) -> type:
@@ -70,7 +72,11 @@ class TopicSender:
         profile = publisher.qos_profile
         bounded = profile.history == HistoryPolicy.KEEP_LAST and profile.reliability == ReliabilityPolicy.RELIABLE
         self._depth = profile.depth if bounded else 0
-        self._sent, self._since = 0, time.monotonic()
+        self._part = max(1, self._depth // _PARTS)
+        self._sent = 0  # since the last part
+        self._open = 0  # since all was known to be acknowledged
+        self._since = time.monotonic()
+        self._patience = _PATIENCE
 
     def send(self, message: RawMessage) -> None:
         """Publish. Raises RCLError or struct.error if that cannot be done."""
@@ -80,7 +86,7 @@ class TopicSender:
         else:
             self.publisher.publish(message.data)
         self._sent += 1
-        if self._depth and self._sent >= self._depth:
+        if self._depth and self._sent >= self._part:
             self._hold_back()
 
     def acknowledged(self) -> bool:
@@ -91,10 +97,13 @@ class TopicSender:
     def _hold_back(self) -> None:
         """At high rates, wait for the readers before the history overwrites what they have not got yet."""
         now = time.monotonic()
-        if now - self._since < _FAST:
-            while not (done := self.acknowledged()) and time.monotonic() - now < _PATIENCE:
+        self._open += self._sent
+        if now - self._since < _FAST and self._open + self._part >= self._depth:
+            while not (done := self.acknowledged()) and time.monotonic() - now < self._patience:
                 time.sleep(0.0002)
-            self.overwritten += 0 if done else self._sent
+            self.overwritten += 0 if done else self._open
+            self._patience = _PATIENCE if done else _AGAIN
+            self._open = 0
         self._sent, self._since = 0, time.monotonic()
 
 
