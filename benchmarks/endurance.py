@@ -73,13 +73,14 @@ def _watched(
     hours_a_message: how much of the recording a message stands for.
     """
     heard.spin_until(lambda: _windows(heard.diagnostics) > 0)
+    earlier = int(_of(heard.diagnostics, "push_replay").get("published", 0))
     begun, covered, looks = monotonic(), 0.0, 0
     seen: dict[str, list[Vitals]] = {}
     while monotonic() - begun < options.minutes * 60.0 and covered < options.hours:
         looks += 1
         heard.spin_until(_clock_at(begun + looks * options.every), options.every + 10.0)
         told = heard.diagnostics
-        covered = int(_of(told, "push_replay").get("published", 0)) * hours_a_message
+        covered = (int(_of(told, "push_replay").get("published", earlier)) - earlier) * hours_a_message
         print(f"{monotonic() - begun:6.0f} s, {covered:6.2f} h recorded; {_figures(told)}; load {load()}", flush=True)
         for name, number in _with_children(nodes).items():
             seen.setdefault(name, []).append(vitals(number))

@@ -51,6 +51,13 @@ def test_the_simulator_knows_no_model() -> None:
             assert not name.startswith(("push_predictor.models", "push_predictor.evaluation")), f"{path}: {name}"
 
 
+@pytest.mark.parametrize("node", ["predict_server", "push_replay", "push_validator"])
+def test_a_node_starts_without_scipy_stats(node: str) -> None:
+    """It takes 0.4 s to import; the nodes need one small function of it, which push_predictor.ranks has."""
+    check = f"import sys, push_predictor.nodes.{node}; sys.exit('scipy.stats' in sys.modules)"
+    subprocess.run([sys.executable, "-c", check], check=True, cwd=ROOT)
+
+
 def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
     forbidden = "import sys; sys.modules.update(dict.fromkeys(['rclpy', 'matplotlib', 'rosbags', 'h5py', 'rich']))\n"
     use = (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rclpy.executors import SingleThreadedExecutor
-from ros_harness import NodeProcess, free_domain, node_process, ros_context, wait_until
+from ros_harness import NodeProcess, call, free_domain, node_process, ros_context, wait_until
 from validator_bench import HEXAGON, WRITTEN, Status, assert_same_as_offline, finish, replaying
 
 from examples.planner_client import PlannerClient
@@ -120,8 +120,8 @@ def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_mis
     said = capfd.readouterr().err
     assert "predict_push_batch: no answer within 0.5 s, asking again" in said
     assert "predict_push_batch: answers again after" in said and "requests went unanswered" in said
-    (late,) = [taken for taken, _ in planner.answers[5:] if taken > TIMEOUT]  # one request bridged the gap
-    assert late < 30.0 and all(np.array_equal(mean, planner.answers[0][1]) for _, mean in planner.answers)
+    assert any(taken > TIMEOUT for taken, _ in planner.answers[5:])  # a request bridged the gap
+    assert all(np.array_equal(mean, planner.answers[0][1]) for _, mean in planner.answers)
 
 
 def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
@@ -152,7 +152,7 @@ def test_answers_to_others_do_not_crowd_out_ones_own(domain: int):
             ours.work()
             time.sleep(0.2)
             for _ in range(300):
-                assert other.call(PredictPush.Request(), timeout_sec=10.0) is not None
+                call(other, PredictPush.Request())
             executor = SingleThreadedExecutor(context=busy.context)
             executor.add_node(busy)
             assert wait_until(lambda: executor.spin_once(0.0) or bool(answers), 10.0)

@@ -43,6 +43,19 @@ from push_predictor_interfaces.srv import (
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KINDS = {"slider/pose": PoseStamped, "pusher/pose": PoseStamped, "pusher/wrench": WrenchStamped}
+CONTROLS = {
+    Burst: "burst",
+    GetRate: "get_rate",
+    Pause: "pause",
+    Play: "play",
+    PlayNext: "play_next",
+    Resume: "resume",
+    Seek: "seek",
+    SetRate: "set_rate",
+    Stop: "stop",
+    TogglePaused: "toggle_paused",
+    IsPaused: "is_paused",
+}
 
 
 class Ears:
@@ -55,6 +68,8 @@ class Ears:
         self.states: list[str] = []
         self.clock: list[int] = []
         self.reports: list[dict[str, str]] = []
+        # All at once: when the last is answered, the node has found the others too, and loses none of their answers.
+        self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in CONTROLS.items()}
         for topic, kind in KINDS.items():
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
         node.create_subscription(String, "rig", lambda m: self.rig.append(m.data), LATCHED)
@@ -127,11 +142,9 @@ def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_bag(tmp_path_factory.mktemp("bags") / "second.mcap", push_messages(1.0))
 
 
-def service(ears: Ears, name: str, kind: Any, **request: Any) -> Any:
-    client = ears.node.create_client(kind, f"push_replay/{name}")
-    answer = call(client, kind.Request(**request))
-    ears.node.destroy_client(client)
-    return answer
+def service(ears: Ears, kind: Any, **request: Any) -> Any:
+    call(ears.controls[IsPaused], IsPaused.Request())
+    return call(ears.controls[kind], kind.Request(**request))
 
 
 @pytest.mark.parametrize(("duration", "rate", "depth"), [(6.0, 1.0, 1000), (40.0, 100.0, 0)])
@@ -170,7 +183,7 @@ def test_a_rate_beyond_the_machine_says_how_far_it_is_behind(tmp_path: Path) -> 
     bag = write_bag(tmp_path / "long.mcap", push_messages(100.0))
     with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, ears):
         ears.wait_for("paused")
-        service(ears, "resume", Resume)
+        service(ears, Resume)
         report = ears.final_report()
     assert float(report["late_max_us"]) > 1.0e5  # 62 500 messages in 100 us of wall time cannot be
     assert report["published"] == str(len(push_messages(100.0)))
@@ -214,13 +227,13 @@ def test_a_recording_without_a_rig_plays_and_says_how_to_give_one(tmp_path: Path
 def test_the_controls_of_a_paused_player(second: Path) -> None:
     with replay(second, play__start_paused=True) as (_, ears):
         ears.wait_for("paused")
-        assert service(ears, "is_paused", IsPaused).paused
-        assert service(ears, "play_next", PlayNext).success
-        assert service(ears, "burst", Burst, num_messages=9).actually_burst == 9
+        assert service(ears, IsPaused).paused
+        assert service(ears, PlayNext).success
+        assert service(ears, Burst, num_messages=9).actually_burst == 9
         assert wait_until(lambda: ears.heard == 10)
-        assert not service(ears, "play", Play).success
-        assert service(ears, "seek", Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
-        assert service(ears, "burst", Burst, num_messages=0).actually_burst == 62
+        assert not service(ears, Play).success
+        assert service(ears, Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
+        assert service(ears, Burst, num_messages=0).actually_burst == 62
         ears.wait_for("finished")
         assert ears.final_report()["acknowledged"] == "yes"
 
@@ -228,22 +241,22 @@ def test_the_controls_of_a_paused_player(second: Path) -> None:
 def test_pause_rate_stop_and_play_again(second: Path) -> None:
     with replay(second, play__rate=0.1) as (_, ears):
         ears.wait_for("playing")
-        assert service(ears, "get_rate", GetRate).rate == pytest.approx(0.1)
-        assert not service(ears, "set_rate", SetRate, rate=0.0).success
-        service(ears, "pause", Pause)
+        assert service(ears, GetRate).rate == pytest.approx(0.1)
+        assert not service(ears, SetRate, rate=0.0).success
+        service(ears, Pause)
         ears.wait_for("paused")
         heard = ears.heard
         time.sleep(0.2)
         assert ears.heard <= heard + 3  # under way when the pause came
-        service(ears, "toggle_paused", TogglePaused)
-        assert not service(ears, "is_paused", IsPaused).paused
-        service(ears, "stop", Stop)
+        service(ears, TogglePaused)
+        assert not service(ears, IsPaused).paused
+        service(ears, Stop)
         ears.wait_for("finished")
         assert ears.heard < len(push_messages(1.0))
-        assert service(ears, "set_rate", SetRate, rate=5.0).success
+        assert service(ears, SetRate, rate=5.0).success
         for messages in ears.raw.values():
             messages.clear()
-        assert service(ears, "play", Play, start_offset=Time(nanosec=500_000_000)).success
+        assert service(ears, Play, start_offset=Time(nanosec=500_000_000)).success
         assert wait_until(lambda: ears.heard == len(push_messages(1.0)) - 313)
 
 
@@ -252,8 +265,8 @@ def test_restamping_adds_one_offset_and_keeps_rate_1(second: Path) -> None:
     begin = time.time_ns()
     with replay(second, restamp=True) as (_, ears):
         ears.wait_for("playing")
-        assert not service(ears, "set_rate", SetRate, rate=2.0).success
-        assert service(ears, "get_rate", GetRate).rate == 1.0
+        assert not service(ears, SetRate, rate=2.0).success
+        assert service(ears, GetRate).rate == 1.0
         ears.wait_for("finished")
     offsets = {
         stamp(new) - stamp(old) for t in KINDS for new, old in zip(ears.raw[t], recorded(messages, t), strict=True)

@@ -20,6 +20,12 @@ def test_they_are_those_of_the_ranks_with_equal_values_sharing_theirs(values: Ar
     np.testing.assert_allclose(normal_scores(values), ndtri((rankdata(values, axis=0) - 0.5) / len(values)))
 
 
+def test_a_column_with_nan_has_no_scores_the_others_have_theirs():
+    scores = normal_scores(np.array([[1.0, 1.0], [np.nan, 2.0], [3.0, np.inf]]))
+    assert np.isnan(scores[:, 0]).all()
+    np.testing.assert_allclose(scores[:, 1], ndtri([1 / 6, 1 / 2, 5 / 6]), atol=1e-15)
+
+
 def test_only_the_order_matters():
     values = np.random.default_rng(0).standard_normal((30, 3))
     assert np.array_equal(normal_scores(values), normal_scores(np.exp(values)))

@@ -44,7 +44,9 @@ class Stage:
         self.settled: list[int] = []
         self.cost = 0
         self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
-        outlet = Outlet(self.publish, lambda: self.settled.append(len(self.log)), self.states.append)
+        outlet = Outlet(
+            lambda message: None, self.publish, lambda: self.settled.append(len(self.log)), self.states.append
+        )
         settings = {"window": 10, "loop": False, "delay": 0, **options}
         self.player = ReplayPlayer(ListSource(messages), self.clock, self, outlet, **settings)
 
@@ -268,7 +270,7 @@ def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
         stage.player.tell_time(seen.append)  # late by now, so that the clock alone would be far ahead
         return done
 
-    stage.player._outlet = Outlet(look, lambda: None, stage.states.append)
+    stage.player._outlet = Outlet(lambda message: None, look, lambda: None, stage.states.append)
     stage.run()
     assert seen == [*(m.log_time for m in TEN[1:]), TEN[-1].log_time]
 

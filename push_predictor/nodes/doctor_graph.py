@@ -33,7 +33,8 @@ INTERFACES = {
 }
 WHEELS = "pip install 'ros-jazzy-rclpy[fastrtps]', or . /opt/ros/jazzy/setup.sh"
 BUILD = "pip install ./push_predictor_interfaces, or colcon build && . install/setup.sh"
-PATIENCE = 20.0  # s for predict_server to start and to answer
+PATIENCE = 20.0  # s for predict_server to start, and to answer
+AGAIN = 4.0  # s until it is asked again
 PUSH = {"velocity": 0.02, "contact": 0.1, "angle": 0.1, "duration": 0.2}
 
 
@@ -158,9 +159,11 @@ def _call(namespace: str, alive: Callable[[], bool]) -> str:
                 return "predict_server ended"
             if time.monotonic() > deadline:
                 return f"predict_server was not found within {PATIENCE:.0f} s"
-        future = client.call_async(PredictPush.Request(**PUSH))
-        rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE)
-        response = future.result() if future.done() else None
+        response, deadline = None, time.monotonic() + PATIENCE
+        while response is None and time.monotonic() < deadline:  # an answer is lost while the two still get acquainted
+            future = client.call_async(PredictPush.Request(**PUSH))
+            rclpy.spin_until_future_complete(node, future, timeout_sec=AGAIN)
+            response = future.result() if future.done() else None
         if response is None:
             return f"predict_push did not answer within {PATIENCE:.0f} s"
         return "" if response.success else f"predict_push was refused: {response.message}"

@@ -24,6 +24,7 @@ from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay_clock import SECOND, PlayerClock, SystemWall, sharpen_sleep
 from push_predictor.nodes.replay_controls import ReplayControls
 from push_predictor.nodes.replay_options import ReplayOptions, read_options
+from push_predictor.nodes.replay_patience import Patience
 from push_predictor.nodes.replay_player import Outlet, ReplayPlayer
 from push_predictor.nodes.replay_report import ReplayReport
 from push_predictor.nodes.replay_source import BagSource
@@ -42,6 +43,7 @@ class PushReplay(Node):
     def __init__(self, stop: Stop) -> None:
         super().__init__("push_replay")
         self._stop = stop
+        self._ending = threading.Event()
         self._options = options = read_options(self)
         bag = open_bag(options.recording)
         self._restamper = Restamper() if options.restamp else None
@@ -55,7 +57,6 @@ class PushReplay(Node):
         self._player = self._make_player(options)
         self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._start_reporting()
-        self._ending = threading.Event()
         self._threads = [threading.Thread(target=self._guarded, args=(work,)) for work in (self._play, self._tick)]
         for thread in self._threads:
             thread.start()
@@ -74,7 +75,7 @@ class PushReplay(Node):
     def _open_topics(self, bag: Bag) -> ReplayTopics:
         chosen = {topic: kind for topic, kind in bag.topics.items() if self._options.filter.accepts(topic)}
         overrides = read_overrides(self._options.qos_overrides)
-        topics = ReplayTopics(self, chosen, bag.qos, overrides, self._restamper)
+        topics = ReplayTopics(self, chosen, bag.qos, overrides, self._restamper, Patience(self._ending.is_set))
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")
         return topics
@@ -96,7 +97,7 @@ class PushReplay(Node):
     def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
         wall = SystemWall()
         clock = PlayerClock(wall, options.rate, options.start_paused, options.spin)
-        outlet = Outlet(publish=self._publish, settle=self._settle, announce=self._announce)
+        outlet = Outlet(self._topics.make_room, self._publish, self._settle, self._announce)
         return ReplayPlayer(self._source, clock, wall, outlet, options.window, options.loop, options.delay)
 
     def _publish(self, message: RawMessage) -> bool:

@@ -21,10 +21,12 @@ _READING = 300_000  # ns: with less time than this before the next deadline noth
 class Outlet:
     """Where a player speaks.
 
-    publish: sends one message, False if that failed; settle: waits until subscribers have what was sent;
-    announce: is told playing, paused or finished.
+    make_room: waits until subscribers have what a message would overwrite, while controls go on; publish: sends it,
+    False if that failed; settle: waits until subscribers have what was sent; announce: is told playing, paused or
+    finished.
     """
 
+    make_room: Callable[[RawMessage], None]
     publish: Callable[[RawMessage], bool]
     settle: Callable[[], None]
     announce: Callable[[str], None]
@@ -111,6 +113,7 @@ class ReplayPlayer:
         done = 0
         with self._control():
             while self._clock.paused and (count == 0 or done < count) and (head := self._head()) is not None:
+                self._outlet.make_room(head)
                 self._send(head)
                 done += 1
             if done and self._time is not None:
@@ -215,6 +218,7 @@ class ReplayPlayer:
             assert self._ahead is not None
             self._ahead.fill(lambda: deadline - self._wall.now() > _READING)
         if self._clock.sleep_until(head.log_time, generation):
+            self._outlet.make_room(head)
             self._send_at(head, generation)
         return True
 

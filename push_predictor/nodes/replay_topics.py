@@ -20,13 +20,12 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.qos import overridden, replay_profile
 from push_predictor.nodes.replay_clock import SECOND
+from push_predictor.nodes.replay_patience import Patience
 from push_predictor.recordings.bag import RawMessage
 from push_predictor.recordings.definitions import SCALAR_LAYOUTS
 
 OWN_TOPICS = frozenset({"clock", "rig", "replay_status"})
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Za-z][A-Za-z0-9]*)")
-_PATIENCE = 5.0  # s a subscriber may hold the replay up before it is left behind
-_AGAIN = 0.05  # s, two heartbeats: so long one that was left behind is waited for
 _PARTS = 4  # of a history: looked at one by one, for a stall of the machine makes the whole look slow
 _FAST = 0.2  # s: where a part fills within this time, the history is not overwritten unasked
 
@@ -65,18 +64,28 @@ class Restamper:
 class TopicSender:
     """Publishes one topic's serialized messages; overwritten: messages a subscriber may have lost to KEEP_LAST."""
 
-    def __init__(self, publisher: Publisher, restamper: Restamper | None) -> None:
+    def __init__(self, publisher: Publisher, restamper: Restamper | None, patience: Patience) -> None:
         self.publisher = publisher
         self.overwritten = 0
-        self._restamper = restamper
+        self._restamper, self._patience = restamper, patience
         profile = publisher.qos_profile
         bounded = profile.history == HistoryPolicy.KEEP_LAST and profile.reliability == ReliabilityPolicy.RELIABLE
         self._depth = profile.depth if bounded else 0
         self._part = max(1, self._depth // _PARTS)
         self._sent = 0  # since the last part
-        self._open = 0  # since all was known to be acknowledged
+        self._open = 0  # since they were last waited for, no more than the history holds
         self._since = time.monotonic()
-        self._patience = _PATIENCE
+
+    def make_room(self) -> None:
+        """At high rates, wait for the readers before the history overwrites what they have not got yet."""
+        if not self._depth or self._sent < self._part:
+            return
+        self._open = min(self._open + self._sent, self._depth)
+        if time.monotonic() - self._since < _FAST and self._open + self._part >= self._depth:
+            if not self._patience.wait(self.publisher.topic_name, self.acknowledged):
+                self.overwritten += self._open
+            self._open = 0
+        self._sent, self._since = 0, time.monotonic()
 
     def send(self, message: RawMessage) -> None:
         """Publish. Raises RCLError or struct.error if that cannot be done."""
@@ -86,25 +95,11 @@ class TopicSender:
         else:
             self.publisher.publish(message.data)
         self._sent += 1
-        if self._depth and self._sent >= self._part:
-            self._hold_back()
 
     def acknowledged(self) -> bool:
         """Has every matched reliable subscriber got everything?"""
         # Always with timeout 0: the call keeps the interpreter lock, so a wait here would stop every thread.
         return bool(self.publisher.wait_for_all_acked(Duration(seconds=0)))
-
-    def _hold_back(self) -> None:
-        """At high rates, wait for the readers before the history overwrites what they have not got yet."""
-        now = time.monotonic()
-        self._open += self._sent
-        if now - self._since < _FAST and self._open + self._part >= self._depth:
-            while not (done := self.acknowledged()) and time.monotonic() - now < self._patience:
-                time.sleep(0.0002)
-            self.overwritten += 0 if done else self._open
-            self._patience = _PATIENCE if done else _AGAIN
-            self._open = 0
-        self._sent, self._since = 0, time.monotonic()
 
 
 class ReplayTopics:
@@ -123,7 +118,9 @@ class ReplayTopics:
         recorded_qos: Mapping[str, str],
         overrides: Mapping[str, Mapping[str, Any]],
         restamper: Restamper | None,
+        patience: Patience,
     ) -> None:
+        self._patience = patience
         self._node, self._qos, self._overrides, self._restamper = node, recorded_qos, overrides, restamper
         self.senders: dict[str, TopicSender] = {}
         self.skipped: dict[str, str] = {}
@@ -131,6 +128,10 @@ class ReplayTopics:
         self.untimed = frozenset(t for t, k in topics.items() if k in SCALAR_LAYOUTS and not SCALAR_LAYOUTS[k].header)
         for topic, kind in topics.items():
             self._open(topic, kind)
+
+    def make_room(self, message: RawMessage) -> None:
+        """Wait until the subscribers of its topic have what it would overwrite, within reason."""
+        self.senders[message.topic].make_room()
 
     def send(self, message: RawMessage) -> bool:
         """Publish a message; False if that failed."""
@@ -172,7 +173,7 @@ class ReplayTopics:
         except InvalidTopicNameException as error:
             self.skipped[topic] = " ".join(str(error).split())
             return
-        self.senders[topic] = TopicSender(publisher, self._restamper if stamped else None)
+        self.senders[topic] = TopicSender(publisher, self._restamper if stamped else None, self._patience)
 
     def _publisher(self, topic: str, name: str, found: type, kept: bool) -> Publisher:
         overrides = self._overrides.get(topic.strip("/"), {})

@@ -19,7 +19,7 @@ from push_predictor.nodes.polled import PolledGroup, take_all
 from push_predictor.nodes.scalar_inlet import ScalarInlet
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 
-DEPTH = 5000  # the most that Fast DDS keeps, unless a profile says otherwise; memory is taken as they fill
+DEPTH = 5000  # the most that Fast DDS keeps, of more the newest are turned away; memory is taken as they fill
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last DEPTH messages only
 PATIENCE = 1.0  # s
 TOPICS = (

@@ -9,7 +9,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import IO, BinaryIO, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast
+from typing import BinaryIO, Final, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import lz4.frame  # type: ignore[import-untyped]  # ships no types
 import zstandard
@@ -111,15 +111,15 @@ def chunk_head(start: bytes, length: int) -> ChunkHead:
 def unpack_chunk(head: ChunkHead, stream: BinaryIO) -> Bytes:
     """The records in a chunk whose packed ones come next in the stream; of a chunk that is cut off, what can be had.
 
-    Takes as much memory as they unpack to, an eighth more at most, and never more than the size that the head tells.
+    Takes no more memory than the packed bytes and what they unpack to, which may not be more than the head tells.
     Raises one of UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
     """
     packed = _Packed(stream, head.packed)
     found = _unpacked(head, packed)
+    if len(found) > head.size or not (packed.cut or len(found) == head.size):
+        raise ValueError(f"a chunk does not hold the {head.size} bytes it tells of")
     if packed.cut:
         return found
-    if len(found) != head.size:
-        raise ValueError(f"a chunk does not hold the {head.size} bytes it tells of")
     if head.crc and zlib.crc32(found) != head.crc:
         raise ValueError("a chunk's checksum is wrong")
     return found
@@ -145,18 +145,28 @@ def _unpacked(head: ChunkHead, packed: _Packed) -> Bytes:
     """At most the bytes that the head tells of, and one piece more where there are more."""
     if head.compression == "":
         return packed.read(head.packed)
-    if head.compression not in _PIECES:
+    if head.compression not in ("zstd", "lz4"):
         raise ValueError(f"chunk compression {head.compression!r}, zstd, lz4 and none are accepted")
+    if head.compression == "lz4":  # piece by piece: what does not compress would be there almost twice
+        return _gathered(_lz4_pieces(packed), head.size)
+    # At once, where the frame tells the same size: libzstd's decoder of pieces takes a window of twice a chunk.
+    data = packed.read(head.packed)
+    if data and not packed.cut and zstandard.frame_content_size(data) == head.size:
+        return bytes(zstandard.ZstdDecompressor().decompress(data))
+    return _gathered(_zstd_pieces(data), head.size)
+
+
+def _gathered(pieces: Iterator[bytes], size: int) -> bytearray:
     found = bytearray()
-    for piece in _PIECES[head.compression](packed):
+    for piece in pieces:
         found += piece
-        if len(found) > head.size:
+        if len(found) > size:
             break
     return found
 
 
-def _zstd_pieces(packed: _Packed) -> Iterator[bytes]:
-    reader = zstandard.ZstdDecompressor().stream_reader(cast(IO[bytes], packed), _PIECE, read_across_frames=True)
+def _zstd_pieces(data: bytes) -> Iterator[bytes]:
+    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
     while piece := reader.read(_PIECE):
         yield piece
 
@@ -167,6 +177,3 @@ def _lz4_pieces(packed: _Packed) -> Iterator[bytes]:
         yield reader.decompress(data, max_length=_PIECE)
         while not (reader.needs_input or reader.eof):
             yield reader.decompress(b"", max_length=_PIECE)
-
-
-_PIECES = {"zstd": _zstd_pieces, "lz4": _lz4_pieces}
