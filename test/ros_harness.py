@@ -19,6 +19,7 @@ from pathlib import Path
 from queue import Empty, Queue
 from typing import IO, Any
 
+from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -26,7 +27,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-START_TIMEOUT = 30.0
+START_TIMEOUT = 60.0
 PATIENCE = 10.0  # s until a call is made again; ~/finish answers within 5 s
 _HELD: deque[tuple[int, IO[str]]] = deque()
 _NAMES = itertools.count()
@@ -64,7 +65,7 @@ class NodeProcess(subprocess.Popen[bytes]):
         assert text in self.text(), f"{text!r} was not printed (exit status {self.poll()}):\n{self.text()}"
         return self.text()
 
-    def stop(self, number: int = signal.SIGINT, timeout: float = 10.0) -> int:
+    def stop(self, number: int = signal.SIGINT, timeout: float = 30.0) -> int:
         """Send a signal and return the exit status; kill and fail if it does not end."""
         if self.poll() is None:
             self.send_signal(number)
@@ -151,11 +152,24 @@ def wait_until(condition: Callable[[], bool], timeout: float = START_TIMEOUT) ->
     return True
 
 
-def call(client: Client, request: Any, timeout: float = START_TIMEOUT) -> Any:
+def acquaint(node: Node, server: str, timeout: float = START_TIMEOUT) -> None:
+    """Wait until the node named `server` knows every subscription and client that `node` has made so far.
+
+    It learns of them in the order in which they were made, and answers the last one; asking that twice does no harm.
+    """
+    client = node.create_client(GetParameters, f"{server}/get_parameters")
+    try:
+        call(client, GetParameters.Request(), timeout, patience=1.0)
+    finally:
+        node.destroy_client(client)
+
+
+def call(client: Client, request: Any, timeout: float = START_TIMEOUT, patience: float = PATIENCE) -> Any:
     """Wait for the service, call it and return the response.
 
     Asks again now and then: the middleware drops the answer to a client that it has not yet matched after 0.1 s, which
-    happens on a busy machine to a client that has just been made. So the service must bear being asked twice.
+    happens on a busy machine to a client that has just been made. So the service must bear being asked twice; else
+    `acquaint` first.
     Raises AssertionError if either takes longer than `timeout` (s). Another thread must spin the node.
     """
     assert client.wait_for_service(timeout), f"no service {client.srv_name} after {timeout} s"
@@ -165,7 +179,7 @@ def call(client: Client, request: Any, timeout: float = START_TIMEOUT) -> Any:
             asked.append(client.call_async(request))
             asked[-1].add_done_callback(answers.put)
             with suppress(Empty):
-                return answers.get(timeout=min(left, PATIENCE)).result()
+                return answers.get(timeout=min(left, patience)).result()
     finally:
         for future in asked:
             client.remove_pending_request(future)
@@ -203,7 +217,7 @@ def _end(process: NodeProcess) -> None:
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
     try:
-        process.wait(10.0)
+        process.wait(30.0)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

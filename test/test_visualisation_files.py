@@ -52,7 +52,7 @@ def published() -> dict[str, list[Any]]:
         of_replay = {"/slider/pose", "/pusher/pose", "/pusher/wrench", "/replay_status"}
         of_validator = {"/push_residual", "/push_markers", "/push_alarm"}
         wanted = of_replay | of_validator | {"/diagnostics"}
-        assert wait_until(lambda: all(node.count_publishers(name) for name in wanted), 20.0)
+        assert wait_until(lambda: all(node.count_publishers(name) for name in wanted), 60.0)
         return {name: node.get_publishers_info_by_topic(name) for name, _ in node.get_topic_names_and_types()}
 
 

@@ -28,7 +28,7 @@ def replaying(
     domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
 ) -> Iterator[NodeProcess]:
     """push_replay, once somebody listens."""
-    params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 20.0, **more}
+    params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
     with node_process("push_replay", *ros_args, domain=domain, params=params) as process:
         yield process
 
