@@ -15,6 +15,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -139,9 +140,14 @@ class PushReplay(Node):
         wanted = [s for topic, s in senders.items() if topic.strip("/") in _PUSH_TOPICS] or list(senders.values())
         deadline = time.perf_counter_ns() + self._options.wait_for_subscribers
         while time.perf_counter_ns() < deadline and not self._ending.is_set():
-            if all(sender.publisher.get_subscription_count() for sender in wanted):
+            if all(sender.publisher.get_subscription_count() for sender in wanted) and self._rig_is_known():
                 return
             time.sleep(0.01)
+
+    def _rig_is_known(self) -> bool:
+        """Have those who want the rig got it? Samples that come before it would be judged by another one's."""
+        matched = self._rig.get_subscription_count() >= self.count_subscribers(self._rig.topic_name)
+        return matched and bool(self._rig.wait_for_all_acked(Duration(seconds=0)))
 
     def _tick(self) -> None:
         """Publish /clock at its frequency, of wall time: an executor's timer costs more and keeps its pace less."""

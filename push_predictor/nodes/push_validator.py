@@ -114,7 +114,7 @@ class PushValidator(Node):
     def _speak(self) -> None:
         self._residuals = self.create_publisher(PushResidual, "push_residual", 1000)
         self._alarms = self.create_publisher(PushAlarm, "push_alarm", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "push_markers", 10)
+        self._markers = self.create_publisher(MarkerArray, "push_markers", 100)  # for a burst after a stall
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(PERIOD, self._work, clock=steady)
