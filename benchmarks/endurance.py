@@ -95,7 +95,7 @@ def _clock_at(time: float) -> Callable[[], bool]:
 
 
 def _ended(child: int) -> float:
-    """Seconds that a child takes to end: a day's windows are written for a minute."""
+    """Seconds that a child takes to end: a day's windows are written for minutes."""
     begun = monotonic()
     os.kill(child, signal.SIGTERM)
     os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)

@@ -50,9 +50,9 @@ def main(output: str, depth: str, *topics: str) -> None:
 
 
 def _still_hearing(heard: dict[str, list[bytes]]) -> bool:
-    """Has anything come within half a second? What is in DDS by now is taken at the pace of Python."""
+    """Has anything come within two seconds? What is in DDS by now is taken at the pace of Python."""
     before = sum(map(len, heard.values()))
-    time.sleep(0.5)
+    time.sleep(2.0)
     return sum(map(len, heard.values())) > before
 
 

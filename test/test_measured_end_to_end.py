@@ -154,20 +154,20 @@ def server(models: tuple[Path, dict[str, PushModel]]) -> Iterator[int]:
     """The ROS domain in which a predict_server serves all of them."""
     domain = free_domain()
     with node_process("predict_server", domain=domain, params={"models": [str(models[0])]}) as process:
-        process.wait_for_text("serving")
+        process.wait_for_text("serving", 120.0)
         yield domain
 
 
 def validated_online(recording: Path, names: list[str], domain: int, out: Path) -> None:
     """Replay a recording to a validator of its own, which leaves its files in `out`."""
     watching = {"model": names[0], "compare": names[1:] or [""], "output": out, "report": False}
-    playing = {"recording": recording, "play.rate": RATE, "wait_for_subscribers": 15.0, "exit_when_finished": True}
+    playing = {"recording": recording, "play.rate": RATE, "wait_for_subscribers": 60.0, "exit_when_finished": True}
     with (
         node_process("push_validator", domain=domain, params=watching) as validator,
         node_process("push_replay", domain=domain, params=playing) as replay,
     ):
-        assert wait_until(lambda: "validation written" in validator.text(), 30.0), validator.text() + replay.text()
-        assert "lost 0" in replay.text()
+        assert wait_until(lambda: "validation written" in validator.text(), 120.0), validator.text() + replay.text()
+        replay.wait_for_text("lost 0")  # it says so after its last message
 
 
 @pytest.mark.parametrize("run", [*RUNS, BAG, HEXAGON])

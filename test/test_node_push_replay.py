@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import pickle
 import signal
+import statistics
 import struct
 import subprocess
 import sys
@@ -74,7 +76,7 @@ class Ears:
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
         node.create_subscription(String, "rig", lambda m: self.rig.append(m.data), LATCHED)
         node.create_subscription(String, "replay_status", lambda m: self.states.append(m.data), LATCHED)
-        node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), 100)
+        node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), 1000)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._report, 100)
 
     def _report(self, message: DiagnosticArray) -> None:
@@ -87,9 +89,16 @@ class Ears:
     def wait_for(self, state: str) -> None:
         assert wait_until(lambda: self.states[-1:] == [state]), f"heard {self.states}, not {state}"
 
-    def final_report(self) -> dict[str, str]:
-        assert wait_until(lambda: bool(self.reports) and self.reports[-1]["state"] == "finished")
+    def report(self, state: str) -> dict[str, str]:
+        """What a replay in `state` says about itself."""
+        assert wait_until(lambda: bool(self.reports) and self.reports[-1]["state"] == state, 120.0), self.states
         return self.reports[-1]
+
+    def hear_all(self, state: str) -> int:
+        """Wait for all that a replay in `state` has published, and count it: states overtake a backlog of messages."""
+        published = int(self.report(state)["published"])
+        assert wait_until(lambda: self.heard >= published), f"heard {self.heard} of {published}"
+        return published
 
 
 @contextmanager
@@ -97,7 +106,7 @@ def replay(bag: Path, *ros_args: str, namespace: str | None = None, **params: An
     """A replay that begins once the test listens; parameters with `__` for a dot."""
     domain = free_domain()
     names = {name.replace("__", "."): value for name, value in params.items()}
-    given = {"recording": bag, "wait_for_subscribers": 15.0, "play.wait_acked_timeout.sec": 4, **names}
+    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60, **names}
     with ros_context(domain, namespace) as node:
         ears = Ears(node)
         with node_process("push_replay", *ros_args, domain=domain, namespace=namespace, params=given) as process:
@@ -113,7 +122,7 @@ def listener(output: Path, depth: int, domain: int) -> Iterator[Callable[[], dic
 
     def heard() -> dict[str, list[bytes]]:
         process.send_signal(signal.SIGINT)
-        assert process.wait(10.0) == 0
+        assert process.wait(60.0) == 0
         found: dict[str, list[bytes]] = pickle.loads(output.read_bytes())
         return found
 
@@ -154,12 +163,13 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
     messages = push_messages(duration)
     bag = write_bag(tmp_path / "pushes.mcap", messages)
     domain = free_domain()
-    params = {"recording": bag, "play.rate": rate, "wait_for_subscribers": 15.0, "exit_when_finished": True}
+    waiting = {"wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60}
+    params = {"recording": bag, "play.rate": rate, "exit_when_finished": True, **waiting}
     with (
         listener(tmp_path / "heard", depth, domain) as heard,
         node_process("push_replay", domain=domain, params=params) as process,
     ):
-        assert process.wait(60.0) == 0, process.text()
+        assert process.wait(180.0) == 0, process.text()
         printed, found = process.text(), heard()
     assert f"published {len(messages)} messages" in printed
     assert "lost 0, acknowledged yes" in printed
@@ -168,12 +178,13 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
 
 
 def test_a_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
-    with replay(second) as (_, ears):
-        ears.wait_for("playing")
+    with replay(second, play__start_paused=True) as (_, ears):
+        ears.wait_for("paused")
         begin = time.monotonic()
+        service(ears, Resume)
         assert wait_until(lambda: ears.heard == len(push_messages(1.0)))
-        assert time.monotonic() - begin > 0.7
-        report = ears.final_report()
+        assert time.monotonic() - begin > 0.99  # from before the first to after the last: a busy machine adds to it
+        report = ears.report("finished")
     assert report["published"] == str(len(push_messages(1.0)))
     assert report["lost"] == "0"
     assert 0.0 < float(report["late_p50_us"]) <= float(report["late_p99_us"]) <= float(report["late_max_us"])
@@ -184,20 +195,23 @@ def test_a_rate_beyond_the_machine_says_how_far_it_is_behind(tmp_path: Path) -> 
     with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, ears):
         ears.wait_for("paused")
         service(ears, Resume)
-        report = ears.final_report()
+        report = ears.report("finished")
     assert float(report["late_max_us"]) > 1.0e5  # 62 500 messages in 100 us of wall time cannot be
     assert report["published"] == str(len(push_messages(100.0)))
 
 
-def test_rig_status_and_clock_are_published(second: Path) -> None:
-    with replay(second) as (_, ears):
+def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
+    end = START + 4 * 10**9
+    with replay(write_bag(tmp_path / "four.mcap", push_messages(4.0))) as (_, ears):
         ears.wait_for("finished")
         assert [json.loads(text) for text in ears.rig] == [RIG]
         assert ears.states in (["playing", "finished"], ["finished"])
         assert ears.clock == sorted(ears.clock)
-        during = [t for t in set(ears.clock) if START <= t < START + 10**9]
-        assert len(during) == pytest.approx(40, abs=15)
-        assert max(ears.clock) <= START + 10**9
+        during = sorted(t for t in set(ears.clock) if START <= t < end)
+        gaps = [after - before for before, after in itertools.pairwise(during)]
+        assert statistics.median(gaps) == pytest.approx(25e6, rel=0.2)  # 40 Hz; a busy machine leaves some out
+        assert len(during) < 170
+        assert max(ears.clock) <= end
 
 
 def test_a_late_subscriber_still_gets_the_rig(second: Path) -> None:
@@ -235,7 +249,7 @@ def test_the_controls_of_a_paused_player(second: Path) -> None:
         assert service(ears, Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
         assert service(ears, Burst, num_messages=0).actually_burst == 62
         ears.wait_for("finished")
-        assert ears.final_report()["acknowledged"] == "yes"
+        assert ears.report("finished")["acknowledged"] == "yes"
 
 
 def test_pause_rate_stop_and_play_again(second: Path) -> None:
@@ -245,14 +259,14 @@ def test_pause_rate_stop_and_play_again(second: Path) -> None:
         assert not service(ears, SetRate, rate=0.0).success
         service(ears, Pause)
         ears.wait_for("paused")
-        heard = ears.heard
-        time.sleep(0.2)
-        assert ears.heard <= heard + 3  # under way when the pause came
+        published = ears.hear_all("paused")
+        time.sleep(0.5)
+        assert (ears.heard, ears.states[-1]) == (published, "paused")
         service(ears, TogglePaused)
         assert not service(ears, IsPaused).paused
         service(ears, Stop)
         ears.wait_for("finished")
-        assert ears.heard < len(push_messages(1.0))
+        assert ears.hear_all("finished") < len(push_messages(1.0))
         assert service(ears, SetRate, rate=5.0).success
         for messages in ears.raw.values():
             messages.clear()
@@ -264,10 +278,10 @@ def test_restamping_adds_one_offset_and_keeps_rate_1(second: Path) -> None:
     messages = push_messages(1.0)
     begin = time.time_ns()
     with replay(second, restamp=True) as (_, ears):
-        ears.wait_for("playing")
+        assert wait_until(lambda: bool(ears.states))
         assert not service(ears, SetRate, rate=2.0).success
         assert service(ears, GetRate).rate == 1.0
-        ears.wait_for("finished")
+        assert ears.hear_all("finished") == len(messages)
     offsets = {
         stamp(new) - stamp(old) for t in KINDS for new, old in zip(ears.raw[t], recorded(messages, t), strict=True)
     }
@@ -303,14 +317,14 @@ def test_namespace_and_remapping_move_the_topics(second: Path) -> None:
 )
 def test_topics_are_filtered_as_rosbag2_does(second: Path, options: dict[str, Any], played: set[str]) -> None:
     with replay(second, play__rate=10.0, play__wait_acked_timeout=-1.0, **options) as (_, ears):
-        ears.wait_for("finished")
-        assert wait_until(lambda: {topic for topic, heard in ears.raw.items() if heard} == played)
+        ears.hear_all("finished")
+        assert {topic for topic, heard in ears.raw.items() if heard} == played
 
 
 def test_offset_and_duration_choose_a_part(second: Path) -> None:
     options = {"play__start_offset__nsec": 500_000_000, "play__playback_duration": 0.1}
     with replay(second, **options) as (_, ears):
-        ears.wait_for("finished")
+        ears.hear_all("finished")
         stamps = [stamp(data) for data in ears.raw["pusher/wrench"]]
     assert stamps == [START + 10**6 * (504 + 8 * k) for k in range(12)]
 
@@ -321,8 +335,8 @@ def test_a_damaged_recording_plays_up_to_the_damage_and_names_it(tmp_path: Path)
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
     with replay(cut, play__rate=20.0) as (process, ears):
-        ears.wait_for("finished")
-        report = ears.final_report()
+        ears.hear_all("finished")
+        report = ears.report("finished")
         heard = ears.raw["slider/pose"]
         assert 100 < len(heard) < 2000
         assert heard == recorded(messages, "slider/pose")[: len(heard)]
@@ -334,7 +348,7 @@ def test_an_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
     alien = [("/alien", "alien_msgs/msg/Saucer", START, b"\0\1\0\0\0\0\0\0")]
     bag = write_bag(tmp_path / "alien.mcap", alien + push_messages(0.2))
     with replay(bag) as (_, ears):
-        report = ears.final_report()
+        report = ears.report("finished")
     assert "alien_msgs" in json.loads(report["not_published"])["/alien"]
     assert report["published"] == str(len(push_messages(0.2)))
 
@@ -367,7 +381,7 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
             assert wait_until(lambda: bool(ears.reports))
         else:
             ears.wait_for(state)
-        assert process.stop(number, timeout=3.0) == 0
+        assert process.stop(number, timeout=20.0) == 0  # it would be delayed or play for longer
         assert "Traceback" not in process.text()
         assert "late p50" in process.text()
 
@@ -391,7 +405,7 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
 def test_a_bad_parameter_is_one_line_and_status_1(second: Path, params: dict[str, Any], said: str) -> None:
     given = {"recording": second, **params} if params else {}
     with node_process("push_replay", domain=free_domain(), params=given) as process:
-        assert process.wait(10.0) == 1
+        assert process.wait(60.0) == 1
         lines = process.text().splitlines()
     assert len(lines) == 1, lines
     assert lines[0].startswith("push_replay: ")

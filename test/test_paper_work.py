@@ -34,7 +34,8 @@ PIECES = textwrap.dedent(
         return number * number
 
     def slowly(number, log):
-        time.sleep(0.3)
+        while number > 3 and not Path(log).with_name("go_on").exists():
+            time.sleep(0.05)
         return squared(number, log)
 
     def where(number):
@@ -113,11 +114,12 @@ def test_what_was_done_before_an_interruption_is_kept(pieces, tmp_path: Path, co
     try:
         wait_for(lambda: len(lines(log)) >= 3)
         os.killpg(process.pid, end)  # as a terminal does
-        assert process.wait(timeout=20) != 0
+        assert process.wait(timeout=60) != 0
     finally:
         end_group(process)
     done = len(lines(log))
     assert 3 <= done < count
+    (tmp_path / "go_on").touch()
     results = Work(tmp_path / "kept", cores=1).run("slow squares", pieces.slowly, calls_of(log, count))
     assert results == [n * n for n in range(count)]
     assert len(lines(log)) <= count + cores  # at most what was being written when it ended is made again
@@ -127,9 +129,11 @@ def started(folder: Path, log: Path, cores: int, count: int) -> subprocess.Popen
     """Another process at the same work, leader of its own group."""
     program = textwrap.dedent(
         f"""
+        import signal
         from pathlib import Path
         from pieces_of_work import slowly
         from push_predictor.paper.work import Work
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
         Work(Path({str(folder / "kept")!r}), cores={cores}).run("slow squares", slowly, {calls_of(log, count)!r})
         """
     )
@@ -144,10 +148,10 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
     """Whatever a killed leader has left of its workers."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    process.wait(timeout=20)
+    process.wait(timeout=60)
 
 
-def wait_for(condition, timeout: float = 30.0) -> None:
+def wait_for(condition, timeout: float = 120.0) -> None:
     end = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < end, "waited in vain"
