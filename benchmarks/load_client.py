@@ -1,8 +1,8 @@
 """Clients of one predict_server that share a process: what benchmarks/load.py starts a few of.
 
 Each is a node of its own that asks, in turns, one push and a batch, one request at a time, so many a second. Its
-requests never change, so neither may the answers. `--deaf` asks and never takes an answer; `--stopped` is stopped, as
-by Ctrl-Z, with answers under way. Writes down what became of every request, as JSON.
+requests never change, so neither may the answers. `--deaf` asks and, once the server knows it, takes no answer;
+`--stopped` is stopped, as by Ctrl-Z, with answers under way. Writes down what became of every request, as JSON.
 
 The middleware hands every answer of a service to all its clients; each takes those of the others too, to drop them. So
 fifty clients take fifty times what they asked for: rclpy's executor has not the time for that on two cores, and here
@@ -32,6 +32,7 @@ from rclpy.utilities import get_default_context
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 TIMEOUT = 5.0  # s, after which a client counts a request as failed
+PATIENCE = 60.0  # s until the server is there, and has answered once
 BATCH, EVERY = 100, 10  # pushes in a batch; each so many-th request is one
 SINGLE, MANY = "predict_push", "predict_push_batch"
 DURATION = 0.2
@@ -50,7 +51,7 @@ class Account:
 
 
 class Asker:
-    """One client: call `step` often, and `take` when one of its `clients` is ready."""
+    """One client: `begin`, then call `step` often, and `take` when one of its `clients` is ready."""
 
     def __init__(self, number: int, rate: float) -> None:
         self.node = Node(f"client_{os.getpid()}_{number}", enable_rosout=False, start_parameter_services=False)
@@ -58,10 +59,19 @@ class Asker:
         self.clients = [self._client(PredictPush, SINGLE), self._client(PredictPushBatch, MANY)]
         self._requests = [_single(rng), _batch(rng)]
         self._first: list[Any] = [None, None]  # answers
-        self._pause, self._due = 1.0 / rate, perf_counter() + rng.random() / rate
+        self._pause, self._lag, self._due = 1.0 / rate, rng.random() / rate, 0.0
         self._open: tuple[int, float, int] | None = None  # kind, when it was asked, its number
         self._count = number
         self.accounts = [Account(), Account()]
+        self.heard = False  # has the server answered it at all?
+
+    def greet(self) -> None:
+        """Send a request that no account counts, by the client that was made last."""
+        self.clients[-1].handle.send_request(self._requests[-1])
+
+    def begin(self) -> None:
+        """Ask from now on, not all askers at the same moment."""
+        self._due = perf_counter() + self._lag
 
     @property
     def busy(self) -> bool:
@@ -95,6 +105,7 @@ class Asker:
         """Take an answer; it may be somebody else's, or to a request that was given up."""
         client = self.clients[kind]
         header, answer = client.handle.take_response(client.srv_type.Response)
+        self.heard |= header is not None
         if header is None or self._open is None or header.request_id.sequence_number != self._open[2]:
             return
         account = self.accounts[kind]
@@ -109,8 +120,8 @@ class Asker:
 
     def _client(self, kind: Any, name: str) -> Client:
         client = self.node.create_client(kind, name, qos_profile=QoSProfile(depth=DEPTH))
-        if not client.wait_for_service(60.0):
-            raise SystemExit(f"{client.srv_name}: the service did not appear within 60 s")
+        if not client.wait_for_service(PATIENCE):
+            raise SystemExit(f"{client.srv_name}: the service did not appear within {PATIENCE:g} s")
         return client
 
 
@@ -139,10 +150,13 @@ def main() -> int:
     options = _options()
     rclpy.init()
     askers = [Asker(options.seed * 1000 + k, options.rate) for k in range(options.clients)]
+    _acquaint(askers[-1])
     print("asking", flush=True)
     if options.deaf or options.stopped:
         return _never_take(askers[0], options)
     waiter, end = Waiter(askers), perf_counter() + options.seconds
+    for asker in askers:
+        asker.begin()
     while (asking := perf_counter() < end) or any(asker.busy for asker in askers):
         for asker in askers:
             asker.step(asking)
@@ -150,6 +164,20 @@ def main() -> int:
     accounts = [dict(zip((SINGLE, MANY), map(vars, asker.accounts), strict=True)) for asker in askers]
     options.out.write_text(json.dumps(accounts))
     return 0
+
+
+def _acquaint(last: Asker) -> None:
+    """Wait until the server knows all clients of this process; it drops what it has to say to one that it does not.
+
+    It learns of them in the order in which they were made, and answers the last one.
+    """
+    waiter, begun = Waiter([last]), perf_counter()
+    while not last.heard:
+        if (now := perf_counter()) > begun + PATIENCE:
+            raise SystemExit(f"the server did not answer within {PATIENCE:g} s")
+        last.greet()
+        while not last.heard and (left := now + 1.0 - perf_counter()) > 0.0:
+            waiter.wait(left)
 
 
 def _never_take(asker: Asker, options: argparse.Namespace) -> int:

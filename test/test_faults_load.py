@@ -32,7 +32,7 @@ def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     domain = free_domain()
     command = [sys.executable, f"benchmarks/{name}.py", "--domain", str(domain), *arguments]
     return subprocess.run(
-        command, cwd=REPOSITORY, env=node_environment(domain), capture_output=True, text=True, timeout=120, check=False
+        command, cwd=REPOSITORY, env=node_environment(domain), capture_output=True, text=True, timeout=400, check=False
     )
 
 
@@ -51,7 +51,8 @@ def test_many_clients_beside_a_deaf_and_a_stopped_one_are_all_answered():
     served = int(re.findall(r"it answered (\d+)", told)[0])
     answered = sum(map(int, re.findall(r"answered (\d+): p50", told)))
     assert served > answered  # also what the deaf and the stopped one asked, as far as it had left them
-    assert "threads +0, descriptors +0" in told
+    (grown,) = re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", told)
+    assert max(map(int, grown)) <= 0, told
 
 
 def test_answers_are_taken_though_the_executor_is_busy_with_samples():
@@ -62,7 +63,8 @@ def test_answers_are_taken_though_the_executor_is_busy_with_samples():
         context = Context()
         context.init(args=[], domain_id=domain)
         busy = Node("busy", context=context)
-        client = PredictionClient(busy, timeout=30.0)
+        client = PredictionClient(busy, timeout=120.0)
+        assert wait_until(lambda: client.server_is_there and node.count_clients("predict_push") > 0)
         answers: list[PredictPush.Response] = []
         for _ in range(30):
             client.ask(PredictPush.Request(), answers.append)
@@ -71,7 +73,7 @@ def test_answers_are_taken_though_the_executor_is_busy_with_samples():
             client.work()
             return len(answers) == 30
 
-        assert wait_until(all_answered, 20.0), f"{len(answers)} answers"
+        assert wait_until(all_answered, 60.0), f"{len(answers)} answers"
         assert (client.open, client.timeouts, client.problems) == (0, 0, [])
         busy.destroy_node()
         context.try_shutdown()
@@ -83,7 +85,7 @@ def test_answers_are_taken_though_the_executor_is_busy_with_samples():
 def test_no_node_opens_files_or_starts_threads_while_recorded_hours_pass():
     """The long form: 24 recorded hours. Seconds are too few to judge memory by."""
     done = benchmark(
-        "endurance", "--minutes", "0.2", "--every", "0.2", "--warm-up", "0.12", "--most-growth", "60",
+        "endurance", "--minutes", "0.2", "--every", "0.1", "--warm-up", "0.12", "--most-growth", "60",
         "--recording", "bags/hexagon_delrin",
     )  # fmt: skip
     told = done.stdout + done.stderr

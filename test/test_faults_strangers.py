@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -16,13 +15,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import ros_harness
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
-from ros_harness import REPOSITORY, call, free_domain, node_environment, node_process, ros_context, wait_until
+from ros_harness import (
+    REPOSITORY,
+    acquaint,
+    call,
+    free_domain,
+    node_environment,
+    node_process,
+    ros_context,
+    wait_until,
+)
 
 from push_predictor.nodes.strangers import DISCOVERY, RANGE, limit_discovery
 from push_predictor_interfaces.srv import Resume
@@ -126,7 +135,9 @@ print("push_validator" in node.get_node_names())
 def on(machine: str, environment: Mapping[str, str], *command: str, **how: Any) -> subprocess.Popen[str]:
     unset = [word for name in DISCOVERY for word in ("-u", name)]
     words = ["ip", "netns", "exec", machine, "env", *unset, *(f"{k}={v}" for k, v in environment.items()), *command]
-    return subprocess.Popen(words, env=node_environment(DOMAIN), cwd=REPOSITORY, text=True, **how)
+    # Without shared memory, which network namespaces have in common, and with it all tests in a domain of this number.
+    alone = {**node_environment(DOMAIN), "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+    return subprocess.Popen(words, env=alone, cwd=REPOSITORY, text=True, **how)
 
 
 DOMAIN = 57  # these machines have no other nodes
@@ -135,7 +146,7 @@ DOMAIN = 57  # these machines have no other nodes
 def finds(machine: str, patience: float) -> bool:
     """Does somebody on this machine, who looks as far as ROS does by default, find the validator?"""
     stranger = on(machine, {}, sys.executable, "-c", LOOK, str(patience), stdout=subprocess.PIPE)
-    out, _ = stranger.communicate(timeout=30.0)
+    out, _ = stranger.communicate(timeout=60.0)
     return "True" in out
 
 
@@ -147,11 +158,11 @@ def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[
         node = on(here, asked, *command, stdout=output, stderr=output)
         try:
             assert wait_until(lambda: "waiting for" in log.read_text()), log.read_text()
-            assert asked or finds(here, 10.0)  # who looks far on the same machine finds it in any case
-            assert finds(there, 10.0 if asked else 3.0) == bool(asked)
+            assert asked or finds(here, 25.0)  # who looks far on the same machine finds it in any case
+            assert finds(there, 25.0 if asked else 3.0) == bool(asked)
         finally:
             node.terminate()
-            node.wait(10.0)
+            node.wait(30.0)
     assert ("other machines cannot find this node" in log.read_text()) == (not asked)
 
 
@@ -160,15 +171,15 @@ def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[
 
 @dataclass
 class Listener:
-    """When each node stated its health, and in which state it was."""
+    """When each node stated its health, by its own clock, and in which state it was."""
 
     heard: dict[str, list[tuple[float, str]]] = field(default_factory=dict)
 
-    def __call__(self, message: DiagnosticArray) -> None:
+    def __call__(self, message: DiagnosticArray, info: Mapping[str, int]) -> None:
         for status in message.status:
             state = {pair.key: pair.value for pair in status.values}["state"]
             node = status.name.split(":")[0].strip("/")
-            self.heard.setdefault(node, []).append((time.monotonic(), state))
+            self.heard.setdefault(node, []).append((1e-9 * info["source_timestamp"], state))
 
     def in_state(self, node: str, state: str) -> list[float]:
         return [when for when, said in self.heard.get(node, []) if said == state]
@@ -183,6 +194,7 @@ class Graph:
 
     def change(self, transition: int) -> None:
         client = self.node.create_client(ChangeState, "/push_predictor/change_state")
+        acquaint(self.node, "/push_predictor")  # a transition that is asked for twice is refused
         assert call(client, ChangeState.Request(transition=Transition(id=transition))).success
 
 
@@ -207,9 +219,9 @@ def graph() -> Iterator[Graph]:
 
 def assert_every_second(graph: Graph, node: str, state: str) -> None:
     """Statements of this state, a second apart; the first may be late by what the change took."""
-    assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 4, 15.0), graph.listener.heard
-    times = graph.listener.in_state(node, state)[1:4]
-    assert 1.5 < times[-1] - times[0] < 3.5, times
+    assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 8, 60.0), graph.listener.heard
+    gaps = np.diff(graph.listener.in_state(node, state)[1:8])
+    assert 0.75 < np.median(gaps) < 1.75, gaps
 
 
 def test_every_node_states_its_health_once_a_second_also_where_it_has_nothing_to_do(graph: Graph):
@@ -277,7 +289,7 @@ def test_the_policy_allows_what_each_node_does_and_nothing_else(graph: Graph):
         wanted["subscriber"] -= set() if tf_is_there() else {"/tf", "/tf_static"}
         if name == "push_validator":  # it listens to /clock itself where it dates scalar topics
             assert "/clock" in wanted["subscriber"]
-        assert wait_until(lambda name=name, wanted=wanted: used(graph.node, name) == wanted, 5.0), (  # type: ignore[misc]  # bound at once
+        assert wait_until(lambda name=name, wanted=wanted: used(graph.node, name) == wanted, 30.0), (  # type: ignore[misc]  # bound at once
             name,
             {kind: names ^ wanted[kind] for kind, names in used(graph.node, name).items()},
         )

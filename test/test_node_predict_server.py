@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import resource
 import signal
+import subprocess
+import sys
 import time
 from array import array
 from pathlib import Path
@@ -124,7 +127,7 @@ class Server:
             found[:] = [s for s in list(self.statuses) if ready(s)]
             return bool(found)
 
-        assert harness.wait_until(seen, 15.0), f"no such diagnostics among {self.statuses}\n{self.process.text()}"
+        assert harness.wait_until(seen, 60.0), f"no such diagnostics among {self.statuses}\n{self.process.text()}"
         return found[0], {pair.key: pair.value for pair in found[0].values}
 
 
@@ -263,10 +266,11 @@ def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
 def test_one_push_is_answered_while_a_long_batch_is_computed(server):
     many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (2500, 1)), 0.2, {}))
     batch = server._clients["predict_push_batch"].call_async(many)
-    time.sleep(0.1)  # the server has begun
-    assert server.push().success
-    assert not batch.done()
-    assert harness.wait_until(batch.done)
+    answered = 0
+    while not batch.done() and answered < 100_000:
+        assert server.push().success
+        answered += 1
+    assert batch.done() and answered > 5  # behind the batch there would be one, or two
     assert len(batch.result().in_domain) == 50_000
 
 
@@ -302,11 +306,15 @@ def test_what_nobody_foresaw_is_answered_and_logged_and_the_node_lives(folder, m
 def test_thirty_requests_in_flight_are_all_answered(server):
     client = server._clients["predict_push"]
     futures = [client.call_async(query_to_request("", push, 0.2)) for push in np.resize(MANY, (30, 3))]
-    assert harness.wait_until(lambda: all(future.done() for future in futures), 10.0)
+    assert harness.wait_until(lambda: all(future.done() for future in futures), 60.0)
     assert all(future.result().success for future in futures)
 
 
 def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
+    """By a prediction, not by the word that the node is inactive.
+
+    On a busy machine `call` may have to ask again, a limit of the middleware: it waits 0.1 s for a client to be known.
+    """
     domain = harness.free_domain()
     with harness.ros_context(domain) as node:
         client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=100))
@@ -546,13 +554,19 @@ def test_introspection_shows_requests_when_it_is_asked_for(server):
         server.push(push)
         return any(e.info.event_type == ServiceEventInfo.REQUEST_RECEIVED and e.request for e in events)
 
-    assert harness.wait_until(shown, 10.0)
+    assert harness.wait_until(shown, 60.0)
     assert any(e.request and e.request[0].velocity == push[0] for e in events)
     assert server.set("introspection", "disabled").successful
-    time.sleep(0.3)
+
+    def quiet() -> bool:
+        before = len(events)
+        time.sleep(0.5)
+        return len(events) == before
+
+    assert harness.wait_until(quiet)  # those of the last requests come after their answers
     events.clear()
     server.push(push)
-    time.sleep(0.3)
+    time.sleep(1.0)
     assert not events
 
 
@@ -578,11 +592,21 @@ def test_a_signal_ends_it_cleanly(folder, number):
         assert "Traceback" not in server.process.text()
 
 
+def time_of_its_libraries() -> float:
+    """The processor time that their import takes at present, in s: 0.4 where the limit below was set."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-c", "import rclpy, scipy.linalg"]
+    subprocess.run(command, env=harness.node_environment(harness.free_domain()), check=True, timeout=60.0)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def test_it_is_ready_within_two_seconds_of_processor_time(folder):
+    """Or in as many times what its libraries take, on a machine that is slow by itself."""
     with server_of([folder / "gp.model"]) as server:
         assert server.push().success
         ticks = Path(f"/proc/{server.process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-        assert sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") < 2.0
+        assert sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") < max(2.0, 5.0 * time_of_its_libraries())
 
 
 def memory_kb(process) -> int:

@@ -19,10 +19,11 @@ from action_msgs.msg import GoalStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from made_up_traces import pushes, slippery
-from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from synthetic import square_rig
+from validator_bench import Status
 
 from msg_adapters.predictions import query_to_request
 from push_predictor.models.model_file import load_model, save_model
@@ -68,10 +69,12 @@ class Server:
 
     def __init__(self, process: harness.NodeProcess, node: Node, domain: int) -> None:
         self.process, self.node, self.domain = process, node, domain
-        self.predict = node.create_client(PredictPush, "predict_push")
         self.load = node.create_client(LoadModel, "load_model")
         self.change = node.create_client(ChangeState, "push_predictor/change_state")
-        self._action = ActionClient(node, TraceResidual, "trace_residual")
+        self._action = ActionClient(
+            node, TraceResidual, "trace_residual", feedback_sub_qos_profile=QoSProfile(depth=100)
+        )
+        self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
 
     def trace(self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "") -> Goal:
         return Goal(self._action, TraceResidual.Goal(model=model, covariates=covariates, output=str(output)))
@@ -86,13 +89,19 @@ class Server:
         children = [int(pid) for task in tasks for pid in task.read_text().split()]
         return [pid for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
 
+    def held(self, goal: Goal) -> int:
+        """The process of a trace at work, stopped: it does not end by itself, however long the test takes."""
+        assert goal.reached("motion")
+        (worker,) = self.workers()
+        os.kill(worker, signal.SIGSTOP)
+        return worker
+
 
 class Goal:
     """A goal that was accepted: its feedback so far, its status and result."""
 
     def __init__(self, action: ActionClient, goal: TraceResidual.Goal) -> None:
         assert action.wait_for_server(harness.START_TIMEOUT)
-        time.sleep(0.5)  # the server has found our requests by now, not yet surely our ear for its answer and feedback
         self.stages: list[tuple[str, float]] = []
         sent = action.send_goal_async(goal, lambda m: self.stages.append((m.feedback.stage, m.feedback.progress)))
         assert harness.wait_until(sent.done, PATIENCE)
@@ -137,15 +146,16 @@ def names(folder: Path) -> list[str]:
 def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
     place: Path, server: Server, drifting: Path
 ) -> None:
-    goal, answered, slowest = server.trace(drifting), 0, 0.0
+    goal, answered = server.trace(drifting), 0
     while not goal.ended:
-        begun = time.monotonic()
         assert server.push().success
-        slowest, answered = max(slowest, time.monotonic() - begun), answered + 1
+        answered += 1
         time.sleep(0.02)
     status, result = goal.end()
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True), result.message
-    assert answered > 20 and slowest < 1.0, (answered, slowest)
+    assert answered > 20  # behind the trace there would be one, or two
+    # Feedback and result are taken apart from each other, in either order.
+    assert harness.wait_until(lambda: goal.stages[-1:] == [("done", 1.0)]), goal.stages
     shares = [share for _, share in goal.stages]
     assert {"measurement", "motion", "report", "done"} <= dict(goal.stages).keys()
     assert shares == sorted(shares) and shares[-1] == 1.0
@@ -168,8 +178,7 @@ def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
 def test_a_cancelled_trace_leaves_nothing(server: Server, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
-    assert goal.reached("motion")
-    (worker,) = server.workers()
+    worker = server.held(goal)
     goal.handle.cancel_goal_async()
     status, result = goal.end()
     assert status == GoalStatus.STATUS_CANCELED and not result.success and "cancelled" in result.message
@@ -179,6 +188,7 @@ def test_a_cancelled_trace_leaves_nothing(server: Server, drifting: Path) -> Non
 
 def test_a_second_goal_is_refused_with_the_reason(server: Server, drifting: Path, tmp_path: Path) -> None:
     first = server.trace(drifting, covariates=[])
+    server.held(first)
     status, result = server.trace(tmp_path / "other").end()
     assert status == GoalStatus.STATUS_ABORTED and not result.success
     assert "one at a time" in result.message and "deployed" in result.message
@@ -190,9 +200,7 @@ def test_a_second_goal_is_refused_with_the_reason(server: Server, drifting: Path
 def test_a_worker_that_dies_is_told_and_the_server_lives_on(server: Server, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
-    assert goal.reached("motion")
-    (worker,) = server.workers()
-    os.kill(worker, signal.SIGKILL)
+    os.kill(server.held(goal), signal.SIGKILL)
     status, result = goal.end()
     assert status == GoalStatus.STATUS_ABORTED and "signal 9" in result.message
     assert names(drifting) == before and server.push().success
@@ -237,11 +245,12 @@ def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
         stream.write(last[: len(last) // 2])  # the validator is writing
     model = drifting.parent / "absent.pushmodel"
     save_model(train_model(pushes(20, 4), square_rig(), "analytical", name="deployed"), model)
-    params = {"model": model, "output": drifting}
+    params, status = {"model": model, "output": drifting}, Status(server.node)
     with harness.node_process("push_validator", domain=server.domain, params=params):
-        assert server.node.create_client(GetParameters, "push_validator/get_parameters").wait_for_service(PATIENCE)
-        status, result = server.trace(tmp_path / "elsewhere").end()
-        assert status == GoalStatus.STATUS_SUCCEEDED, result.message
+        # A validator that sees predict_push has found the server's other services and clients, made earlier, as well.
+        assert harness.wait_until(lambda: bool(status.all) and "nobody offers" not in status.message), status.message
+        ended, result = server.trace(tmp_path / "elsewhere").end()
+        assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
         assert names(tmp_path / "elsewhere") == sorted([EXTENDED, REPORT, VERDICT])
         assert load_model(tmp_path / "elsewhere" / EXTENDED).needs == ("elapsed_time",)
 
@@ -254,10 +263,9 @@ def test_a_node_that_ends_tells_its_client_and_takes_the_trace_with_it(place: Pa
         assert status == GoalStatus.STATUS_ABORTED and "the node is inactive" in result.message
         harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE)))
         goal = server.trace(drifting, covariates=[])
-        assert goal.reached("motion")
-        (worker,) = server.workers()
+        worker = server.held(goal)
         assert server.process.stop(signal.SIGINT) == 0
-        assert harness.wait_until(lambda: not Path(f"/proc/{worker}").exists(), 5.0)
+        assert harness.wait_until(lambda: not Path(f"/proc/{worker}").exists(), 30.0)
         status, result = goal.end()
         assert status == GoalStatus.STATUS_ABORTED and "the node ends" in result.message
     assert names(drifting) == before

@@ -20,6 +20,7 @@ class DeferredAction(ActionServer):
             goal.execute()
             begin(goal)
 
+        self._untold: Any = None  # the last result, until somebody was sent it
         super().__init__(
             node,
             action_type,
@@ -28,6 +29,11 @@ class DeferredAction(ActionServer):
             handle_accepted_callback=accepted,
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
         )
+
+    @property
+    def told(self) -> bool:
+        """Whether the last result has been sent to somebody who asked for it."""
+        return self._untold is None
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
         """Do nothing: the work is done elsewhere."""
@@ -39,4 +45,10 @@ class DeferredAction(ActionServer):
             end()
             return result
 
+        self._untold = result
         super().notify_execute(goal, last)
+
+    def _send_result_response(self, request_header: Any, future: Any) -> None:
+        super()._send_result_response(request_header, future)
+        if future.result().result is self._untold:
+            self._untold = None

@@ -40,7 +40,7 @@ from push_predictor.nodes.validator_folder import ValidatorFolder
 from push_predictor_interfaces.action import TraceResidual
 
 PERIOD = 0.05  # s between two looks at the process, while there is one
-LAST_PATIENCE = 2.0  # s that the end of the node waits for its executor to end a trace
+LAST_PATIENCE = 5.0  # s that the end of the node waits for its executor to end a trace and to send the result
 HOLDS = "pushes.csv as push_validator writes it, push tables or recordings"
 
 
@@ -78,11 +78,13 @@ class ResidualTracer:
         if self._job is None:
             return
         deadline = monotonic() + LAST_PATIENCE
-        while self._job is not None and monotonic() < deadline:
+        while not self._all_told() and monotonic() < deadline:
             time.sleep(PERIOD)
-        time.sleep(PERIOD)  # the result is sent in the executor's next turns
         if (job := self._job) is not None:  # the executor has ended: nobody can be told any more
             _clear(job)
+
+    def _all_told(self) -> bool:
+        return self._job is None and self._action.told
 
     def end(self, reason: str) -> None:
         """End the trace that runs, if there is one; its client is told why."""
@@ -199,11 +201,13 @@ class ResidualTracer:
         self._finish(goal, goal.abort, _result(reason))
 
     def _finish(self, goal: Any, end: Callable[[], None], result: TraceResidual.Result) -> None:
-        if self._job is not None and self._job.goal is goal:
-            _clear(self._job)
-            self._job = None
-            self._node.destroy_timer(self._timer)
+        if (job := self._job) is None or job.goal is not goal:
+            self._action.finish(goal, end, result)
+            return
+        _clear(job)
+        self._node.destroy_timer(self._timer)
         self._action.finish(goal, end, result)
+        self._job = None  # last: `close` then waits until the result was sent
 
 
 def _result(message: str) -> TraceResidual.Result:

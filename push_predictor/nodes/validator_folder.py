@@ -11,7 +11,8 @@ from rclpy.task import Future
 
 from push_predictor.errors import RecordingError
 
-PATIENCE = 3.0  # s that a validator has to be found, and to answer
+PATIENCE = 5.0  # s that a validator has to be found, and to answer
+AGAIN = 1.0  # s until it is asked again: the middleware drops an answer to a client that the validator has just met
 
 
 class ValidatorFolder:
@@ -19,22 +20,31 @@ class ValidatorFolder:
 
     def __init__(self, node: Node) -> None:
         self._client = node.create_client(GetParameters, "push_validator/get_parameters")
-        self._asked: Future | None = None
-        self._begun = 0.0
+        self._asked: list[Future] = []
+        self._begun = self._due = 0.0
 
     def ask(self) -> None:
         """Begin anew."""
-        self._asked, self._begun = None, monotonic()
+        self._forget()
+        self._begun = self._due = monotonic()
 
     def work(self) -> Path | None:
         """The folder, None while there is no answer. Raises RecordingError if there will be none."""
-        if self._asked is None and self._client.service_is_ready():
-            self._asked = self._client.call_async(GetParameters.Request(names=["output"]))
-        if self._asked is not None and self._asked.done():
-            return _folder(self._asked.result())
-        if monotonic() - self._begun > PATIENCE:
-            raise RecordingError(f"no push_validator {'runs' if self._asked is None else 'answers'}")
+        now = monotonic()
+        if now >= self._due and self._client.service_is_ready():
+            self._asked.append(self._client.call_async(GetParameters.Request(names=["output"])))
+            self._due = now + AGAIN
+        for asked in self._asked:
+            if asked.done():
+                return _folder(asked.result())
+        if now - self._begun > PATIENCE:
+            raise RecordingError(f"no push_validator {'answers' if self._asked else 'runs'}")
         return None
+
+    def _forget(self) -> None:
+        for asked in self._asked:
+            self._client.remove_pending_request(asked)
+        self._asked.clear()
 
 
 def _folder(response: GetParameters.Response) -> Path:
