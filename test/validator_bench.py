@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from ros_harness import REPOSITORY, NodeProcess, call, node_process, wait_until
+from ros_harness import REPOSITORY, START_TIMEOUT, NodeProcess, call, node_process, wait_until
 from std_srvs.srv import Trigger
 
 from push_predictor.evaluation.offline import validate_recording
@@ -43,7 +43,17 @@ class Status:
 
     def wait_for_first(self) -> None:
         """A node that was heard here has, by then, discovered this listener too, which takes DDS up to 3 s."""
-        assert wait_until(lambda: bool(self.all), 30.0), f"nothing on /diagnostics of {self._name}"
+        assert wait_until(lambda: bool(self.all)), f"nothing on /diagnostics of {self._name}"
+
+    def wait_for_server(self) -> None:
+        """Until the node knows a server: one found late in a replay would answer about all of it in one burst."""
+        found = wait_until(lambda: bool(self.all) and "nobody offers" not in self.message)
+        assert found, f"no server found: {self.all[-1:]}"
+
+    def wait_for_news(self) -> None:
+        """Until the values are of after this call: the first that comes may have been on its way before."""
+        known = len(self.all)
+        assert wait_until(lambda: len(self.all) > known + 1), f"no more on /diagnostics of {self._name}"
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -58,10 +68,10 @@ class Status:
     def values(self) -> dict[str, str]:
         return self.all[-1][2] if self.all else {}
 
-    def wait_for(self, key: str, value: str, timeout: float = 30.0) -> None:
+    def wait_for(self, key: str, value: str, timeout: float = START_TIMEOUT) -> None:
         assert wait_until(lambda: self.values.get(key) == value, timeout), f"{key} is not {value}: {self.all[-1:]}"
 
-    def wait_for_message(self, text: str, timeout: float = 30.0) -> str:
+    def wait_for_message(self, text: str, timeout: float = START_TIMEOUT) -> str:
         assert wait_until(lambda: text in self.message, timeout), f"no {text!r} in {self.all[-1:]}"
         return self.message
 
@@ -99,7 +109,7 @@ def assert_same_figures(found: Any, expected: Any) -> None:
         assert found == expected
 
 
-def finish(node: Node, name: str = "push_validator/finish", timeout: float = 30.0) -> Trigger.Response:
+def finish(node: Node, name: str = "push_validator/finish", timeout: float = START_TIMEOUT) -> Trigger.Response:
     client = node.create_client(Trigger, name)
     try:
         return call(client, Trigger.Request(), timeout)
