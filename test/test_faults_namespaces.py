@@ -83,10 +83,10 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
 
 
 def _counted(both: Both, cell: str) -> bool:
-    """Do the diagnostics of a cell tell of all its windows, and the test's requests, by now?"""
+    """Were all residuals of a cell heard, and do its diagnostics tell of all windows and requests, by now?"""
     total = _windows(both, cell)
     judged = both.diagnostics[f"{cell}/push_validator"].get("robot windows") == str(total)
-    return judged and _served(both, cell) >= total + 40
+    return judged and _served(both, cell) >= total + 40 and len(both.heard[cell].residuals) >= total
 
 
 def _windows(both: Both, cell: str) -> int:

@@ -470,7 +470,7 @@ def test_another_rig_ends_the_score_and_a_model_of_another_slider_is_warned_abou
         status.wait_for_server()  # a change of the rig waits 5 s for answers
         with replaying(domain) as replay:
             replay.wait_for_text("finished: published", 60.0)
-        with replaying(domain, recording=CIRCLE, **{"play.delay": 1.0}) as replay:  # the rig comes well before
+        with replaying(domain, recording=CIRCLE) as replay:
             process.wait_for_text(WRITTEN, 60.0)
             assert_same_as_offline(tmp_path, models["analytical"])
             replay.wait_for_text("finished: published", 60.0)

@@ -22,7 +22,7 @@ from push_predictor.evaluation.alarm import DEFAULT_RATE, AlarmState, checked_ra
 from push_predictor.models.push_model import Prediction
 from push_predictor.nodes.model_source import ModelSource
 from push_predictor.nodes.parameters import Param, declare, values_of
-from push_predictor.nodes.polled import DeferredTrigger
+from push_predictor.nodes.polled import DeferredTrigger, PolledGroup, take_all
 from push_predictor.nodes.prediction_client import PredictionClient
 from push_predictor.nodes.push_alarm import PushAlarm as AlarmProcess
 from push_predictor.nodes.qos import LATCHED
@@ -107,7 +107,7 @@ class PushValidator(Node):
         self._speak()
 
     def _listen(self) -> None:
-        self.create_subscription(String, "rig", self._on_rig, LATCHED)
+        self._rigs = self.create_subscription(String, "rig", self._on_rig, LATCHED, callback_group=PolledGroup())
         self.create_subscription(String, "replay_status", self._on_status, LATCHED)
         self._finish = DeferredTrigger(self, "~/finish")
 
@@ -156,6 +156,8 @@ class PushValidator(Node):
         if (models := self._source.models()) is not None:
             self._alarm.prepare(next(iter(models.values())))
         self._alarm.work()
+        for message, *_ in take_all(self._rigs):  # before the samples that came after it
+            self._on_rig(message)
         if self._ending is None:
             self._collect()
             self._ending = self._due()
