@@ -111,7 +111,7 @@ def _paint_story(axes: Axes, story: Story, change: int) -> None:
         xlim=(-2, last + 2),
         ylabel="mean square of the standardised\nresidual of a push (1: as predicted)",
     )
-    axes.legend(loc="lower right", ncols=2)
+    axes.legend(loc="lower center", ncols=2)
     grid(axes)
 
 
