@@ -91,7 +91,7 @@ class Sensors:
 
     def __init__(self, node: Node) -> None:
         kinds = {"slider": PoseStamped, "pusher": PoseStamped, "wrench": WrenchStamped}
-        self._out: dict[str, Publisher] = {n: node.create_publisher(kinds[n], t, 1000) for n, t in TOPICS.items()}
+        self._out: dict[str, Publisher] = {n: node.create_publisher(kinds[n], t, 5000) for n, t in TOPICS.items()}
         self._clock = node.create_publisher(Clock, "/clock", 10)
         for publisher in (*self._out.values(), self._clock):
             assert wait_until(partial(_is_heard, publisher))
@@ -161,7 +161,7 @@ def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) 
         assert "1 ahead (samples whose stamp is ahead" in status.message
         sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor is gone, the others go on
         status.wait_for_message("the wrench is silent")
-        assert process.stop() == 0
+        assert process.stop() == 0, process.text()
     table = read_table(out / "pushes.csv")
     assert len(expected_rows) > 30 and len(table) == len(expected_rows)
     assert table.inputs == pytest.approx(expected_rows.inputs, abs=1e-9)

@@ -83,7 +83,7 @@ class Outcome:
             self.result = json.loads((output / "validation.json").read_text())
             wait_until(lambda: bool(self.alarms and late), 30.0 if self.result["alarm"]["fired"] else 0.5)
             self.late = late
-            assert process.stop() == 0
+            assert process.stop() == 0, process.text()
 
 
 @pytest.fixture(scope="module")

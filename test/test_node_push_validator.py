@@ -114,7 +114,7 @@ def watched(models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
             judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
             assert wait_until(lambda: len(heard.residuals) >= sum(judged) and len(heard.markers) >= judged[0])
             heard.status.wait_for("state", "waiting for samples")
-            assert process.stop() == 0
+            assert process.stop() == 0, process.text()
     return out, heard
 
 
@@ -332,7 +332,7 @@ def test_refused_windows_and_answers_that_are_no_gaussian_are_left_out_and_liste
             reasons = [entry["reason"] for entry in log["refused"]]
             status.wait_for("refused", str(len(reasons)))
             assert f"{len(reasons)} predictions refused" in status.message
-            assert process.stop() == 0
+            assert process.stop() == 0, process.text()
     total = int(count_of_windows(models["gp"]))
     assert result["n_test"] == len(log["windows"]) == total - len(reasons) and log["unanswered"] == 0
     assert {reason.split(":")[0] for reason in reasons} == {"response mean", "covariance", "angle"}
@@ -521,7 +521,7 @@ def test_useless_messages_are_counted_by_kind_and_do_no_harm(domain: int, models
         assert values["pusher rejected not finite"] == "1"
         assert "/slider/pose: 4 of 5 samples rejected" in status.message
         assert finish(node).success
-        assert process.stop() == 0
+        assert process.stop() == 0, process.text()
 
 
 def test_no_markers_are_made_while_nobody_watches(monkeypatch: pytest.MonkeyPatch):

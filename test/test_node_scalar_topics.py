@@ -110,7 +110,7 @@ class Watched:
             with replaying(domain, recording=recording, rate=8.0):
                 process.wait_for_text(WRITTEN, 90.0)
             status.wait_for("state", "waiting for samples")
-            assert process.stop() == 0
+            assert process.stop() == 0, process.text()
         self.output, self.message, self.values = output, status.message, status.values
         self.said = [message for _, message, _ in status.all]
 
