@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from ros_harness import call, free_domain, node_process, ros_context, wait_until
+from ros_harness import acquaint, call, free_domain, node_process, ros_context, wait_until
 from std_msgs.msg import String
 from validator_bench import CIRCLE, HEXAGON, WRITTEN, assert_same_as_offline, replaying
 
@@ -25,7 +25,7 @@ from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.bag import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.msg import PushResidual
-from push_predictor_interfaces.srv import ListModels, PredictPush
+from push_predictor_interfaces.srv import ListModels, PredictPush, Resume
 
 CELLS = {"/cell1": HEXAGON, "/cell2": CIRCLE}
 
@@ -70,7 +70,11 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
         for cell in CELLS:
             found.listed[cell] = call(node.create_client(ListModels, f"{cell}/list_models"), ListModels.Request()).names
         for cell, recording in CELLS.items():
-            stack.enter_context(replaying(domain, "-r", f"__ns:={cell}", recording=recording, rate=10.0))
+            paused = {"play.start_paused": True}  # until it knows who listens here
+            stack.enter_context(replaying(domain, "-r", f"__ns:={cell}", recording=recording, rate=10.0, **paused))
+        for cell in CELLS:
+            acquaint(node, f"{cell}/push_replay")
+            call(node.create_client(Resume, f"{cell}/push_replay/resume"), Resume.Request())
         for k in range(40):
             for cell, client in clients.items():
                 found.answers[cell].append(call(client, _request(k)))

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 import push_predictor
 from push_predictor.errors import PushPredictorError
@@ -51,6 +52,7 @@ def pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     (tmp_path / "pieces_of_work.py").write_text(PIECES)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(REPOSITORY)]))
+    get_reusable_executor().shutdown(wait=True)  # processes that other tests have left know nothing of the module
     import pieces_of_work
 
     yield pieces_of_work

@@ -150,6 +150,8 @@ class PushValidator(Node):
     # --- the work -------------------------------------------------------------------------------------------
 
     def _work(self) -> None:
+        if self._closed.is_set():
+            return  # close() ends what works here, from another thread
         self._inlet.look()
         self._inlet.drain()
         self._source.work()
