@@ -163,16 +163,22 @@ def test_a_chunk_that_lost_bytes_does_not_pass_for_one_that_is_cut_off(bag: Path
     assert any("damaged or cut off" in note for note in notes)
 
 
-def test_zeros_at_the_end_as_after_a_power_cut_cost_no_message_before_them(bag: Path) -> None:
-    """Without chunks, too: the last message is whole, though no record follows it."""
-    with bag.open("wb") as stream:
-        writer = Writer(stream, use_chunking=False)
+def hundred_poses(path: Path, enable_data_crcs: bool = False) -> int:
+    """Write a bag without chunks; answers the byte where its data end."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, use_chunking=False, enable_data_crcs=enable_data_crcs)
         writer.start(profile="ros2")
         channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
         for step in range(100):
             writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
         end = stream.tell()
         writer.finish()
+    return end
+
+
+def test_zeros_at_the_end_as_after_a_power_cut_cost_no_message_before_them(bag: Path) -> None:
+    """Without chunks, too: the last message is whole, though no record follows it."""
+    end = hundred_poses(bag)
     data = bag.read_bytes()
     bag.write_bytes(data[:end] + bytes(5000))
     found, notes = told(bag)
@@ -233,14 +239,7 @@ def test_a_metadata_index_that_points_elsewhere_is_named_and_the_record_found(ba
 
 def test_the_checksum_of_the_whole_data_is_checked_where_it_was_written(tmp_path: Path) -> None:
     path = tmp_path / "sum.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream, use_chunking=False, enable_data_crcs=True)
-        writer.start(profile="ros2")
-        channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
-        for step in range(100):
-            writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
-        end = stream.tell()
-        writer.finish()
+    end = hundred_poses(path, enable_data_crcs=True)
     assert told(path)[1] == []
     data = bytearray(path.read_bytes())
     data[end - 20] ^= 1
