@@ -5,7 +5,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := $(shell find push_predictor msg_adapters launch config scripts -type f -not -name '*.pyc') setup.py setup.cfg package.xml
+SOURCES := $(shell find push_predictor push_predictor_paper msg_adapters launch config scripts -type f -not -name '*.pyc' -not -path '*/build/*' -not -path '*.egg-info/*') setup.py setup.cfg package.xml
 INTERFACES := $(shell find push_predictor_interfaces -type f -not -path '*/build/*')
 # One process or robot must not hear another's demo or tests (ROS_DOMAIN_ID is theirs to choose).
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
@@ -45,5 +45,5 @@ $(VENV)/.interfaces: $(VENV)/.python $(INTERFACES)
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.interfaces $(SOURCES)
-	$(BIN)/pip install -qq '.[report,live,import,test]'
+	$(BIN)/pip install -qq '.[report,live,import,test]' ./push_predictor_paper
 	touch $@

@@ -22,13 +22,13 @@ import numpy as np
 
 from benchmarks.blind import later_spec, rig_of
 from benchmarks.blind_score import wilson
-from push_predictor.evaluation.alarm import AlarmState
-from push_predictor.evaluation.alarm_scores import Calibration, calibrate, judged
+from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.evaluation.alarm.scores import Calibration, calibrate, judged
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.window_finder import find_windows
-from push_predictor.recordings.windows import windows_to_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.simulation.changes import Changes, Moment
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig

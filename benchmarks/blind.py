@@ -40,10 +40,10 @@ from benchmarks.blind_effects import (
 from benchmarks.blind_library import library_without
 from benchmarks.blind_oracle import oracle_gain
 from benchmarks.blind_score import markdown_of, score_of
-from push_predictor.models.model_file import save_model
+from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.recordings.window_finder import find_windows
-from push_predictor.recordings.windows import windows_to_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.batches import conditions_of, end_times
 from push_predictor.simulation.changes import Changes, Conditions, Topic
@@ -227,8 +227,8 @@ def drawn_for(spec: SimulationSpec, group: str, rng: np.random.Generator) -> Dra
 
 def trace_one(folder: Path, alpha: float, without: str | None) -> dict[str, Any]:
     """The verdict on one recording, with the seconds of processor time that it took."""
+    from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.trace import trace_data
-    from push_predictor.residuals.trace_json import trace_json
 
     begin = time.process_time()
     try:

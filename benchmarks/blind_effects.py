@@ -14,7 +14,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.simulation.changes import Changes, Conditions, Moment
-from push_predictor.simulation.scatter import Scatter, knots_for, mixed
+from push_predictor.simulation.noise import Scatter, knots_for, mixed
 from push_predictor.simulation.sensors import Faults
 from push_predictor.simulation.slider import pressure_patterns, support_points
 from push_predictor.types import Array
@@ -63,7 +63,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Driver:
-    """What a kind is driven by. covariates: its names in the contract; form: of push_predictor.models.forms."""
+    """What a kind is driven by. covariates: its names in the contract; form: see models.effects.driver_basis."""
 
     name: str
     covariates: tuple[str, ...]

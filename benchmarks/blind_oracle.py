@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.forms import Form
+from push_predictor.models.effects.driver_basis import Form
 from push_predictor.models.mechanisms import LIBRARY
-from push_predictor.models.model_file import load_model
+from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.drivers import standard_form, two_dimensional
-from push_predictor.residuals.extension import extend, gain, refit_base
-from push_predictor.residuals.loading import load_evidence
-from push_predictor.residuals.split import held_out_rows
+from push_predictor.residuals.evidence.drivers import standard_form, two_dimensional
+from push_predictor.residuals.evidence.loading import load_evidence
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.extension.extension import extend, gain, refit_base
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:

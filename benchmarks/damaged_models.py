@@ -3,7 +3,7 @@
     python -m benchmarks.damaged_models --copies 2000
 
 A copy is refused by ModelFileError, or answers exactly as the whole file does. Anything else ends the run with the seed
-and the number of the copy. CI makes 60 of each kind in test/test_faults_models.py.
+and the number of the copy. CI makes 60 of each kind in test/faults/test_faults_models.py.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
+TESTS = Path(__file__).resolve().parents[1] / "test"
+sys.path[:0] = [str(TESTS / "faults"), str(TESTS / "support")]
 
-from test_faults_models import KINDS, damaged, same, told, trained
+from test_faults_models import KINDS, damaged, same, told, trained  # noqa: E402 (after the path)
 
-from push_predictor.errors import ModelFileError
-from push_predictor.models.model_file import load_model, save_model
+from push_predictor.errors import ModelFileError  # noqa: E402 (after the path)
+from push_predictor.models.store.model_file import load_model, save_model  # noqa: E402 (after the path)
 
 
 def main() -> None:

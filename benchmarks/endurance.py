@@ -29,8 +29,8 @@ from typing import Any
 from server_under_test import Caller, caller, graph, load, process
 from vitals import Vitals, growth, vitals
 
-from push_predictor.recordings.bag import open_bag
-from push_predictor.share import DEFAULT_MODEL, share_path
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.resources import DEFAULT_MODEL, share_path
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / "bags" / "square_abs_test"

@@ -18,12 +18,12 @@ from time import perf_counter
 import numpy as np
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.effects import Effect
-from push_predictor.models.forms import Form
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import ExtendedBody, Prediction, PushModel
-from push_predictor.models.served import serve
+from push_predictor.models.tabulated.tabulated_model import serve
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

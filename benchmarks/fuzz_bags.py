@@ -38,7 +38,7 @@ from random import Random
 
 from benchmarks.bag_damage import KINDS, Copy, Form, damaged, forms, write_form
 from push_predictor.errors import PushPredictorError
-from push_predictor.recordings.bag import open_bag
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.describe import describe_recording
 
 SLACK = 128_000  # bytes: notes, summary, the buffers of files

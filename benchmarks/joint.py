@@ -17,19 +17,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from push_predictor_paper.fits.fits import SPLIT_WORDS, Fit, SplitName, split_of
+from push_predictor_paper.fits.fits import trained as trained_on_split
 
 from benchmarks.measured_square import SIZES, imported_square
 from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap
 from push_predictor.evaluation.validation import by_push
-from push_predictor.models.bodies import LearnedBody
 from push_predictor.models.correlation import Correlation
 from push_predictor.models.correlation_fit import fit_correlation
+from push_predictor.models.predictors import LearnedBody
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
-from push_predictor.paper.fits import SPLIT_WORDS, Fit, SplitName, split_of
-from push_predictor.paper.fits import trained as trained_on_split
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array

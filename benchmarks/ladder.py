@@ -21,23 +21,23 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.tally import tally
-from push_predictor.models.bodies import ExtendedBody
-from push_predictor.models.effects import Effect, mechanism_named
+from push_predictor.evaluation.push_scores import tally
+from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.predictors import ExtendedBody
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates import Candidate, candidates_of
-from push_predictor.residuals.drivers import driver_names
-from push_predictor.residuals.evidence import evidence_of
-from push_predictor.residuals.extension import compared, extend, gain, physics_of
-from push_predictor.residuals.inputs_basis import inputs_basis
-from push_predictor.residuals.loading import Loaded, load_evidence
+from push_predictor.residuals.candidates.candidates import Candidate, candidates_of
+from push_predictor.residuals.evidence.drivers import driver_names
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.loading import Loaded, load_evidence
+from push_predictor.residuals.evidence.residuals import evidence_of
+from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.extension.extension import compared, extend, gain, physics_of
 from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.search import Term, search
-from push_predictor.residuals.split import digest_of, held_out_rows
+from push_predictor.residuals.selection.search import Term, search
 from push_predictor.types import Array
 
 ALPHA = 0.05  # of a step; the gate guards against what this lets in

@@ -27,7 +27,7 @@ from load_client import MANY, SINGLE, TIMEOUT
 from server_under_test import caller, graph, load, predict_server
 from vitals import Growth, Vitals, growth, vitals
 
-from push_predictor.share import DEFAULT_MODEL, share_path
+from push_predictor.resources import DEFAULT_MODEL, share_path
 
 A_PROCESS = 10  # clients; with a process each, localhost discovery would not find them all
 WARM_UP = 60.0  # s

@@ -18,13 +18,13 @@ import numpy as np
 from benchmarks.measured_scores import HEAD, Fold, figures, pooled, total, trained
 from benchmarks.measured_square import mit_square_tables
 from push_predictor.evaluation.metrics import nmse
-from push_predictor.models.analytical import AnalyticalPush, fit_analytical
+from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording, require_rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.window_finder import find_windows
-from push_predictor.recordings.windows import PushWindow, WindowOptions
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.types import Array
 
 BLOCKS = {"Al": "aluminium", "St": "steel"}

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from push_predictor_paper.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 
-from push_predictor.evaluation import tally as tallies
+from push_predictor.evaluation import push_scores as tallies
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
-from push_predictor.evaluation.tally import Tally
+from push_predictor.evaluation.push_scores import Tally
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
-from push_predictor.paper.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from push_predictor_paper.data.corpus import PushSet
+from push_predictor_paper.fits.fits import KINDS, Fit, Score, SplitName, score
 
 from benchmarks.measured_scores import HEAD, difference, figures
+from push_predictor.evaluation.push_scores import pooled
 from push_predictor.evaluation.splits import FOLDS
-from push_predictor.evaluation.tally import pooled
-from push_predictor.paper.corpus import PushSet
-from push_predictor.paper.fits import KINDS, Fit, Score, SplitName, score
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 

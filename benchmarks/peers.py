@@ -26,11 +26,11 @@ from benchmarks.measured_square import imported_square
 from benchmarks.training import cpu_seconds, fit_reference, made_up_pushes
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.splits import random_split, split_by_push
-from push_predictor.models.gp import fit_gp
-from push_predictor.models.prediction import LatentPrediction
-from push_predictor.models.quadrature import exact_log_density, gaussian_log_density
-from push_predictor.models.sparse_fit import fit_sparse_vhgp
-from push_predictor.models.vhgp import fit_vhgp
+from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
+from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
+from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.types import Array, IntArray
 
 SPARSE_FROM = 500

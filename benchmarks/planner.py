@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.planner_table import Regime, Runs, table
-from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import Prediction, PushModel
-from push_predictor.models.served import ServedModel, serve
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
 from push_predictor.models.train import train_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
@@ -31,7 +31,7 @@ from push_predictor.planning.persistence import persistence_of
 from push_predictor.planning.repertoire import Repertoire, every_line, repertoire
 from push_predictor.planning.unscented import Predict, Tip
 from push_predictor.recordings.load import load_data, load_rig_for
-from push_predictor.simulation.one_push import push_once
+from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array, TextArray

@@ -19,11 +19,11 @@ import numpy as np
 
 from benchmarks.planner import AREA, SEED, VARIANTS, WINDOW, repertoires_of, trained
 from push_predictor.geometry.frames import to_body
-from push_predictor.models.model_file import load_model
-from push_predictor.models.served import serve
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import serve
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.repertoire import Repertoire
-from push_predictor.simulation.one_push import push_once
+from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array, IntArray

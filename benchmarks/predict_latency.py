@@ -40,11 +40,11 @@ from server_under_test import (
 )
 from std_srvs.srv import Trigger
 
-from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.served import ServedModel, serve
-from push_predictor.nodes.direct_service import DirectService
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
 from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.server.direct_service import DirectService
 from push_predictor_interfaces.srv import PredictPush
 
 BLOCK = 20

@@ -27,7 +27,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 
-from push_predictor.recordings.bag import open_bag
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import SimulationSpec, simulate

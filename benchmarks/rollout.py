@@ -34,9 +34,9 @@ from benchmarks.rollout_truth import (
     weights_of,
 )
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.served import ServedModel, serve
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
 from push_predictor.models.train import train_model
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
 from push_predictor.planning.push_windows import windows_of

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.rollout_truth import repeats
-from push_predictor.evaluation.figures.canvas import OBSERVED, PREDICTED, START, draw
 from push_predictor.evaluation.unimodality import dip, p_values
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.served import ServedModel
+from push_predictor.models.tabulated.tabulated_model import ServedModel
 from push_predictor.planning.rollout import rollout
+from push_predictor.reporting.canvas import OBSERVED, PREDICTED, START, draw
 from push_predictor.types import Array
 
 if TYPE_CHECKING:

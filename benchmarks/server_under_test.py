@@ -21,9 +21,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.model_file import save_model
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable

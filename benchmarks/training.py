@@ -21,9 +21,9 @@ import numpy as np
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from push_predictor.models.gp import fit_gp
-from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.vhgp import VHGP, fit_vhgp
+from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.types import Array
 
 CHOICES = {"SE": DEFAULT_CHOICE, "Matern + nugget": KernelChoice("matern52", noise_nugget=True)}

@@ -23,12 +23,12 @@ import numpy as np
 from examples.live_table import LiveTable
 from examples.loop import close_the_loop
 from examples.processes import node
-from push_predictor.evaluation.figures.readme import readme_picture
 from push_predictor.evaluation.offline import report_windows, validate_recording
+from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.validation import Comparison, metrics_json
-from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
-from push_predictor.recordings.windows import windows_to_table
+from push_predictor.models.store.model_file import load_model
+from push_predictor.recordings.windows.push_window import windows_to_table
 
 ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"

@@ -25,11 +25,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
 from examples.processes import LOGS, node
-from push_predictor.evaluation.figures.canvas import draw
 from push_predictor.geometry.outline import Outline
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.window_markers import LIMIT
+from push_predictor.nodes.validator.window_markers import LIMIT
 from push_predictor.recordings.load import load_rig_for
+from push_predictor.reporting.canvas import draw
 from push_predictor_interfaces.msg import PushResidual
 
 if TYPE_CHECKING:

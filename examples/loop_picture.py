@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from push_predictor.evaluation.figures.canvas import COLOURS, NEARBY, draw, grid
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
-from push_predictor.models.model_file import load_model
+from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.loading import load_evidence
+from push_predictor.reporting.canvas import COLOURS, NEARBY, draw, grid
+from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.types import Array
 
 if TYPE_CHECKING:

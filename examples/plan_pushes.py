@@ -22,14 +22,14 @@ from examples.planner_picture import Step, draw_pushes
 from examples.processes import LOGS, node
 from push_predictor.errors import PushPredictorError
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.model_file import load_model
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.persistence import persistence_of
 from push_predictor.planning.repertoire import Repertoire, every_line, repertoire
 from push_predictor.planning.unscented import Tip
-from push_predictor.simulation.one_push import push_once
+from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from push_predictor.evaluation.figures.canvas import NEARBY, OBSERVED, PREDICTED, draw
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.planning.choose import Choice
 from push_predictor.planning.goal import Goal
+from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, draw
 from push_predictor.types import Array
 
 if TYPE_CHECKING:

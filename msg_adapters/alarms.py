@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msg_adapters import MessageError
 from msg_adapters.stamps import ns_to_stamp
-from push_predictor.evaluation.alarm import AlarmState
+from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor_interfaces.msg import PushAlarm
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from push_predictor.recordings.definitions import HEADER_DEFINITION
+from push_predictor.recordings.bag.definitions import HEADER_DEFINITION
 
 RESIDUAL_TYPE = "push_predictor_interfaces/msg/PushResidual"
 RESIDUAL_DEFINITION = f"""std_msgs/Header header

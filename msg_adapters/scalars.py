@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from msg_adapters.streams import LIMIT
-from push_predictor.recordings.cdr import decode
-from push_predictor.recordings.definitions import SCALAR_LAYOUTS
+from push_predictor.recordings.bag.cdr import decode
+from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.types import BoolArray
 

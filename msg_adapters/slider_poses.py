@@ -15,7 +15,7 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import yaw_of_quaternion
 from push_predictor.geometry.spatial import SpatialPose
 from push_predictor.planning.slider_pose import SliderAfter, WorldPush
-from push_predictor.recordings.windows import WindowOptions
+from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
 
 FLAT = 0.1  # rad out of the plane: there a projection is off by 0.5 %

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.geometry.frames import yaw_of_quaternion
-from push_predictor.recordings.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, decode
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, decode
 from push_predictor.recordings.streams import PoseStream, WrenchStream
 from push_predictor.types import Array, BoolArray
 

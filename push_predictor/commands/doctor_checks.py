@@ -41,8 +41,8 @@ def model_predicts(given: Path | None) -> Finding:
     try:
         import numpy as np
 
-        from push_predictor.models.model_file import load_model
-        from push_predictor.share import DEFAULT_MODEL, share_path
+        from push_predictor.models.store.model_file import load_model
+        from push_predictor.resources import DEFAULT_MODEL, share_path
 
         path = given or share_path(*DEFAULT_MODEL)
         model = load_model(path)

@@ -27,8 +27,8 @@ def run(options: argparse.Namespace) -> None:
     """Evaluate and print; warn where a push was trained on, or the data are of another slider."""
     from push_predictor.evaluation.offline import rig_difference
     from push_predictor.evaluation.validation import compare, metrics_json, trained_on
-    from push_predictor.models.model_file import load_model
     from push_predictor.models.request import check_table
+    from push_predictor.models.store.model_file import load_model
     from push_predictor.recordings.load import known_rig, load_data
     from push_predictor.recordings.rig import load_rig
 

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _describe_model(path: Path) -> dict[str, object]:
-    from push_predictor.models.model_file import load_model
+    from push_predictor.models.store.model_file import load_model
 
     model = load_model(path)
     low, high = model.training.inputs.min(axis=0), model.training.inputs.max(axis=0)

@@ -31,8 +31,8 @@ def run(options: argparse.Namespace) -> None:
     """Check, predict, print."""
     import numpy as np
 
-    from push_predictor.models.model_file import load_model
     from push_predictor.models.request import check_request
+    from push_predictor.models.store.model_file import load_model
 
     model = load_model(options.model)
     covariates = dict(_covariate(text) for text in options.covariate)

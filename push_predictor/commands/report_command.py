@@ -61,10 +61,11 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _paper(options: argparse.Namespace) -> None:
+    from push_predictor_paper.plan import FULL, QUICK
+    from push_predictor_paper.report import report_paper
+    from push_predictor_paper.work import Work
+
     from push_predictor.commands.progress_bar import ProgressBar
-    from push_predictor.paper.plan import FULL, QUICK
-    from push_predictor.paper.report import report_paper
-    from push_predictor.paper.work import Work
 
     if options.jobs is not None and options.jobs < 1:
         raise RequestError("--jobs", options.jobs, "a number from 1 on")
@@ -98,7 +99,7 @@ def _validation(options: argparse.Namespace) -> None:
     import json
 
     from push_predictor.evaluation.offline import report_recording
-    from push_predictor.models.model_file import load_model
+    from push_predictor.models.store.model_file import load_model
 
     if (options.model is None) != (options.recording is None):
         missing = "--model" if options.model is None else "--recording"

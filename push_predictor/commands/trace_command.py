@@ -47,8 +47,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Trace, write what was asked for, say what was found."""
     from push_predictor.recordings.rig import load_rig
+    from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.trace import trace_data
-    from push_predictor.residuals.trace_json import trace_json
 
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
@@ -77,14 +77,14 @@ def _names(text: str) -> list[str]:
 
 
 def _write_report(path: Path, found: Trace) -> None:
-    from push_predictor.residuals.report import write_trace_report
+    from push_predictor.residuals.reporting.page import write_trace_report
 
     write_trace_report(path, found)
 
 
 def _save(path: Path | None, found: Trace) -> bool:
     """Save the extended model where there is one; else say so."""
-    from push_predictor.models.model_file import save_model
+    from push_predictor.models.store.model_file import save_model
 
     if path is None:
         return False
@@ -97,7 +97,7 @@ def _save(path: Path | None, found: Trace) -> bool:
 
 
 def _print(found: Trace, options: argparse.Namespace, saved: bool) -> None:
-    from push_predictor.residuals.summary import summary_lines
+    from push_predictor.residuals.reporting.summary import summary_lines
 
     print("\n".join(summary_lines(found)))
     if options.report is not None:

@@ -46,10 +46,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Load, train, save."""
-    from push_predictor.models.model_file import save_model
+    from push_predictor.models.store.model_file import save_model
     from push_predictor.models.train import inducing_inputs, train_model, training_rows
     from push_predictor.recordings.load import load_data, load_rig_for
-    from push_predictor.recordings.windows import WindowOptions
+    from push_predictor.recordings.windows.push_window import WindowOptions
 
     check_data(options.data)
     check_seed(options.seed)

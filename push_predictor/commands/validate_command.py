@@ -27,13 +27,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Validate and print; warn where the model is of another rig, or a push was trained on."""
-    from push_predictor.evaluation.alarm_scores import alarm_about
+    from push_predictor.evaluation.alarm.scores import alarm_about
     from push_predictor.evaluation.offline import recording_rig, rig_difference, validate_recording
     from push_predictor.evaluation.validation import metrics_json, trained_on
-    from push_predictor.evaluation.window_log import write_window_log
-    from push_predictor.models.model_file import load_model
+    from push_predictor.models.store.model_file import load_model
+    from push_predictor.online.window_log import write_window_log
     from push_predictor.recordings.rig import load_rig
-    from push_predictor.recordings.windows import windows_to_table
+    from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows)
     model = load_model(options.model)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.evaluation.push_scores import Tally, Totals
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.evaluation.tally import Tally, Totals
 from push_predictor.types import Array
 
 Figure = Callable[[Totals], Array]  # (d,) of d draws

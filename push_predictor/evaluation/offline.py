@@ -11,14 +11,14 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
-from push_predictor.models.served import serve
-from push_predictor.recordings.bag import open_bag
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
-from push_predictor.recordings.stream_faults import recording_faults
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.window_finder import WindowFinder
-from push_predictor.recordings.windows import PushWindow, WindowOptions, windows_to_table
+from push_predictor.recordings.windows.finder import WindowFinder
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
+from push_predictor.recordings.windows.stream_faults import recording_faults
 
 
 def recorded_windows(
@@ -99,7 +99,9 @@ def report_windows(
     more: Mapping[str, str] | None = None,
 ) -> Path:
     """The same for windows that were predicted already, by a server for instance; more: further facts for the page."""
-    from push_predictor.evaluation.report import write_validation_report  # matplotlib: only where pictures are made
+    from push_predictor.evaluation.report.page import (
+        write_validation_report,  # matplotlib: only where pictures are made
+    )
 
     table = windows_to_table(windows)
     seen = trained_on(models[0], table)

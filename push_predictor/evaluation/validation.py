@@ -11,7 +11,7 @@ from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussia
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.recordings.windows import TIMED_ID
+from push_predictor.recordings.windows.push_window import TIMED_ID
 from push_predictor.types import Array
 
 

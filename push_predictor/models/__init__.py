@@ -1,1 +1,4 @@
-"""Models of one push: Gaussian process, variational heteroscedastic GP, analytical."""
+"""Models of one push: from velocity, contact point and angle to the mean and covariance of the displacement.
+
+Start with `push_model`, `train` and `store.model_file`; the folders hold the parts that they are made of.
+"""

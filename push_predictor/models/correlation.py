@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
 from push_predictor.types import Array, IntArray
 
 PAIRS = ((0, 1), (0, 2), (1, 2))

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.bodies import LearnedBody
 from push_predictor.models.correlation import Correlation, correlations, covariances
-from push_predictor.models.left_out import left_out
+from push_predictor.models.gaussian_process.cross_validation import left_out
+from push_predictor.models.predictors import LearnedBody
 from push_predictor.types import Array, IntArray
 
 BANDWIDTHS = (0.2, 0.3, 0.4, 0.6, 0.9, 1.4, 2.5)  # standard deviations of the features

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.bodies import AnalyticalBody, ExtendedBody, LearnedBody, Scaling, scaled_features
-from push_predictor.models.covariate_range import CovariateRange, range_of
+from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import AnalyticalBody, ExtendedBody, LearnedBody, Scaling, scaled_features
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray

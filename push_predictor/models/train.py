@@ -9,11 +9,14 @@ import numpy as np
 
 from push_predictor import __version__
 from push_predictor.errors import TrainingError
-from push_predictor.models.analytical import AnalyticalPush, fit_analytical
 from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.features import push_features
-from push_predictor.models.gp import GaussianProcess, fit_gp
-from push_predictor.models.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
 from push_predictor.models.push_model import (
     KINDS,
     AnalyticalBody,
@@ -23,9 +26,6 @@ from push_predictor.models.push_model import (
     Scaling,
     scaled_features,
 )
-from push_predictor.models.sparse_fit import DEFAULT_INDUCING, fit_sparse_vhgp
-from push_predictor.models.sparse_vhgp import SparseVHGP
-from push_predictor.models.vhgp import VHGP, fit_vhgp
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray

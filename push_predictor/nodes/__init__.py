@@ -1,1 +1,4 @@
-"""The ROS 2 nodes: wiring alone, the work is in the library."""
+"""The ROS 2 nodes `predict_server`, `push_replay` and `push_validator`, and what they share.
+
+Each node has a folder for its parts; nothing outside this folder imports from it, except the command `doctor`.
+"""

@@ -87,7 +87,7 @@ def middleware() -> dict[str, str]:
     """Which RMW, which domain, and how far it looks for others."""
     from rclpy.utilities import get_rmw_implementation_identifier
 
-    from push_predictor.nodes.strangers import DISCOVERY, limit_discovery
+    from push_predictor.nodes.network_security import DISCOVERY, limit_discovery
 
     told = ", ".join(f"{name}={os.environ[name]}" for name in DISCOVERY if os.environ.get(name))
     far = "this machine alone, the default of these nodes" if limit_discovery() else told
@@ -106,7 +106,7 @@ def shared_memory() -> dict[str, str]:
 
 def security() -> dict[str, str]:
     """Whether the security that was asked for can be had."""
-    from push_predictor.nodes.strangers import ENABLE, SecurityError, require_security, security_compiled_in
+    from push_predictor.nodes.network_security import ENABLE, SecurityError, require_security, security_compiled_in
 
     try:
         require_security()

@@ -22,19 +22,19 @@ from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.nodes.answers import answer_batch, answer_list, answer_load, answer_push
-from push_predictor.nodes.direct_service import DirectService
-from push_predictor.nodes.heartbeat import Heartbeat
-from push_predictor.nodes.model_shelf import SHIPPED, ModelShelf
+from push_predictor.models.store.model_registry import SHIPPED, ModelShelf
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.pose_answers import answer_slider_pose
-from push_predictor.nodes.request_frames import RequestFrames
-from push_predictor.nodes.request_log import RequestLog
-from push_predictor.nodes.residual_tracer import ResidualTracer
-from push_predictor.nodes.rollout_answers import answer_rollout
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.nodes.server_parameters import INTROSPECTION, PARAMETERS
-from push_predictor.nodes.server_status import NO_MODEL, server_status
+from push_predictor.nodes.server.answers import answer_batch, answer_list, answer_load, answer_push
+from push_predictor.nodes.server.direct_service import DirectService
+from push_predictor.nodes.server.heartbeat import Heartbeat
+from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
+from push_predictor.nodes.server.pose_answers import answer_slider_pose
+from push_predictor.nodes.server.request_frames import RequestFrames
+from push_predictor.nodes.server.request_log import RequestLog
+from push_predictor.nodes.server.residual_tracer import ResidualTracer
+from push_predictor.nodes.server.rollout_answers import answer_rollout
+from push_predictor.nodes.server.status import NO_MODEL, server_status
 from push_predictor_interfaces.srv import (
     ListModels,
     LoadModel,

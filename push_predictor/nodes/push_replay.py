@@ -22,18 +22,18 @@ from std_msgs.msg import String
 
 from push_predictor.errors import RigError
 from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
-from push_predictor.nodes.replay_clock import SECOND, PlayerClock, SystemWall, sharpen_sleep
-from push_predictor.nodes.replay_controls import ReplayControls
-from push_predictor.nodes.replay_options import ReplayOptions, read_options
-from push_predictor.nodes.replay_patience import Patience
-from push_predictor.nodes.replay_player import Outlet, ReplayPlayer
-from push_predictor.nodes.replay_report import ReplayReport
-from push_predictor.nodes.replay_source import BagSource
-from push_predictor.nodes.replay_topics import ReplayTopics, Restamper
+from push_predictor.nodes.replay.controls import ReplayControls
+from push_predictor.nodes.replay.options import ReplayOptions, read_options
+from push_predictor.nodes.replay.topics import ReplayTopics, Restamper
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.recordings.bag import Bag, RawMessage, open_bag
+from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
-from push_predictor.share import share_path
+from push_predictor.replay.back_pressure import Patience
+from push_predictor.replay.clock import SECOND, PlayerClock, SystemWall, sharpen_sleep
+from push_predictor.replay.player import Outlet, ReplayPlayer
+from push_predictor.replay.source import BagSource
+from push_predictor.replay.summary import ReplayReport
+from push_predictor.resources import share_path
 
 _PUSH_TOPICS = ("slider/pose", "pusher/pose", "pusher/wrench")
 

@@ -18,23 +18,23 @@ from visualization_msgs.msg import MarkerArray
 from msg_adapters.alarms import alarm_to_message
 from msg_adapters.diagnostics import diagnostic_array
 from push_predictor.errors import PushPredictorError, RequestError, RigError
-from push_predictor.evaluation.alarm import DEFAULT_RATE, AlarmState, checked_rate
+from push_predictor.evaluation.alarm.evidence import DEFAULT_RATE, AlarmState, checked_rate
 from push_predictor.models.push_model import Prediction
-from push_predictor.nodes.model_source import ModelSource
 from push_predictor.nodes.parameters import Param, declare, values_of
-from push_predictor.nodes.polled import DeferredTrigger, PolledGroup, take_all
-from push_predictor.nodes.prediction_client import PredictionClient
-from push_predictor.nodes.push_alarm import PushAlarm as AlarmProcess
+from push_predictor.nodes.polling import DeferredTrigger, PolledGroup, take_all
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.report_writer import ReportWriter
-from push_predictor.nodes.residual_recorder import ResidualJournal
 from push_predictor.nodes.runtime import Stop, one_line, run
-from push_predictor.nodes.sensor_inlet import SensorInlet
-from push_predictor.nodes.validation_run import ValidationRun
-from push_predictor.nodes.validator_status import fired_text, validator_status
-from push_predictor.nodes.window_markers import window_markers
+from push_predictor.nodes.validator.model_source import ModelSource
+from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.residual_recorder import ResidualJournal
+from push_predictor.nodes.validator.sensor_subscriber import SensorInlet
+from push_predictor.nodes.validator.status import fired_text, validator_status
+from push_predictor.nodes.validator.validation_run import ValidationRun
+from push_predictor.nodes.validator.window_markers import window_markers
+from push_predictor.online.alarm_process import PushAlarm as AlarmProcess
+from push_predictor.online.report_process import ReportWriter
 from push_predictor.recordings.rig import Rig, load_rig, rig_from_json
-from push_predictor.recordings.windows import PushWindow
+from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor_interfaces.msg import PushAlarm, PushResidual
 
 PERIOD = 0.02  # s between two looks at what has arrived

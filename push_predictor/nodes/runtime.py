@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.nodes.strangers import LIMITED, limit_discovery, require_security, security_hint
+from push_predictor.nodes.network_security import LIMITED, limit_discovery, require_security, security_hint
 
 _GRAPH_ERRORS = (
     rclpy_implementation.RCLError,

@@ -15,7 +15,7 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.served import ServedModel
+from push_predictor.models.tabulated.tabulated_model import ServedModel
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.planning.push_windows import PushWindows, windows_of
 from push_predictor.planning.straight_drive import Meeting, drive_onto

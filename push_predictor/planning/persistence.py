@@ -21,11 +21,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.optimize import nnls
 
-from push_predictor.models.bodies import ExtendedBody, LearnedBody
-from push_predictor.models.left_out import moments_left_out
+from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import ExtendedBody, LearnedBody
 from push_predictor.models.push_model import PushModel
-from push_predictor.ranks import normal_scores
+from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 

@@ -16,7 +16,7 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_request
-from push_predictor.models.served import ServedModel
+from push_predictor.models.tabulated.tabulated_model import ServedModel
 from push_predictor.planning.particles import OF_THE_POSE, model_of, push_particles, refuse_other_covariates
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of

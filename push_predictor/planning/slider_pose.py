@@ -11,12 +11,12 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
-from push_predictor.models.covariate_range import HEADINGS
+from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_request
-from push_predictor.models.served import ServedModel
+from push_predictor.models.tabulated.tabulated_model import ServedModel
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.windows import WindowOptions
+from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
 
 # m, as in the windows a model learns from: no force tells here, so the gap must be as small as where none was recorded;

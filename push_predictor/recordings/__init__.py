@@ -1,1 +1,4 @@
-"""Recorded pushes: streams in and out, the rig they were made on, and the windows cut out of them."""
+"""Recorded pushes: streams, rigs and push tables, and how they are read and written.
+
+Import `read`, `load`, `streams`, `rig` and `table`; `bag`, `windows` and `importers` have folders of their own.
+"""

@@ -9,7 +9,7 @@ import numpy as np
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.table_file import read_table, rig_beside
-from push_predictor.recordings.window_finder import find_windows
+from push_predictor.recordings.windows.finder import find_windows
 
 
 def describe_recording(path: Path) -> dict[str, object]:

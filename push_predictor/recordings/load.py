@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError, RigError
-from push_predictor.recordings.bag import open_bag
+from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.table_file import is_recording, read_table, rig_beside, rig_path
-from push_predictor.recordings.window_finder import find_windows
-from push_predictor.recordings.windows import WindowOptions, windows_to_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 
 
 def load_data(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> PushTable:

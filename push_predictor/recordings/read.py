@@ -10,10 +10,10 @@ import numpy as np
 
 from push_predictor.errors import RecordingError, RigError
 from push_predictor.geometry.frames import yaw_of_quaternion
-from push_predictor.recordings.bag import Bag, open_bag
-from push_predictor.recordings.bag_writer import absolute
-from push_predictor.recordings.cdr import POSE_STAMPED, WRENCH_STAMPED, Columns, Layout, decode
-from push_predictor.recordings.definitions import POSE, SCALAR_LAYOUTS, WRENCH
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Columns, Layout, decode
+from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
+from push_predictor.recordings.bag.reader import Bag, open_bag
+from push_predictor.recordings.bag.writer import absolute
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, rig_from_record
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import TopicNames

@@ -10,9 +10,9 @@ import numpy as np
 
 from push_predictor.errors import RecordingError
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.recordings.bag_writer import BagWriter
-from push_predictor.recordings.cdr import POSE_STAMPED, WRENCH_STAMPED, encode
-from push_predictor.recordings.definitions import FLOAT64, POSE, SCALAR_LAYOUTS, WRENCH, MessageType
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, encode
+from push_predictor.recordings.bag.definitions import FLOAT64, POSE, SCALAR_LAYOUTS, WRENCH, MessageType
+from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.rig import RECORD_NAME
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.topics import TopicNames

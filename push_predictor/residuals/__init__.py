@@ -1,1 +1,4 @@
-"""The residual loop: find what a model leaves over, trace it to an effect the model lacks, add it, measure again."""
+"""The residual loop: find what a model fails to explain, trace it to an effect, add it, measure again.
+
+Import `trace`, `outcome` and `reporting`; the folders are the steps that docs/residuals.md numbers.
+"""

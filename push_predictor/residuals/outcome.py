@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.effects import Effect
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array

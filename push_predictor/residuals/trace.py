@@ -14,24 +14,24 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.offline import window_options
-from push_predictor.models.bodies import ExtendedBody
-from push_predictor.models.effects import Effect
-from push_predictor.models.model_file import load_model
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.predictors import ExtendedBody
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.corrections import NO_STREAMS, correct
-from push_predictor.residuals.drivers import CONSTANT
-from push_predictor.residuals.effect_size import size_of
-from push_predictor.residuals.evidence import evidence_of
-from push_predictor.residuals.extension import Term, compared, estimate, extend, gain, physics_of, refit_base
-from push_predictor.residuals.loading import Loaded, cut_anew, load_evidence, previous_residual
-from push_predictor.residuals.measurement import MeasurementError, MeasurementFinding, measurement_errors
-from push_predictor.residuals.motion import MotionFinding, MotionTerm, motion_effects
-from push_predictor.residuals.notes import CUT_AGAIN, notes_of, notes_of_data
+from push_predictor.residuals.channels.corrections import NO_STREAMS, correct
+from push_predictor.residuals.channels.measurement import MeasurementError, MeasurementFinding, measurement_errors
+from push_predictor.residuals.channels.motion import MotionFinding, MotionTerm, motion_effects
+from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
+from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.evidence.loading import Loaded, cut_anew, load_evidence, previous_residual
+from push_predictor.residuals.evidence.residuals import evidence_of
+from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.extension.effect_size import size_of
+from push_predictor.residuals.extension.extension import Term, compared, estimate, extend, gain, physics_of, refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
-from push_predictor.residuals.split import digest_of, held_out_rows
-from push_predictor.residuals.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
+from push_predictor.residuals.reporting.notes import CUT_AGAIN, notes_of, notes_of_data
 
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts

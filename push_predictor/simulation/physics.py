@@ -11,7 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.simulation.changes import PLAIN, Changes, Conditions, Moment
-from push_predictor.simulation.scatter import Scatter
+from push_predictor.simulation.noise import Scatter
 from push_predictor.simulation.surface import FrictionField
 from push_predictor.types import Array
 

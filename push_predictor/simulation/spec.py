@@ -9,9 +9,9 @@ import numpy as np
 
 from push_predictor.recordings.rig import Rig
 from push_predictor.simulation.changes import PLAIN, Changes, Topic
+from push_predictor.simulation.noise import Scatter, knots_for, mixed
 from push_predictor.simulation.physics import Physics
 from push_predictor.simulation.pushes import PushPlan
-from push_predictor.simulation.scatter import Scatter, knots_for, mixed
 from push_predictor.simulation.sensors import FAULTLESS, Faults, Sensors
 from push_predictor.simulation.slider import (
     Slider,

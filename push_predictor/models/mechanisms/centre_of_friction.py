@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
 

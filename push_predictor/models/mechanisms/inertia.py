@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.geometry.frames import rotate
-from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.friction_gradient import SQUARE_OF_SPREAD
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.models.mechanisms.perturbed import Change, State, no_change, response_to

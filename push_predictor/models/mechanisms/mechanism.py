@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.types import Array
 
 

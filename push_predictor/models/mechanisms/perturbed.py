@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.models.analytical import AnalyticalPush
-from push_predictor.models.limit_surface import contact_force
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.limit_surface import contact_force
 from push_predictor.models.mechanisms.mechanism import Push
 from push_predictor.types import Array, IntArray
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from push_predictor.models.analytical import AnalyticalPush
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.recordings.importers.mcube import import_mcube
-from push_predictor.recordings.importers.mit import import_mit
-from push_predictor.recordings.importers.mit_square import import_mit_square
-from push_predictor.recordings.importers.mlab import import_mlab
+from push_predictor.recordings.importers.mcube.pushes import import_mcube
+from push_predictor.recordings.importers.mit.pushes import import_mit
+from push_predictor.recordings.importers.mit.square_windows import import_mit_square
+from push_predictor.recordings.importers.mlab.push_logs import import_mlab
 from push_predictor.recordings.importers.report import ImportReport
 from push_predictor.recordings.importers.rosbag1 import import_rosbag1
 from push_predictor.recordings.rig import Rig

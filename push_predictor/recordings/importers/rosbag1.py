@@ -9,10 +9,10 @@ import numpy as np
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.cleaning import Samples, in_order, twist
-from push_predictor.recordings.importers.mcube import assemble
-from push_predictor.recordings.importers.mcube_rig import block_of
-from push_predictor.recordings.importers.mlab_bag import TOPICS as MLAB
-from push_predictor.recordings.importers.mlab_bag import read_mlab_bag
+from push_predictor.recordings.importers.mcube.pushes import assemble
+from push_predictor.recordings.importers.mcube.rig import block_of
+from push_predictor.recordings.importers.mlab.bag import TOPICS as MLAB
+from push_predictor.recordings.importers.mlab.bag import read_mlab_bag
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.rosbag1_file import (
     bag_messages,

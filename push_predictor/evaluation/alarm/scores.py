@@ -1,0 +1,208 @@
+"""The scores of a push by which the alarm judges it, and those of the training pushes, to which it compares them.
+
+A training push is judged by the model without its fold of pushes, with hyperparameters as they are
+(push_predictor.models.gaussian_process.cross_validation). So its residuals are those of a push that the model has not
+seen, but for a slightly smaller training set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.errors import RequestError
+from push_predictor.evaluation.alarm.evidence import (
+    DEFAULT_RATE,
+    Alarm,
+    AlarmState,
+    ScoreKind,
+    alarm_json,
+    checked_rate,
+)
+from push_predictor.evaluation.metrics import standardised
+from push_predictor.evaluation.splits import push_folds
+from push_predictor.evaluation.validation import Comparison
+from push_predictor.models.gaussian_process.cross_validation import moments_left_out
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
+from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
+from push_predictor.models.predictors import AnalyticalBody, ExtendedBody, LearnedBody
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.types import Array
+
+FOLDS = 10
+FEWEST_PUSHES = 10  # of the calibration; below that no evidence would come of hundreds of pushes
+MEAN_SIZE = 0.9247  # of the cube root of the mean of three squared standard normals
+SIZE = "size of the residual"
+SIZE_WEIGHT, OUTPUT_WEIGHT = 0.3, 0.2  # shares of the false alarms; the mechanisms have the rest
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What an alarm needs to know about a model.
+
+    kinds (k,) and scores (n, k) of its n training pushes. mechanisms: of the library, those that can be computed from
+    what the training windows hold. alike (k,): correlation between windows of one push, of what each score is made of.
+    """
+
+    kinds: tuple[ScoreKind, ...]
+    scores: Array
+    mechanisms: tuple[Mechanism, ...]
+    physics: AnalyticalPush
+    alike: Array
+
+
+class PushJudge:
+    """The alarm of one model: takes windows and what was predicted for them, push after push.
+
+    A push that was seen already, as in a replay that is played again, is no news and is not counted. left_out: pushes
+    that could not be judged, and why. Raises RequestError for a rate outside (0, 1).
+    """
+
+    def __init__(self, calibration: Calibration, rate: float = DEFAULT_RATE, seed: int = 0) -> None:
+        self._calibration = calibration
+        self._alarm = Alarm(calibration.kinds, calibration.scores, rate, seed)
+        self._seen: set[str] = set()
+        self.left_out: list[str] = []
+
+    def add(self, windows: PushTable, mean: Array, covariance: Array) -> str | None:
+        """Take whole pushes, predicted mean (n, 3), covariance (n, 3, 3); answers the push at which it fires."""
+        fired = None
+        scores = _scores_by_push(self._calibration, windows, mean, covariance)
+        for push in windows.pushes:
+            if push not in self._seen and self._judged(push, scores[push]):
+                fired = push
+        return fired
+
+    def _judged(self, push: str, scores: Array) -> bool:
+        self._seen.add(push)
+        try:
+            return self._alarm.add(push, scores)
+        except RequestError as error:
+            self.left_out.append(f"push {push}: {error}")
+            return False
+
+    @property
+    def state(self) -> AlarmState:
+        """What the alarm has seen so far."""
+        return self._alarm.state
+
+
+def judged(
+    calibration: Calibration, windows: PushTable, mean: Array, covariance: Array, rate: float = DEFAULT_RATE
+) -> AlarmState:
+    """The alarm after all pushes of a table, in the order of its rows: what push_validator says in the end."""
+    judge = PushJudge(calibration, rate)
+    judge.add(windows, mean, covariance)
+    return judge.state
+
+
+def alarm_about(
+    model: PushModel, windows: PushTable, comparison: Comparison, rate: float = DEFAULT_RATE
+) -> dict[str, object]:
+    """The field `alarm` of the JSON of `validate`. Raises RequestError for a rate outside (0, 1)."""
+    checked_rate(rate)
+    try:
+        calibration = calibrate(model)
+    except RequestError as error:
+        return alarm_json(None, str(error))
+    return alarm_json(judged(calibration, windows, comparison.mean, comparison.covariance, rate))
+
+
+def calibrate(model: PushModel) -> Calibration:
+    """The scores of a model's training pushes. Raises RequestError where they are fewer than FEWEST_PUSHES."""
+    table = model.training
+    if len(table.pushes) < FEWEST_PUSHES:
+        raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
+    mean, covariance = held_out(model)
+    mechanisms = tuple(mechanism for mechanism in LIBRARY if _computable(mechanism, table))
+    blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, _physics(model), np.empty(0))
+    rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
+    parts = _parts(blank, table, mean, covariance)
+    known = replace(blank, alike=np.array([_alike(*part, rows) for part in parts]))
+    return replace(known, scores=np.array([_scores(known, [(a[r], b[r]) for a, b in parts]) for r in rows]))
+
+
+def held_out(model: PushModel) -> tuple[Array, Array]:
+    """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their fold of pushes."""
+    table = model.training
+    push = Push(table.inputs, table.duration, table.covariates)
+    base, folds = model.base.body, push_folds(table, FOLDS)
+    moments = moments_left_out(base, folds) if isinstance(base, LearnedBody) else base.moments(push)
+    mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
+    return mean, covariance
+
+
+def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, covariance: Array) -> dict[str, Array]:
+    """Scores (k,) of each push, NaN where a covariate is missing.
+
+    Computed for many pushes at once, which takes little longer than for one; long windows, whose integration takes its
+    steps from the longest, push by push, lest a score depend on what it is computed with.
+    """
+    far = windows.inputs[:, 0] * windows.duration > FEWEST_STEPS * LONGEST_STEP
+    alone = set(windows.push_id[far].tolist())
+    together = np.array([push not in alone for push in windows.push_id.tolist()], dtype=bool)
+    groups = [np.flatnonzero(together), *(np.flatnonzero(windows.push_id == push) for push in sorted(alone))]
+    found: dict[str, Array] = {}
+    for rows in groups:
+        part = windows.take(rows)
+        parts = _parts(calibration, part, mean[rows], covariance[rows]) if len(rows) else []
+        for push in part.pushes:
+            own = part.push_id == push
+            found[push] = _scores(calibration, [(along[own], reach[own]) for along, reach in parts])
+    return found
+
+
+def _physics(model: PushModel) -> AnalyticalPush:
+    body = model.base.body
+    if isinstance(body, AnalyticalBody):
+        return body.physics
+    return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
+
+
+def _computable(mechanism: Mechanism, table: PushTable) -> bool:
+    return all(name in table.covariates and np.all(np.isfinite(table.covariates[name])) for name in mechanism.needs)
+
+
+def _kinds(mechanisms: Sequence[Mechanism]) -> tuple[ScoreKind, ...]:
+    outputs = [f"{name}{way}" for way in ("", " by the side of the push") for name in OUTPUTS]
+    named = [f"{m.name}: {parameter.name}" for m in mechanisms for parameter in m.parameters]
+    share = (1.0 - SIZE_WEIGHT - OUTPUT_WEIGHT) / max(len(named), 1)
+    rest = [ScoreKind(name, OUTPUT_WEIGHT / len(outputs), True) for name in outputs]
+    return (ScoreKind(SIZE, SIZE_WEIGHT, False), *rest, *(ScoreKind(name, share, True) for name in named))
+
+
+def _parts(calibration: Calibration, table: PushTable, mean: Array, covariance: Array) -> list[tuple[Array, Array]]:
+    """What each score is made of: by window how far it points its way (n,), and how far chance would, (n,)."""
+    z = standardised(mean, covariance, table.outcomes)
+    size = np.cbrt(np.mean(z**2, axis=1)) - MEAN_SIZE  # nearly normal, so that few or many windows make little odds
+    side = np.sign(table.inputs[:, 2])
+    generic = np.concatenate([np.eye(3)[None] * np.ones((len(z), 1, 1)), np.eye(3)[None] * side[:, None, None]], axis=2)
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    unknown = {name: np.full(len(z), np.nan) for m in calibration.mechanisms for name in m.needs}
+    push = Push(table.inputs, table.duration, {**unknown, **table.covariates})
+    responses = [mechanism.response(calibration.physics, push) for mechanism in calibration.mechanisms]
+    columns = np.concatenate([generic, *(whitener @ response for response in responses)], axis=2)
+    along, reach = np.einsum("nkp,nk->np", columns, z), np.linalg.norm(columns, axis=1)
+    return [(size, np.ones(len(z))), *zip(along.T, reach.T, strict=True)]
+
+
+def _alike(along: Array, reach: Array, rows: Sequence[np.ndarray]) -> float:
+    """Correlation between the windows of a push, by moments over the pushes (0 where none has two windows)."""
+    together = sum(float(along[r].sum() ** 2 - np.sum(along[r] ** 2)) for r in rows)
+    pairs = sum(float(reach[r].sum() ** 2 - np.sum(reach[r] ** 2)) for r in rows)
+    alone = float(np.sum(along**2)) / max(float(np.sum(reach**2)), np.finfo(float).tiny)
+    return float(np.clip(together / pairs / alone, 0.0, 1.0)) if pairs > 0.0 and alone > 0.0 else 0.0
+
+
+def _scores(calibration: Calibration, parts: Sequence[tuple[Array, Array]]) -> Array:
+    """Of one push: the sum over its windows, over the standard deviation that the sum of as many would have."""
+    scores = np.zeros(len(parts))
+    for k, (along, reach) in enumerate(parts):
+        square = float(np.sum(reach**2))
+        spread = square + calibration.alike[k] * (float(reach.sum()) ** 2 - square)
+        scores[k] = 0.0 if spread == 0.0 else along.sum() / np.sqrt(spread)
+    return scores

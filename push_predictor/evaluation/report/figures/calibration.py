@@ -1,0 +1,82 @@
+"""Calibration: how often outcomes lie in the predicted intervals, and where in the predicted distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import binom
+
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.validation import Comparison, pit
+from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
+from push_predictor.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LEVELS = np.linspace(0.02, 0.98, 49)
+WINDOWS_PER_BAR = 10
+FEWEST_BARS, MOST_BARS = 4, 10
+DRAWS = 400
+
+
+def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None:
+    """A row per model: the coverage curve, then a histogram of the PIT per output."""
+    axes = figure.subplots(len(comparisons), 4, squeeze=False, width_ratios=(1.25, 1.0, 1.0, 1.0))
+    for row, comparison in zip(axes, comparisons, strict=True):
+        _paint_coverage(row[0], comparison)
+        values = pit(comparison)
+        tallest = max(_bars(values[:, k])[0].max() for k in range(3))
+        for k, ax in enumerate(row[1:]):
+            _paint_pit(ax, values[:, k], k, tallest)
+        row[0].set_ylabel(f"{comparison.model}\nobserved share")
+        row[1].set_ylabel("windows")
+    for k, ax in enumerate(axes[0, 1:]):
+        ax.set_title(f"PIT of {SYMBOLS[k]}")
+    axes[0, 0].set_title("coverage")
+    axes[0, 0].legend(loc="upper left", handlelength=2.2, borderaxespad=0.2)
+    axes[-1, 0].set_xlabel("nominal share")
+    for ax in axes[-1, 1:]:
+        ax.set_xlabel("predicted probability")
+
+
+def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Array, Array, Array]:
+    """Observed share, and low and high ends of its 95 % interval by resampling whole pushes, (levels, 3) each."""
+    away = np.abs(comparison.observed - comparison.mean) / np.sqrt(comparison.variance)
+    hit = (away[:, None, :] <= ndtri(0.5 + levels / 2.0)[None, :, None]).astype(np.float64)
+    weights = push_bootstrap(comparison.push_id, draws=DRAWS)
+    draws = np.einsum("dn,nlk->dlk", weights, hit, optimize=True) / weights.sum(axis=1)[:, None, None]
+    low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+    return hit.mean(axis=0), low, high
+
+
+def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
+    share, low, high = coverage_curve(comparison)
+    grid(ax)
+    ax.plot([0.0, 1.0], [0.0, 1.0], color="0.2", linewidth=0.8, linestyle=":")
+    for k, (colour, style) in enumerate(zip(COLOURS, ("-", "--", "-."), strict=True)):
+        if len(set(comparison.push_id.tolist())) > 1:
+            ax.fill_between(LEVELS, low[:, k], high[:, k], color=colour, alpha=0.12, linewidth=0.0)
+        ax.plot(LEVELS, share[:, k], color=colour, linestyle=style, linewidth=1.4, label=SYMBOLS[k])
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
+    ax.set_aspect("equal")
+
+
+def _paint_pit(ax: Axes, values: Array, output: int, tallest: float) -> None:
+    counts, edges = _bars(values)
+    low, high = binom.ppf([0.025, 0.975], len(values), 1.0 / len(counts))
+    look: dict[str, Any] = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
+    ax.bar(edges[:-1], counts, np.diff(edges), align="edge", **look)
+    ax.axhspan(low, high, color="0.2", alpha=0.18, linewidth=0.0)
+    ax.axhline(len(values) / len(counts), color="0.2", linewidth=0.8, linestyle=":")
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.08 * max(tallest, high)), xticks=(0.0, 0.5, 1.0))
+
+
+def _bars(values: Array) -> tuple[Array, Array]:
+    count = int(np.clip(len(values) // WINDOWS_PER_BAR, FEWEST_BARS, MOST_BARS))
+    counts, edges = np.histogram(values, bins=count, range=(0.0, 1.0))
+    return counts.astype(np.float64), edges

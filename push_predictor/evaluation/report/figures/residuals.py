@@ -1,0 +1,123 @@
+"""Predicted against observed, and the residuals in the order of time: is something drifting?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.validation import Comparison
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.reporting.canvas import COLOURS, UNITS, grid, output_label
+from push_predictor.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CENTRAL = 1.96  # sd that hold 95 % of a Gaussian
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """When each window (n,) happened, and the name of that axis."""
+
+    place: Array
+    label: str
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Change of the standardised residual over the whole course, with its 95 % interval by resampling pushes."""
+
+    change: float
+    low: float
+    high: float
+
+
+def course_of(comparison: Comparison, windows: Sequence[PushWindow] | None) -> Course:
+    """Minutes since the first window where the windows are known, else the number of the push."""
+    if windows:
+        start = np.array([window.start for window in windows], dtype=np.int64)
+        return Course((start - start.min()) / 60e9, "time since the first window (min)")
+    number = {push: k for k, push in enumerate(dict.fromkeys(comparison.push_id.tolist()))}
+    return Course(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "number of the push")
+
+
+def standardised_residuals(comparison: Comparison) -> Array:
+    """(observed - predicted) / predicted sd, (n, 3), each output by itself."""
+    return np.asarray((comparison.observed - comparison.mean) / np.sqrt(comparison.variance))
+
+
+def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
+    """Straight line through residuals (n,); None where there are fewer than three pushes or all happen at once."""
+    if len(set(push_id.tolist())) < 3 or not np.ptp(place) > 0.0:
+        return None
+    change = _change(np.ones((1, len(place))), place, residual)[0]
+    draws = _change(push_bootstrap(push_id), place, residual)
+    low, high = np.nanquantile(draws, [0.025, 0.975])
+    return Trend(float(change), float(low), float(high))
+
+
+def paint_residuals(figure: Figure, comparison: Comparison, course: Course) -> None:
+    """Per output, above: predicted against observed; below: the standardised residual in the order of time."""
+    axes = figure.subplots(2, 3, height_ratios=(1.25, 1.0))
+    residual = standardised_residuals(comparison)
+    reach = max(3.0, float(np.percentile(np.abs(residual), 99.5)) * 1.1)
+    for k in range(3):
+        _paint_scatter(axes[0, k], comparison, k)
+        _paint_course(axes[1, k], course, residual[:, k], comparison.push_id, k, reach)
+    axes[1, 0].set_ylabel("residual / predicted sd")
+    axes[1, 1].set_xlabel(course.label)
+
+
+def _paint_scatter(ax: Axes, comparison: Comparison, k: int) -> None:
+    predicted, observed = comparison.mean[:, k] * UNITS[k], comparison.observed[:, k] * UNITS[k]
+    half = CENTRAL * np.sqrt(comparison.variance[:, k]) * UNITS[k]
+    both = np.concatenate([predicted, observed])
+    margin = 0.05 * max(float(np.ptp(both)), 1e-9)
+    ends = np.array([both.min() - margin, both.max() + margin])
+    grid(ax)
+    ax.vlines(predicted, predicted - half, predicted + half, color="0.6", alpha=0.35, linewidth=0.9)
+    ax.plot(predicted, observed, "o", color=COLOURS[k], markersize=2.6, mew=0.0, alpha=0.75)
+    ax.plot(ends, ends, color="0.2", linewidth=0.8, linestyle=":")
+    ax.set(xlim=ends, ylim=ends, xlabel=f"predicted {output_label(k)}", ylabel=f"observed {output_label(k)}")
+    ax.set_aspect("equal")
+    ax.locator_params(nbins=6)
+
+
+def _paint_course(ax: Axes, course: Course, residual: Array, push_id: np.ndarray, k: int, reach: float) -> None:
+    grid(ax)
+    ax.axhspan(-CENTRAL, CENTRAL, color="0.2", alpha=0.08, linewidth=0.0)
+    ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
+    ax.plot(course.place, np.clip(residual, -reach, reach), "o", color="0.55", markersize=2.0, mew=0.0, alpha=0.7)
+    place, mean = _per_push(course.place, residual, push_id)
+    ax.plot(place, mean, "o", color=COLOURS[k], markersize=4.0, mew=0.0)
+    found = trend(course.place, residual, push_id)
+    ax.set_title(_told(found), fontsize=8.0)
+    ax.set_ylim(-1.05 * reach, 1.05 * reach)
+
+
+def _told(found: Trend | None) -> str:
+    if found is None:
+        return "too few pushes for a trend"
+    return f"trend {found.change:+.2f} [{found.low:+.2f}, {found.high:+.2f}] sd".replace("-", "−")
+
+
+def _per_push(place: Array, residual: Array, push_id: np.ndarray) -> tuple[Array, Array]:
+    _, index = np.unique(push_id, return_inverse=True)
+    count = np.bincount(index)
+    return np.bincount(index, place) / count, np.bincount(index, residual) / count
+
+
+def _change(weights: Array, place: Array, residual: Array) -> Array:
+    """Slope times span, for weights (draws, n)."""
+    total = weights.sum(axis=1)
+    at, level = weights @ place / total, weights @ residual / total
+    covariance = weights @ (place * residual) / total - at * level
+    variance = weights @ place**2 / total - at**2
+    slope = np.divide(covariance, variance, out=np.full(len(at), np.nan), where=variance > 1e-12 * np.ptp(place) ** 2)
+    return np.asarray(slope * np.ptp(place))

@@ -1,0 +1,191 @@
+"""Maps over contact and angle: what a model predicts and what was recorded, in the same cells.
+
+A map holds one speed and one duration. Contacts are folded by the outline's rotational symmetry, as the models fold
+them, and told as the way along the outline; a circle, whose contacts are all alike to a model, is shown unfolded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.errors import TableError
+from push_predictor.evaluation.report.map_conditions import covariates_of_map
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.types import Array, BoolArray, IntArray
+
+SAME = 0.1  # speeds and durations that differ by less than this part are shown as one
+FINE = 48  # cells of a predicted map along either axis
+FEWEST = 6  # windows in a cell that is shown
+WINDOWS_PER_CELL = 9.0
+MOST_CELLS = 8  # along either axis
+WIDEST_ANGLE = np.radians(89.0)
+ANGLE_STEP = np.radians(5.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """The commonest kind of window: velocity m/s, duration s (medians), and which rows (n,) of the table are alike."""
+
+    velocity: float
+    duration: float
+    rows: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a map by their edges: contact (C + 1,) in m along the folded outline, angle (A + 1,) in rad."""
+
+    contact: Array
+    angle: Array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells along angle and along contact."""
+        return len(self.angle) - 1, len(self.contact) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class PushMap:
+    """Mean and sd (A, C, 3) of an outcome (m, m, rad) per cell, NaN where nothing is known.
+
+    windows, pushes (A, C): how many stand behind a cell of a map of recorded windows, None for any other.
+    """
+
+    cells: Cells
+    mean: Array
+    sd: Array
+    windows: IntArray | None = None
+    pushes: IntArray | None = None
+
+
+def commonest_condition(table: PushTable) -> Condition:
+    """The windows within 10 % of the speed, then of the duration, that most windows have.
+
+    Raises TableError for a table without rows.
+    """
+    if not len(table):
+        raise TableError("0 windows: a map needs at least one")
+    near = _commonest(table.inputs[:, 0])
+    rows = near.copy()
+    rows[near] = _commonest(table.duration[near])
+    return Condition(float(np.median(table.inputs[rows, 0])), float(np.median(table.duration[rows])), rows)
+
+
+def fold_order(outline: Outline) -> int:
+    """How many alike sectors the outline has; 1 for a circle, which has no sectors."""
+    return max(outline.rotational_symmetry, 1)
+
+
+def sector_length(outline: Outline) -> float:
+    """Length of one sector of the outline, m."""
+    return outline.perimeter / fold_order(outline)
+
+
+def way_along(outline: Outline, contact: Array) -> Array:
+    """Folded contacts (n,) in m, counter-clockwise from the start of their sector."""
+    order = fold_order(outline)
+    if outline.semi_axes is not None:
+        return np.asarray((contact * order) % 1.0 * sector_length(outline))
+    sector = outline.edge(contact)[0] // (len(outline.vertices) // order)
+    return np.clip(contact * order - sector, 0.0, 1.0) * sector_length(outline)
+
+
+def fine_cells(outline: Outline, table: PushTable) -> Cells:
+    """Cells for predicted maps: the whole sector, and the angles of the table's rows rounded outwards to 5 degrees."""
+    return _cells(outline, table, FINE, FINE)
+
+
+def coarse_cells(outline: Outline, table: PushTable) -> Cells:
+    """Cells for recorded maps of these rows, over the same ranges: as many as leave about nine windows to each.
+
+    Contacts on a circle are not told apart.
+    """
+    wanted = len(table) / WINDOWS_PER_CELL
+    along = 1 if outline.rotational_symmetry == 0 else _whole(np.sqrt(wanted))
+    return _cells(outline, table, along, _whole(wanted / along))
+
+
+def push_map(
+    model: PushModel, velocity: float, duration: float, cells: Cells, held: Mapping[str, float] | None = None
+) -> PushMap:
+    """What the model predicts at the centre of every cell; NaN outside the domain of its training.
+
+    held: the covariates that an extended model needs, see `map_conditions.held_covariates`.
+    """
+    contact = 0.5 * (cells.contact[1:] + cells.contact[:-1]) / model.rig.outline.perimeter
+    angle = 0.5 * (cells.angle[1:] + cells.angle[:-1])
+    angles, contacts = np.meshgrid(angle, contact, indexing="ij")
+    inputs = np.column_stack([np.full(contacts.size, velocity), contacts.ravel(), angles.ravel()])
+    covariates = covariates_of_map(model.rig.outline, held or {}, inputs)
+    prediction = model.predict(inputs, np.full(len(inputs), duration), covariates)
+    sd = np.sqrt(np.diagonal(prediction.covariance, axis1=1, axis2=2))
+    hidden = ~prediction.in_domain[:, None]
+    shape = (*cells.shape, len(OUTPUTS))
+    mean = np.where(hidden, np.nan, prediction.mean).reshape(shape)
+    return PushMap(cells, mean, np.where(hidden, np.nan, sd).reshape(shape))
+
+
+def recorded_map(outline: Outline, table: PushTable, predicted: Array, cells: Cells) -> PushMap:
+    """What the windows of every cell did: mean outcome, and root mean square of its distance from `predicted` (n, 3).
+
+    The distance from each window's own predicted mean is what a predicted sd speaks of. Neither the variation of the
+    inputs within a cell nor the likeness of windows of one push biases its mean square, as they would a sample sd.
+    """
+    squared = (table.outcomes - predicted) ** 2
+    return _averaged(outline, table, table.outcomes, squared, cells)
+
+
+def predicted_at_windows(outline: Outline, table: PushTable, mean: Array, variance: Array, cells: Cells) -> PushMap:
+    """What was predicted for the recorded windows themselves, mean and variance (n, 3), averaged in the same cells."""
+    return _averaged(outline, table, mean, variance, cells)
+
+
+def _averaged(outline: Outline, table: PushTable, values: Array, squares: Array, cells: Cells) -> PushMap:
+    shape = (*cells.shape, len(OUTPUTS))
+    mean, sd = np.full(shape, np.nan), np.full(shape, np.nan)
+    windows, pushes = np.zeros(cells.shape, np.int64), np.zeros(cells.shape, np.int64)
+    for cell, rows in _members(outline, table, cells):
+        windows[cell], pushes[cell] = rows.size, len(set(table.push_id[rows].tolist()))
+        if rows.size >= FEWEST:
+            mean[cell] = values[rows].mean(axis=0)
+            sd[cell] = np.sqrt(squares[rows].mean(axis=0))
+    return PushMap(cells, mean, sd, windows, pushes)
+
+
+def _commonest(values: Array) -> BoolArray:
+    ordered = np.sort(values)
+    low, high = values / (1.0 + SAME), values * (1.0 + SAME)
+    counts = np.searchsorted(ordered, high, side="right") - np.searchsorted(ordered, low, side="left")
+    chosen = np.argmax(counts)
+    return np.asarray((values >= low[chosen]) & (values <= high[chosen]))
+
+
+def _whole(count: float) -> int:
+    return int(np.clip(round(count), 1, MOST_CELLS))
+
+
+def _cells(outline: Outline, table: PushTable, along_contact: int, along_angle: int) -> Cells:
+    angle = table.inputs[:, 2]
+    low = max(np.floor(angle.min() / ANGLE_STEP) * ANGLE_STEP, -WIDEST_ANGLE)
+    high = min(max(np.ceil(angle.max() / ANGLE_STEP) * ANGLE_STEP, low + ANGLE_STEP), WIDEST_ANGLE)
+    low, high = min(low, angle.min()), max(high, angle.max())  # beyond 89 degrees nothing is cut off
+    contact = np.linspace(0.0, sector_length(outline), along_contact + 1)
+    return Cells(contact, np.linspace(low, high, along_angle + 1))
+
+
+def _members(outline: Outline, table: PushTable, cells: Cells) -> Iterator[tuple[tuple[int, int], IntArray]]:
+    """Every cell that is not empty, with the rows in it; a row beyond the last edge by rounding stays in."""
+    column = _position(cells.contact, way_along(outline, table.inputs[:, 1]))
+    row = _position(cells.angle, table.inputs[:, 2])
+    flat = row * cells.shape[1] + column
+    for index in np.unique(flat):
+        yield divmod(int(index), cells.shape[1]), np.flatnonzero(flat == index)
+
+
+def _position(edges: Array, values: Array) -> IntArray:
+    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2).astype(np.int64)

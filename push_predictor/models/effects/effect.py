@@ -1,0 +1,91 @@
+"""An effect beside a base model: a mechanism, what drives it, how strongly; additive on the mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.mechanisms.mechanism import Mechanism
+from push_predictor.types import Array
+
+GENERIC_TERMS = 6  # of the polynomial, for each output
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """Shift of the mean: sum over parameters p and columns m of the form, response_p x form_m x coefficient_pm.
+
+    mechanism: a name of LIBRARY, or None for the generic one. coefficients (p * m,), p first; covariance of them
+    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's way).
+    """
+
+    mechanism: str | None
+    covariate: str
+    form: Form
+    coefficients: Array
+    covariance: Array
+    outcome_scale: Array
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Covariates that a request must bring."""
+        own = () if self.mechanism is None else mechanism_named(self.mechanism).needs
+        return tuple(dict.fromkeys([*self.form.drivers, *own]))
+
+    def design(self, physics: AnalyticalPush, push: Push) -> Array:
+        """What the coefficients multiply, (n, 3, p * m)."""
+        return design_of(self.mechanism, self.form, physics, push, self.outcome_scale)
+
+    def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
+        """Shift of the mean (n, 3) and its covariance (n, 3, 3)."""
+        design = self.design(physics, push)
+        return design @ self.coefficients, design @ self.covariance @ np.transpose(design, (0, 2, 1))
+
+
+def design_of(mechanism: str | None, form: Form, physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+    """Columns (n, 3, p * m) of an effect: what its coefficients multiply."""
+    n = len(push.inputs)
+    responses = (
+        generic_responses(physics, push, outcome_scale)
+        if mechanism is None
+        else mechanism_named(mechanism).response(physics, push)
+    )
+    values = form.values(push.covariates, n)
+    return (responses[:, :, :, None] * values[:, None, None, :]).reshape(n, 3, -1)
+
+
+def generic_responses(physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+    """A low-order polynomial of contact and angle for each output (n, 3, 3 * 6), per metre of the tip's way.
+
+    outcome_scale (3,): the unit, m, m and rad per metre. The contact enters by the lever arm of its normal force about
+    the centre of friction, as a share of the limit surface's length: it is what folds an outline's symmetries.
+    """
+    way = push.inputs[:, 0] * push.duration
+    basis = way[:, None] * _polynomial(physics, push.inputs)
+    n, m = basis.shape
+    responses = np.zeros((n, 3, 3 * m))
+    for k in range(3):
+        responses[:, k, k * m : (k + 1) * m] = outcome_scale[k] * basis
+    return responses
+
+
+def _polynomial(physics: AnalyticalPush, inputs: Array) -> Array:
+    _, contact, angle = inputs.T
+    normal = physics.outline.inward_normal(contact)
+    arm = physics.outline.point(contact) - np.asarray(physics.support.centre)
+    lever = (arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]) / physics.support.length
+    return np.column_stack([np.ones_like(angle), lever, angle, lever * angle, lever**2, angle**2])
+
+
+def generic_width() -> int:
+    """How many responses the generic mechanism has."""
+    return 3 * GENERIC_TERMS
+
+
+def mechanism_named(name: str) -> Mechanism:
+    """The mechanism of that name. Raises KeyError for one that the library does not hold."""
+    return {mechanism.name: mechanism for mechanism in LIBRARY}[name]

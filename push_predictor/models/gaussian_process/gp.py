@@ -1,0 +1,157 @@
+"""Standard Gaussian process regression with one noise level (Rasmussen and Williams 2006, algorithm 2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, blas
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.descent import Cost, Descent, part_of_rows
+from push_predictor.models.gaussian_process.kernels import (
+    DEFAULT_CHOICE,
+    ArdKernel,
+    KernelChoice,
+    KernelFamily,
+    ard_kernel,
+)
+from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.ridge import factorise
+from push_predictor.types import Array
+
+# Logarithms, for inputs and outputs of unit spread.
+_LENGTHSCALE_BOUNDS = (np.log(1e-2), np.log(1e3))
+_SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
+# Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
+_NOISE_BOUNDS = (np.log(1e-3), np.inf)
+_REFUSED = 1e10
+_STOP = 1e-8
+_SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; nats by which it must lead to more
+_FEWEST_FOR_SHORT = 100  # rows; fewer may be interpolated by short lengthscales
+
+
+@dataclass(frozen=True)
+class GpParameters:
+    """Logarithms of the ARD lengthscales (D,), the signal's and the noise's standard deviation; the kernel's family."""
+
+    log_lengthscales: Array
+    log_signal_sd: float
+    log_noise_sd: float
+    family: KernelFamily = "squared_exponential"
+
+    @property
+    def kernel(self) -> ArdKernel:
+        """Kernel of f."""
+        return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)
+
+    @property
+    def noise_variance(self) -> float:
+        """Variance of the noise."""
+        return float(np.exp(2.0 * self.log_noise_sd))
+
+
+class GaussianProcess:
+    """A Gaussian process conditioned on inputs (n, D) and outputs (n,), both standardised by the caller."""
+
+    def __init__(self, inputs: Array, outputs: Array, parameters: GpParameters) -> None:
+        self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
+        noise = np.full(len(outputs), parameters.noise_variance)
+        self._posterior = KernelPosterior(parameters.kernel.matrix(inputs), noise)
+        self._weights = self._posterior.weights(outputs)
+
+    @property
+    def log_marginal_likelihood(self) -> float:
+        """Log p(outputs | inputs), nats."""
+        constant = len(self.outputs) * np.log(2.0 * np.pi)
+        return -0.5 * float(self.outputs @ self._weights + self._posterior.log_determinant + constant)
+
+    def predict(self, inputs: Array) -> LatentPrediction:
+        """The function and the noise at inputs (m, D)."""
+        kernel = self.parameters.kernel
+        cross = kernel.cross(inputs, self.inputs)
+        # The noise bounds the posterior variance from below by about noise / n; rounding may not.
+        smallest = np.finfo(float).eps * kernel.variance
+        variance = np.maximum(kernel.variance - self._posterior.explained_variance(cross), smallest)
+        log_noise = np.full(len(cross), 2.0 * self.parameters.log_noise_sd)
+        return LatentPrediction(cross @ self._weights, variance, log_noise, np.zeros(len(cross)))
+
+
+def fit_gp(
+    inputs: Array, outputs: Array, choice: KernelChoice = DEFAULT_CHOICE, *, most_iterations: int = 100
+) -> GaussianProcess:
+    """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
+
+    inputs (n, D) and outputs (n,) standardised. choice: of it, the family. Raises TrainingError when the rows do not
+    match or are not finite.
+    """
+    check_rows(inputs, outputs)
+    d = inputs.shape[1]
+    box = np.array([_LENGTHSCALE_BOUNDS] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
+    descent = Descent(box, most_iterations, _STOP)
+    first = _first(inputs, outputs, choice.family, descent)
+    # From the start with all rows: likelihoods have several maxima, and a part of the rows may lead to another one.
+    found = descent.run(_cost(inputs, outputs, choice.family), first)
+    return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
+
+
+def _first(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Array:
+    """Where to begin: the inputs' unit lengthscales, or one of them short, if a part of the rows is surely for it.
+
+    Along a polygon's contact the outcome jumps from side to side: from a long lengthscale the search may call it noise.
+    """
+    d = inputs.shape[1]
+    usual = np.append(np.zeros(d + 1), np.log(0.3))
+    if len(outputs) < _FEWEST_FOR_SHORT:
+        return usual
+    rows = part_of_rows(len(outputs))
+    part = slice(None) if rows is None else rows
+    cost = _cost(inputs[part], outputs[part], family)
+    short = [usual + _SHORT * np.eye(d + 2)[k] for k in range(d)]
+    reached = [cost(descent.run(cost, start).point)[0] for start in (usual, *short)]
+    best = int(np.argmin(reached))
+    return usual if best == 0 or reached[best] > reached[0] - _SURELY else short[best - 1]
+
+
+def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpParameters) -> tuple[float, Array]:
+    """Log p(outputs | inputs) and its derivative wrt (log lengthscales, log signal sd, log noise sd), (D + 2,).
+
+    Raises LinAlgError where the kernel matrix plus noise is not positive definite.
+    """
+    kernel, noise = parameters.kernel, parameters.noise_variance
+    factorised = factorise(kernel.matrix(inputs), smooth=kernel.smooth)
+    ridge = factorised.regularise(np.full(len(outputs), 1.0 / noise))
+    alpha = ridge.residual(outputs / noise)
+    constant = len(outputs) * np.log(2.0 * np.pi * noise)
+    value = -0.5 * float(outputs @ alpha + ridge.log_determinant + constant)
+    weights = ridge.precision()
+    blas.dger(-1.0, alpha, alpha, a=weights.T, overwrite_a=1)
+    of_noise = -noise * np.trace(weights)
+    return value, np.append(-0.5 * kernel.gradient(inputs, factorised.matrix, weights), of_noise)
+
+
+def check_rows(inputs: Array, outputs: Array) -> Array:
+    """The inputs, when they are (n, D) finite numbers that match outputs (n,); else raises TrainingError."""
+    if inputs.ndim != 2 or outputs.shape != inputs.shape[:1] or len(outputs) < 2:
+        raise TrainingError(
+            f"inputs have shape {inputs.shape} and outputs {outputs.shape}, give (n, D) and (n,) with n >= 2"
+        )
+    if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
+        raise TrainingError("inputs or outputs hold NaN or infinity, give finite numbers")
+    return inputs
+
+
+def _parameters(vector: Array, family: KernelFamily) -> GpParameters:
+    return GpParameters(vector[:-2], float(vector[-2]), float(vector[-1]), family)
+
+
+def _cost(inputs: Array, outputs: Array, family: KernelFamily) -> Cost:
+    def negative_log_likelihood(vector: Array) -> tuple[float, Array]:
+        try:
+            value, gradient = log_likelihood_and_gradient(inputs, outputs, _parameters(vector, family))
+        except LinAlgError:
+            return _REFUSED, np.zeros_like(vector)
+        return -value, -gradient
+
+    return negative_log_likelihood

@@ -1,0 +1,44 @@
+"""The posterior of a zero-mean Gaussian process seen through independent noise, at new inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import blas
+
+from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.types import Array
+
+
+class KernelPosterior:
+    """Posterior for a kernel matrix (n, n) between training inputs and noise variances (n,), any kernel.
+
+    After construction a prediction costs one triangular solve. Raises numpy's LinAlgError when the kernel
+    matrix plus noise is not positive definite.
+    """
+
+    def __init__(self, kernel_matrix: Array, noise_variances: Array) -> None:
+        regularised = np.array(kernel_matrix, order="C")
+        regularised.flat[:: len(regularised) + 1] += noise_variances
+        self._factor = cholesky_in_place(regularised)
+
+    @property
+    def log_determinant(self) -> float:
+        """Log det(K + noise)."""
+        return 2.0 * float(np.log(np.diagonal(self._factor)).sum())
+
+    def weights(self, values: Array) -> Array:
+        """(K + noise)^-1 values, shape (n,): the posterior mean at x* is k(x*, X) times this."""
+        half = blas.dtrsv(self._factor, values, lower=1)
+        return np.asarray(blas.dtrsv(self._factor, half, lower=1, trans=1))
+
+    def explained_variance(self, cross: Array) -> Array:
+        """By how much the observations reduce the prior variance at m inputs, shape (m,).
+
+        cross (m, n) holds the kernel between the new inputs and the training inputs:
+        diag(cross (K + noise)^-1 cross').
+        """
+        if len(cross) == 1:
+            half = blas.dtrsv(self._factor, cross[0], lower=1)
+            return np.array([half @ half])
+        half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
+        return np.asarray(np.einsum("ij,ij->j", half, half))

@@ -1,0 +1,38 @@
+"""Choosing inducing inputs among the rows: each time the one of which the rows chosen before tell least.
+
+That is a pivoted Cholesky factorisation of the kernel matrix ("greedy conditional variance" of Burt, Rasmussen and van
+der Wilk 2020, "Convergence of sparse variational inference in Gaussian processes regression"); it depends on the
+kernel's hyperparameters and on no random number but the choice of candidates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.types import Array, IntArray
+
+_CANDIDATES = 10_000
+_TOLD = 1e-6  # of the prior variance: where the others tell so much, one more inducing input would tell nothing
+
+
+def inducing_rows(kernel: ArdKernel, inputs: Array, most: int, weights: Array | None = None) -> IntArray:
+    """At most `most` rows of inputs (n, D), in their order; fewer where they tell of all others.
+
+    weights (n,): what an unknown of each row counts, 1 if not given.
+    """
+    candidates = np.sort(np.random.default_rng(0).permutation(len(inputs))[:_CANDIDATES])
+    found = inputs[candidates]
+    counts = np.ones(len(found)) if weights is None else weights[candidates]
+    most = min(most, len(found))
+    unknown, root, chosen = np.full(len(found), kernel.variance), np.empty((most, len(found))), []
+    for k in range(most):
+        row = int(np.argmax(unknown * counts))
+        if unknown[row] < _TOLD * kernel.variance:
+            break
+        known = kernel.cross(found[row : row + 1], found)[0] - root[:k, row] @ root[:k]
+        root[k] = known / np.sqrt(unknown[row])
+        unknown = np.maximum(unknown - root[k] ** 2, 0.0)
+        unknown[row] = 0.0
+        chosen.append(row)
+    return np.sort(candidates[chosen])

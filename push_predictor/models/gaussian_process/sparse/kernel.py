@@ -1,0 +1,159 @@
+"""A kernel between n rows as m inducing inputs Z know it: Q = K_XZ (K_ZZ + jitter)^-1 K_ZX, never formed.
+
+    Q = V V',  V = K_XZ L^-T (n, m),  L L' = K_ZZ + jitter;      what Z does not tell of a row: k(x, x) - Q_xx >= 0
+
+Everything costs O(n m^2) and goes over the rows in blocks: besides V nothing larger than (n,) or (m, m) is kept.
+The jitter only makes Z tell a little less, so a bound that is computed with Q is one still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import blas, cho_solve
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.gaussian_process.ridge import cholesky_in_place
+from push_predictor.types import Array
+
+_BLOCK = 2048
+_JITTER = 1e-9  # of the kernel's variance
+
+
+@dataclass(frozen=True, eq=False)
+class InducedKernel:
+    """Inputs (n, D); inducing Z (m, D); factor L (m, m); features V (n, m); missing (n,), what Z does not tell."""
+
+    kernel: SquaredExponential
+    inputs: Array
+    inducing: Array
+    factor: Array
+    features: Array
+    missing: Array
+
+    @classmethod
+    def of(cls, kernel: ArdKernel, inputs: Array, inducing: Array) -> InducedKernel:
+        """Raises LinAlgError where the inducing inputs are not told apart, TrainingError for another kernel."""
+        if not isinstance(kernel, SquaredExponential):
+            raise TrainingError(f"{type(kernel).__name__}: a sparse VHGP has squared exponential kernels only")
+        factor = _inducing_factor(kernel, inducing)
+        features = np.empty((len(inputs), len(inducing)))
+        missing = np.empty(len(inputs))
+        for rows in _blocks(len(inputs)):
+            features[rows] = _whitened(factor, kernel.cross(inputs[rows], inducing))
+            missing[rows] = kernel.variance - _squared_norms(features[rows])
+        return cls(kernel, inputs, inducing, factor, features, np.maximum(missing, 0.0))
+
+    def regularise(self, weights: Array) -> InducedRidge:
+        """The ridge of Q for noise variances 1 / weights, weights (n,) > 0. Raises LinAlgError."""
+        inner = np.eye(len(self.inducing), order="F")
+        for rows in _blocks(len(weights)):
+            weighted = self.features[rows] * np.sqrt(weights[rows])[:, None]
+            inner = blas.dsyrk(1.0, weighted.T, beta=1.0, c=inner, lower=1, overwrite_c=1)
+        inner = np.tril(inner) + np.tril(inner, -1).T
+        return InducedRidge(self, weights, inner, cholesky_in_place(inner.copy()))
+
+    def times(self, vector: Array) -> Array:
+        """Q vector, shape (n,)."""
+        return np.asarray(self.features @ (self.features.T @ vector))
+
+
+@dataclass(frozen=True, eq=False)
+class InducedRidge:
+    """Quantities of P = (Q + D)^-1, D = 1 / weights, as in ridge.py. inner: I + V' W V (m, m); factor: its Cholesky."""
+
+    induced: InducedKernel
+    weights: Array
+    inner: Array
+    factor: Array
+
+    @property
+    def log_determinant(self) -> float:
+        """Log det(I + W^1/2 Q W^1/2)."""
+        return 2.0 * float(np.log(np.diagonal(self.factor)).sum())
+
+    @cached_property
+    def posterior_diagonal(self) -> Array:
+        """Diagonal of Q - Q P Q, shape (n,)."""
+        diagonal = np.empty(len(self.weights))
+        for rows in _blocks(len(diagonal)):
+            diagonal[rows] = _squared_norms(_whitened(self.factor, self.induced.features[rows].copy()))
+        return diagonal
+
+    def mean(self, values: Array) -> Array:
+        """Posterior mean (m,) of the whitened inducing variables, which are N(0, I) a priori and seen as V' values."""
+        return np.asarray(cho_solve((self.factor, True), self.induced.features.T @ values))
+
+    def residual(self, values: Array) -> Array:
+        """P D values, shape (n,): what a smoother of these values leaves over."""
+        return np.asarray(values - self.weights * (self.induced.features @ self.mean(values)))
+
+    @cached_property
+    def explained(self) -> Array:
+        """I - inner^-1 (m, m): of the whitened inducing variables' prior variance."""
+        identity = np.eye(len(self.inner))
+        return np.asarray(identity - cho_solve((self.factor, True), identity))
+
+    def gradient(self, added: Array, removed: Array | None = None) -> Array:
+        """Derivative of tr(H Q) - 1/2 sum weights k(x, x), at H fixed, by (log_lengthscales, log_sd), (D + 1,).
+
+        H = 1/2 (W - P + added added' - removed removed'), vectors (n,).
+        """
+        induced, kernel = self.induced, self.induced.kernel
+        vectors = np.column_stack([added] if removed is None else [added, removed])
+        signed = vectors * [1.0, -1.0][: vectors.shape[1]]
+        told = blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
+        of_features = blas.dtrsm(1.0, induced.factor, self.explained, side=1, lower=1)
+        gradient = np.zeros(induced.inputs.shape[1] + 1)
+        for rows in _blocks(len(self.weights)):
+            cross = kernel.cross(induced.inputs[rows], induced.inducing)
+            cross *= (self.weights[rows, None] * induced.features[rows]) @ of_features + signed[rows] @ told.T
+            gradient += _contracted(kernel, induced.inputs[rows], induced.inducing, cross)
+        gradient -= self._of_inducing(told, told * [1.0, -1.0][: told.shape[1]])
+        gradient[-1] -= kernel.variance * float(self.weights.sum())
+        return gradient
+
+    def _of_inducing(self, told: Array, signed: Array) -> Array:
+        """The part of the gradient that goes through K_ZZ, but for its sign."""
+        induced, kernel = self.induced, self.induced.kernel
+        known = self.inner - np.eye(len(self.inner)) - self.explained
+        weights = blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
+        weights = blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ told.T
+        weights = 0.25 * (weights + weights.T)
+        gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)
+        gradient[-1] += 2.0 * _JITTER * kernel.variance * float(np.trace(weights))
+        return gradient
+
+
+def _inducing_factor(kernel: SquaredExponential, inducing: Array) -> Array:
+    """L (m, m), L L' = K_ZZ + jitter. Raises LinAlgError."""
+    matrix = kernel.matrix(inducing)
+    matrix.flat[:: len(matrix) + 1] += _JITTER * kernel.variance
+    return cholesky_in_place(matrix)
+
+
+def _whitened(factor: Array, rows: Array) -> Array:
+    """Rows (n, m) times L^-T, in their memory."""
+    return np.asarray(blas.dtrsm(1.0, factor, rows.T, lower=1, overwrite_b=1).T)
+
+
+def _contracted(kernel: SquaredExponential, inputs: Array, inducing: Array, weighted: Array) -> Array:
+    """Sum_ij weights_ij d k(x_i, z_j) of weighted = weights * k (n, m)."""
+    scale = np.exp(-kernel.log_lengthscales)
+    x, z = inputs * scale, inducing * scale
+    of_rows = weighted.sum(axis=1)
+    squares = of_rows @ (x * x) + weighted.sum(axis=0) @ (z * z) - 2.0 * (x * (weighted @ z)).sum(axis=0)
+    return np.append(squares, 2.0 * of_rows.sum())
+
+
+def _blocks(n: int) -> Iterator[slice]:
+    for start in range(0, n, _BLOCK):
+        yield slice(start, start + _BLOCK)
+
+
+def _squared_norms(rows: Array) -> Array:
+    return np.asarray(np.einsum("ij,ij->i", rows, rows))

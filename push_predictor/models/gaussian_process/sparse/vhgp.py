@@ -1,0 +1,95 @@
+"""A VHGP of many rows: what they say of f and g is kept as what f and g are at some inducing inputs.
+
+Predictions cost what the inducing inputs do, however many rows there are. Its bound: sparse_bound.py; hyperparameters
+and inducing inputs: sparse_fit.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import blas
+
+from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.kernels import ArdKernel
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.sparse.bound import SparseBound, SparseProblem
+from push_predictor.models.gaussian_process.sparse.kernel import InducedRidge
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.types import Array, IntArray
+
+_NOTHING = 1e-9  # of the prior variance, a thousandth of the jitter
+_EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class InducedPosterior:
+    """A function's posterior by inducing inputs Z (m, D): mean k(x, Z) weights, explained variance |k(x, Z) root|^2.
+
+    weights (m,); root (m, r).
+    """
+
+    kernel: ArdKernel
+    inducing: Array
+    weights: Array
+    root: Array
+
+    @classmethod
+    def of(cls, ridge: InducedRidge, values: Array) -> InducedPosterior:
+        """For values (n,) over the noise variances of the ridge."""
+        induced = ridge.induced
+        share, vectors = np.linalg.eigh(ridge.explained)
+        kept = share > _NOTHING
+        told = np.column_stack([ridge.mean(values), vectors[:, kept] * np.sqrt(share[kept])])
+        told = blas.dtrsm(1.0, induced.factor, told, lower=1, trans_a=1)
+        return cls(induced.kernel, induced.inducing, told[:, 0].copy(), np.ascontiguousarray(told[:, 1:]))
+
+    def predict(self, inputs: Array) -> tuple[Array, Array]:
+        """Mean and explained variance at inputs (q, D), (q,) each."""
+        cross = self.kernel.cross(inputs, self.inducing)
+        half = cross @ self.root
+        return cross @ self.weights, np.asarray(np.einsum("ij,ij->i", half, half))
+
+
+class SparseVHGP:
+    """Conditioned on inputs (n, D) and outputs (n,), both standardised by the caller.
+
+    site_precisions (n,) is Lambda of sparse_bound; inducing_signal and inducing_noise: which of the rows are inducing
+    inputs of f and of g.
+    """
+
+    def __init__(
+        self,
+        inputs: Array,
+        outputs: Array,
+        parameters: VhgpParameters,
+        site_precisions: Array,
+        inducing_signal: IntArray,
+        inducing_noise: IntArray,
+    ) -> None:
+        self.inputs, self.outputs = check_rows(inputs, outputs), outputs
+        self.parameters, self.site_precisions = parameters, site_precisions
+        self.inducing_signal, self.inducing_noise = inducing_signal, inducing_noise
+        bound = self.solved()
+        self.bound = bound.value
+        self.signal = InducedPosterior.of(bound.signal.ridge, bound.signal.ridge.weights * outputs)
+        sites = bound.sites.potentials - site_precisions * parameters.noise_mean
+        self.noise = InducedPosterior.of(bound.noise_ridge, sites)
+
+    def solved(self) -> SparseBound:
+        """The bound with all that it takes, (n, m) numbers, which is not kept."""
+        of_signal, of_noise = self.inputs[self.inducing_signal], self.inputs[self.inducing_noise]
+        problem = SparseProblem.of(self.inputs, self.outputs, self.parameters, of_signal, of_noise)
+        return SparseBound.tied(problem, self.site_precisions)
+
+    def predict(self, inputs: Array) -> LatentPrediction:
+        """Predict f and g at inputs (q, D)."""
+        parameters = self.parameters
+        of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
+        mean, explained = self.signal.predict(inputs)
+        log_noise, told = self.noise.predict(inputs)
+        # As of a VHGP, the jitter is independent of the data.
+        variance = np.maximum(of_signal + parameters.jitter - explained, parameters.jitter)
+        log_noise_variance = np.maximum(of_noise - told, _EPSILON * of_noise)
+        return LatentPrediction(mean, variance, parameters.noise_mean + log_noise, log_noise_variance)

@@ -1,0 +1,68 @@
+"""Variational heteroscedastic Gaussian process regression (Lazaro-Gredilla and Titsias, ICML 2011).
+
+    y = f(x) + e,  f ~ GP(0, k_f),  e ~ N(0, exp(g(x))),  g ~ GP(mu0, k_g)
+
+The model of Bauza and Rodriguez (ICRA 2017) for planar pushing, derived from first principles; docs/errata.md
+lists where the printed equations differ. Inputs and outputs are standardised by the caller.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.gp import GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
+from push_predictor.models.gaussian_process.vhgp_fit import maximise_bound
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.types import Array
+
+
+class VHGP:
+    """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound."""
+
+    def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
+        self.inputs, self.outputs = check_rows(inputs, outputs), outputs
+        self.parameters, self.site_precisions = parameters, site_precisions
+        problem = VhgpProblem.of(inputs, outputs, parameters)
+        bound = Bound.tied(problem, site_precisions)
+        self.bound, self._noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
+        del bound  # its matrices make room for the factors
+        self._signal = KernelPosterior(problem.signal_kernel.matrix, noise_level + parameters.jitter)
+        self._noise = KernelPosterior(problem.noise_kernel.matrix, parameters.nugget + 1.0 / site_precisions)
+        self._signal_weights = self._signal.weights(outputs)
+
+    def predict(self, inputs: Array) -> LatentPrediction:
+        """Predict f and g at inputs (m, D)."""
+        signal, noise = self.parameters.signal, self.parameters.noise
+        of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
+        # The jitter is independent of the data, so it is what the variance of f cannot fall below.
+        variance = signal.variance + self.parameters.jitter - self._signal.explained_variance(of_signal)
+        prior = noise.variance + self.parameters.nugget
+        log_noise_variance = prior - self._noise.explained_variance(of_noise)
+        return LatentPrediction(
+            of_signal @ self._signal_weights,
+            np.maximum(variance, self.parameters.jitter),
+            self.parameters.noise_mean + of_noise @ self._noise_weights,
+            np.maximum(log_noise_variance, self.parameters.nugget + np.finfo(float).eps * noise.variance),
+        )
+
+
+def fit_vhgp(
+    inputs: Array,
+    outputs: Array,
+    choice: KernelChoice = DEFAULT_CHOICE,
+    *,
+    start: GpParameters | None = None,
+    most_iterations: int = 40,
+) -> VHGP:
+    """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
+
+    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows and family, else
+    one is made first. Raises TrainingError when the rows do not match or are not finite.
+    """
+    check_rows(inputs, outputs)
+    near = start or fit_gp(inputs, outputs, choice).parameters
+    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations))

@@ -1,0 +1,127 @@
+"""The analytical push model of Lynch, Maekawa and Tanie 1992, for any outline and a disc of finite radius."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from push_predictor.errors import RequestError, RigError, TrainingError
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.mechanics.limit_surface import Support, uniform_support
+from push_predictor.models.mechanics.quasi_static import DiscContact, Sweep, slide
+from push_predictor.types import Array
+
+TEXTBOOK_FRICTION = 0.3
+FRICTION_BOUNDS = (0.0, 2.0)  # of the fit; above 2 the motion cone of a usual slider covers all pushes
+LENGTH_BOUNDS = (0.02, 1.0)  # of the fit, as shares of the farthest the support can reach
+WEIGHTING_ROUNDS = 3
+DIFFERENCE_STEP = 1e-3  # relative, above the noise that the integration's tolerance leaves
+PARAMETER_TOLERANCE = 1e-5  # relative
+INTEGRATION_NOISE = 1e-4  # relative; residuals below it say nothing
+
+
+@dataclass(frozen=True, eq=False)
+class AnalyticalPush:
+    """Quasi-static pushing of a slider on an ellipsoidal limit surface by a disc with Coulomb friction.
+
+    pusher_radius in m, contact_friction a finite number >= 0, support by default that of uniform pressure.
+    Raises RigError for another radius or friction.
+    """
+
+    outline: Outline
+    pusher_radius: float
+    contact_friction: float = TEXTBOOK_FRICTION
+    support: Support = field(default=cast(Support, None))  # None only until __post_init__ is through
+
+    def __post_init__(self) -> None:
+        for name in ("pusher_radius", "contact_friction"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise RigError(f"{name}: {value!r} is not accepted, give a finite number >= 0")
+        if cast("Support | None", self.support) is None:
+            object.__setattr__(self, "support", uniform_support(self.outline))
+
+    def displacement(self, inputs: Array, duration: Array) -> Array:
+        """Displacement (n, 3: dx, dy in m, dtheta in rad) of the body's origin in the push direction's frame.
+
+        inputs (n, 3): velocity in m/s, contact as a fraction of the perimeter, angle in rad (contract,
+        section 1); duration (n,) in s. The pusher's centre runs straight at constant velocity. Where the
+        pusher slides off, the slider stays. Raises RequestError for a value that is not finite or goes back.
+        """
+        velocity, contact, angle = np.asarray(inputs, dtype=np.float64).T
+        _check_request(velocity, contact, angle, np.asarray(duration, dtype=np.float64))
+        normal = self.outline.inward_normal(contact)
+        start = self.outline.point(contact) - self.pusher_radius * normal
+        direction = rotate(normal, angle)
+        disc = DiscContact(self.outline, self.pusher_radius, self.contact_friction, self.support)
+        pose = slide(disc, Sweep(start, direction, velocity * duration))
+        heading = np.arctan2(direction[:, 1], direction[:, 0])
+        return np.column_stack([rotate(pose[:, :2], -heading), pose[:, 2]])
+
+
+def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcomes: Array) -> AnalyticalPush:
+    """Model with the contact friction and the length c that explain outcomes (n, 3: dx, dy, dtheta) best.
+
+    Least squares over the three outputs, each in units of the scale of its residuals, which is taken anew
+    from the fit WEIGHTING_ROUNDS times: the Gaussian likelihood's maximum for unknown, constant scales. The
+    centre of friction and the outline stay. Bounds: friction 0 to 2; c from 0.02 to 1 of the distance of the
+    outline's farthest point from the centre of friction, which no pressure can exceed. Deterministic. Raises
+    TrainingError for rows that do not fit together, fewer than two of them, or values that are not finite.
+    """
+    _check_rows(inputs, duration, outcomes)
+    low, high = _bounds(model)
+    inset = 1e-3 * (high - low)  # least_squares wants to start inside the bounds
+    estimate = np.clip([model.contact_friction, model.support.length], low + inset, high - inset)
+
+    def residuals(parameters: Array) -> Array:
+        return _with(model, parameters).displacement(inputs, duration) - outcomes
+
+    noise = INTEGRATION_NOISE * _root_mean_square(outcomes) + np.finfo(np.float64).tiny
+    for _ in range(WEIGHTING_ROUNDS):
+        scale = np.maximum(_root_mean_square(residuals(estimate)), noise)
+        estimate = least_squares(
+            lambda p, unit=scale: (residuals(p) / unit).ravel(),
+            estimate,
+            bounds=(low, high),
+            x_scale=high - low,
+            diff_step=DIFFERENCE_STEP,
+            xtol=PARAMETER_TOLERANCE,
+        ).x
+    return _with(model, estimate)
+
+
+def _check_request(velocity: Array, contact: Array, angle: Array, duration: Array) -> None:
+    for name, values in (("contact", contact), ("angle", angle), ("velocity", velocity), ("duration", duration)):
+        wrong = ~np.isfinite(values) | (name in ("velocity", "duration")) & (values < 0.0)
+        if np.any(wrong):
+            raise RequestError(name, float(values[wrong][0]), "a finite number, velocity and duration >= 0")
+
+
+def _root_mean_square(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
+
+
+def _with(model: AnalyticalPush, parameters: Array) -> AnalyticalPush:
+    friction, length = (float(p) for p in parameters)
+    return replace(model, contact_friction=friction, support=replace(model.support, length=length))
+
+
+def _bounds(model: AnalyticalPush) -> tuple[Array, Array]:
+    reach = float(np.max(np.linalg.norm(model.outline.vertices - model.support.centre, axis=1)))
+    shares = np.array([FRICTION_BOUNDS, (LENGTH_BOUNDS[0] * reach, LENGTH_BOUNDS[1] * reach)])
+    return shares[:, 0], shares[:, 1]
+
+
+def _check_rows(inputs: Array, duration: Array, outcomes: Array) -> None:
+    n = len(duration)
+    if n < 2 or np.shape(inputs) != (n, 3) or np.shape(outcomes) != (n, 3):
+        raise TrainingError(
+            f"rows: inputs {np.shape(inputs)}, duration {np.shape(duration)}, outcomes {np.shape(outcomes)} "
+            "are not accepted, give (n, 3), (n,), (n, 3) with n of at least 2"
+        )
+    if not all(np.all(np.isfinite(values)) for values in (inputs, duration, outcomes)):
+        raise TrainingError("rows: a value is not finite, give finite inputs, durations and outcomes")

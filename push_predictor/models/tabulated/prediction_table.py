@@ -1,0 +1,191 @@
+"""Predictions of a learnt model tabulated over a box: an answer costs the same however many rows it learnt from.
+
+Per output: the mean and the variance of f, and the log process variance, which is what is smooth: the variance of f has
+narrow dips at the training pushes, of quadratic shape. Each posterior is read at Chebyshev nodes as dense as its own
+lengthscales ask for. The correlation of the outputs, where they have one, is read at the knots themselves, as the three
+numbers of partial_correlation. All share the knots of one spline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from math import exp, sqrt
+
+import numpy as np
+
+from push_predictor.errors import PushPredictorError
+from push_predictor.models.correlation import Correlation, correlations, covariances
+from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
+from push_predictor.models.push_model import LearnedBody
+from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.push_chart import Chart, Whole
+from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
+from push_predictor.models.tabulated.table_sides import Side, table_sides
+from push_predictor.types import Array
+
+MOST_KNOTS = 1_000_000  # 96 MB
+MOST_NODES = 150_000  # of one posterior and edge: some seconds
+FEWEST_NODES = 10
+FEWEST_CELLS = 16
+
+
+@dataclass(frozen=True)
+class Density:
+    """Nodes and cells a lengthscale."""
+
+    nodes: float
+    cells: float
+
+
+SIGNAL = Density(nodes=4.0, cells=12.0)  # the signal is wanted to a small part of the noise, the noise to one of itself
+NOISE = Density(nodes=2.5, cells=6.0)
+COUPLING_CELLS = 3.0  # a bandwidth of the correlation
+
+
+class TooFineError(PushPredictorError):
+    """A model varies too fast for a table of a reasonable size, or its kernels allow none."""
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionTable:
+    """columns: which of velocity, place and angle the splines run over; least: of the variances of f; knots: how
+    many in all.
+    """
+
+    spline: TensorSpline
+    columns: slice
+    least: list[float]
+    knots: int
+
+    def moments(self, points: Array, box: Whole) -> tuple[Array, Array, Array]:
+        """Mean (n, 3), outcome and process covariance (n, 3, 3), SI units, at (n, 3) velocity, place, angle."""
+        values = self.spline(points[:, self.columns], box)
+        coupling = bounded(values[:, 9:]) if values.shape[1] > 9 else None
+        latent, process = np.maximum(values[:, 3:6], self.least), np.exp(values[:, 6:9])
+        return values[:, :3], *covariances(latent, process, coupling)
+
+    def moments_one(self, point: Sequence[float], box: int) -> list[float]:
+        """The same for one point, in plain numbers: 3 of the mean, 9 of the outcome's and 9 of the process covariance,
+        row by row.
+        """
+        values = self.spline.at(point[self.columns], box).tolist()
+        p, q, r = exp(values[6]), exp(values[7]), exp(values[8])
+        u, v, w = (max(value, least) for value, least in zip(values[3:6], self.least, strict=True))
+        mean, a, b, c = values[:3], u + p, v + q, w + r
+        if len(values) == 9:
+            return [*mean, a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c, p, 0.0, 0.0, 0.0, q, 0.0, 0.0, 0.0, r]
+        r12, r13, r23 = bounded_one(values[9:])
+        pq, pr, qr = r12 * sqrt(p * q), r13 * sqrt(p * r), r23 * sqrt(q * r)
+        ab, ac, bc = pq + r12 * sqrt(u * v), pr + r13 * sqrt(u * w), qr + r23 * sqrt(v * w)
+        return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
+
+
+def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinement: float = 1.0) -> PredictionTable:
+    """The table over the box of velocity, place and angle from low (3,) to high (3,).
+
+    refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError, also for kernels
+    that are no products over the axes.
+    """
+    regressions = [
+        sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
+        for regression in body.regressions
+    ]
+    if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in regressions):
+        raise TooFineError("only squared exponential kernels are products over the axes of a table")
+    sides = table_sides(body.scaling, chart, low, high)
+    resolved = _resolved(regressions, body.correlation)
+    axes = [Axis(side.low, side.high, _cells(side, resolved, refinement)) for side in sides]
+    knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
+    if knots > MOST_KNOTS:
+        raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are taken")
+    values = _values(_Grid(sides, axes, refinement), body, regressions)
+    values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
+    least = body.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
+    columns = _as_slice([side.column for side in sides])
+    return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
+
+
+def _values(grid: _Grid, body: LearnedBody, regressions: Sequence[GridRegression]) -> Array:
+    """At the knots: means, variances of f, log process variances, SI units, and the correlation's three numbers."""
+    outputs = [grid.outputs(regression) for regression in regressions]
+    values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
+    sd, zero = body.scaling.outcome_sd, np.zeros(3)
+    values *= np.concatenate([sd, sd**2, np.ones(3)])
+    values += np.concatenate([body.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
+    return values if body.correlation is None else np.concatenate([values, grid.coupling(body.correlation)], axis=-1)
+
+
+def _as_slice(columns: Sequence[int]) -> slice:
+    """Any columns out of three, without a copy."""
+    return slice(columns[0], columns[-1] + 1, columns[-1] - columns[0] if len(columns) == 2 else 1)
+
+
+def _resolved(regressions: Sequence[GridRegression], correlation: Correlation | None) -> list[tuple[ArdKernel, float]]:
+    """What the knots must resolve: kernels, and how many cells a lengthscale of each asks for."""
+    wanted = [(r.signal.kernel, SIGNAL.cells) for r in regressions]
+    wanted += [(r.noise.kernel, NOISE.cells) for r in regressions if r.noise]
+    return wanted + ([(correlation.kernel, COUPLING_CELLS)] if correlation else [])
+
+
+def _cells(side: Side, resolved: Sequence[tuple[ArdKernel, float]], refinement: float) -> int:
+    wanted = max(cells * side.lengthscales(kernel) for kernel, cells in resolved)
+    return max(FEWEST_CELLS, int(np.ceil(refinement * wanted)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """The knots of a table."""
+
+    sides: Sequence[Side]
+    axes: Sequence[Axis]
+    refinement: float
+
+    def outputs(self, regression: GridRegression) -> list[Array]:
+        """Mean and variance of f, and log process variance, at the knots, (boxes, cells_1 + 1, ...) each.
+
+        Where the place is none of the sides, there is one box.
+        """
+        mean, variance = self._moments(regression.signal, SIGNAL)
+        if regression.noise is None:
+            return [mean, variance, np.full_like(mean, regression.log_noise)]
+        log_mean, spread = self._moments(regression.noise, NOISE)
+        return [mean, variance, regression.log_noise + log_mean + 0.5 * spread]
+
+    def _moments(self, posterior: GridPosterior, density: Density) -> tuple[Array, Array]:
+        wanted = [density.nodes * side.lengthscales(posterior.kernel) for side in self.sides]
+        counts = [int(self.refinement * (FEWEST_NODES + count)) for count in wanted]
+        if (total := float(np.prod(counts, dtype=np.float64))) > MOST_NODES:
+            raise TooFineError(f"{total:.0f} nodes would be needed, at most {MOST_NODES} are taken")
+        nodes = [axis.nodes(count) for axis, count in zip(self.axes, counts, strict=True)]
+        mean, variance = posterior.moments(self._factors(posterior.kernel, posterior.inputs, nodes))
+        return self._at_knots(mean, counts), self._at_knots(variance, counts)
+
+    def coupling(self, correlation: Correlation) -> Array:
+        """The three numbers of a correlation at the knots, (boxes, cells_1 + 1, ..., 3)."""
+        knots = [np.linspace(axis.low, axis.high, axis.cells + 1) for axis in self.axes]
+        factors = self._factors(correlation.kernel, correlation.features, knots)
+        sums = weighted_sums(factors, correlation.products)
+        numbers = unbounded(correlations(sums.reshape(-1, sums.shape[-1]), correlation.shrinkage))
+        columns = [_boxes_first(column.reshape(sums.shape[:-1]), [len(knot) for knot in knots]) for column in numbers.T]
+        return np.stack(columns, axis=-1)
+
+    def _factors(self, kernel: ArdKernel, inputs: Array, values: Sequence[Array]) -> list[Array]:
+        return [side.factor(kernel, inputs, places) for side, places in zip(self.sides, values, strict=True)]
+
+    def _at_knots(self, values: Array, counts: Sequence[int]) -> Array:
+        values = _boxes_first(values, counts)
+        for d, (axis, count) in enumerate(zip(self.axes, counts, strict=True)):
+            values = along(d + 1, axis.nodes_to_knots(count), values)
+        return values
+
+
+def _boxes_first(values: Array, counts: Sequence[int]) -> Array:
+    """From the boxes of the place's axis one after the other, to (boxes, *counts)."""
+    shape = list(chain(*((size // count, count) for size, count in zip(values.shape, counts, strict=True))))
+    order = [*range(0, len(shape), 2), *range(1, len(shape), 2)]
+    return values.reshape(shape).transpose(order).reshape(-1, *counts)

@@ -1,0 +1,38 @@
+"""A sparse VHGP as its posteriors on grids, from which prediction_table.py makes a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.sparse.vhgp import InducedPosterior, SparseVHGP
+from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression
+from push_predictor.types import Array, IntArray
+
+_EPSILON = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class InducedGridPosterior(GridPosterior):
+    """Its inputs are the inducing inputs; root (m, r) as of InducedPosterior, so nothing is left to factorise."""
+
+    root: Array
+
+    @cached_property
+    def _explaining(self) -> tuple[IntArray, Array]:
+        return np.arange(len(self.inputs)), self.kernel.variance * self.root
+
+
+def sparse_grid_regression(regression: SparseVHGP) -> GridRegression:
+    """See grid_posterior.grid_regression."""
+    parameters = regression.parameters
+    jitter, of_noise = parameters.jitter, parameters.noise.variance
+    signal = _on_grid(regression.signal, parameters.signal.variance + jitter, jitter)
+    return GridRegression(signal, parameters.noise_mean, _on_grid(regression.noise, of_noise, _EPSILON * of_noise))
+
+
+def _on_grid(posterior: InducedPosterior, prior_variance: float, least_variance: float) -> InducedGridPosterior:
+    inputs, weights, none = posterior.inducing, posterior.weights, np.empty(0)
+    return InducedGridPosterior(posterior.kernel, inputs, none, weights, prior_variance, least_variance, posterior.root)

@@ -1,0 +1,63 @@
+"""The domain of a learnt model's training data with the model's predictions tabulated in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.features import push_features
+from push_predictor.models.push_model import DOMAIN_MARGIN, LearnedBody, Prediction, PushModel
+from push_predictor.models.tabulated.prediction_table import PredictionTable, tabulate
+from push_predictor.models.tabulated.push_chart import Chart, push_chart
+from push_predictor.types import Array, BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class TabulatedDomain:
+    """The box of features, from low (F,) to high (F,), that PushModel.in_domain means, margin included."""
+
+    chart: Chart
+    low: Array
+    high: Array
+    table: PredictionTable
+
+    def predict(self, inputs: Array) -> tuple[BoolArray, Prediction | None]:
+        """Which of the pushes (n, 3) lie in the domain, and the predictions if all of them do."""
+        velocity, contact, angle = inputs.T
+        place, box = self.chart.place(contact)
+        features = np.column_stack([velocity, *self.chart.place_features(place, box), angle])
+        inside = np.asarray(((features >= self.low) & (features <= self.high)).all(axis=1))
+        if not inside.all():
+            return inside, None
+        points = np.column_stack([velocity, place, angle])
+        return inside, Prediction(*self.table.moments(points, box), inside)
+
+    def predict_one(self, push: Sequence[float]) -> Prediction | None:
+        """The prediction for one push in the domain, in plain numbers, several times as fast; else None."""
+        velocity, contact, angle = push
+        place, box = self.chart.place_one(contact)
+        features = (velocity, *self.chart.place_features(place, box), angle)
+        for feature, (low, high) in zip(features, self._bounds, strict=True):
+            if not low <= feature <= high:
+                return None
+        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
+        covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
+        return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
+
+    @cached_property
+    def _bounds(self) -> list[tuple[float, float]]:
+        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
+
+
+def tabulated_domain(model: PushModel, body: LearnedBody, refinement: float = 1.0) -> TabulatedDomain:
+    """The domain of a model with this body; refinement: of the table. Raises TooFineError."""
+    inputs, chart = model.training.inputs, push_chart(model.rig.outline)
+    low, high = inputs.min(axis=0), inputs.max(axis=0)
+    low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
+    features = push_features(model.rig.outline, inputs)
+    least, most = features.min(axis=0), features.max(axis=0)
+    margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
+    return TabulatedDomain(chart, least - margin, most + margin, tabulate(body, chart, low, high, refinement))

@@ -1,0 +1,168 @@
+"""A push model as it is served: inside the domain of its training data it answers from a table, in microseconds.
+
+A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but is a smooth function of at most three. It
+is tabulated once, the table is compared with the model, and it is used only if it is true to it. Every other push and
+every other model is answered by the model itself.
+
+The analytical model and the effects that follow from it have no table: where contacts begin to slip they bend, and a
+table would have to be very fine there. One push alone is computed in plain numbers instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.mechanics.analytical_scalar import single_push
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, LearnedBody, Prediction, PushModel
+from push_predictor.models.tabulated.prediction_table import TooFineError
+from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
+from push_predictor.types import Array, BoolArray
+
+MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
+COVARIANCE_TOLERANCE = 1e-2  # relative, of the variance of any combination of outputs
+CHECKED = 250  # random pushes of the domain, and as many training pushes
+REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
+
+
+@dataclass(frozen=True)
+class TableError:
+    """The largest differences found between table and model: of a mean, in predicted standard deviations, and of the
+    variance that outcome or process covariance give any combination of outputs, relative: the largest eigenvalue of
+    L^-1 T L^-T - I, of either sign, where T is the table's and L L' the model's.
+    """
+
+    mean: float
+    covariance: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a table with these errors may answer: at half the tolerances, for not every push was compared."""
+        return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.covariance <= COVARIANCE_TOLERANCE
+
+    def __str__(self) -> str:
+        return f"means to {self.mean:.1e} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
+
+
+@dataclass(frozen=True, eq=False)
+class ServedModel:
+    """A model and, in words, how it is answered for. domain and error are None where there is no table.
+
+    A push gets the same answer alone as among others, to rounding. Made by `serve`.
+    """
+
+    model: PushModel
+    how: str
+    domain: TabulatedDomain | None = None
+    error: TableError | None = None
+
+    @property
+    def tabulated(self) -> bool:
+        """Whether pushes in the domain are answered from a table."""
+        return self.domain is not None
+
+    def predict(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
+        """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same.
+
+        Of an extended model the base is tabulated; the effects are computed and added.
+        """
+        if self.domain is None:
+            return self._quick.predict(inputs, duration, covariates)
+        prediction, body = self._of_base(self.domain, inputs, duration), self._quick.body
+        if not isinstance(body, ExtendedBody):
+            return prediction
+        push = Push(inputs, duration, covariates or {})
+        moments = body.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
+        return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
+
+    def exact_count(self, inputs: Array) -> int:
+        """How many of the pushes (n, 3) are answered by the model itself, not from a table."""
+        return len(inputs) if self.domain is None else int(np.sum(~self.model.base.in_domain(inputs)))
+
+    @cached_property
+    def _quick(self) -> PushModel:
+        """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""
+        return replace(self.model, body=_quick_body(self.model.body))
+
+    def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
+        base = self.model.base
+        if len(inputs) == 1:
+            return domain.predict_one(inputs[0].tolist()) or base.predict(inputs, duration)
+        inside, prediction = domain.predict(inputs)
+        if prediction is not None:
+            return prediction
+        exact = base.predict(inputs[~inside], duration[~inside])
+        if not inside.any():
+            return exact
+        return _merged(inside, self._of_base(domain, inputs[inside], duration[inside]), exact)
+
+
+def serve(model: PushModel) -> ServedModel:
+    """A model with a table, where there can be one; takes about a second for a VHGP of 1000 rows."""
+    base = model.base
+    if not isinstance(base.body, LearnedBody):
+        return ServedModel(model, "exact: only learnt models have a table")
+    how = ""
+    for refinement in REFINEMENTS:
+        try:
+            domain = tabulated_domain(base, base.body, refinement)
+        except TooFineError as too_fine:
+            return ServedModel(model, f"exact: {how}{too_fine}")
+        error = _error(base, domain)
+        if error.accepted:
+            return ServedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
+        how = f"a table gives {error}; "
+    return ServedModel(model, f"exact: {how}too far off")
+
+
+def _quick_body(body: LearnedBody | AnalyticalBody | ExtendedBody) -> LearnedBody | AnalyticalBody | ExtendedBody:
+    if isinstance(body, LearnedBody):
+        return body
+    quick = replace(body, physics=single_push(body.physics))
+    if isinstance(quick, ExtendedBody) and isinstance(quick.base, AnalyticalBody):
+        return replace(quick, base=replace(quick.base, physics=single_push(quick.base.physics)))
+    return quick
+
+
+def _error(model: PushModel, domain: TabulatedDomain) -> TableError:
+    inputs = _probes(model)
+    inside, table = domain.predict(inputs)
+    assert table is not None, inputs[~inside]
+    exact = model.predict(inputs, np.full(len(inputs), model.training.duration[0]))
+    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
+    of_mean = np.max(np.abs(table.mean - exact.mean) / sd)
+    of_outcome = relative_error(table.covariance, exact.covariance)
+    of_process = relative_error(table.process_covariance, exact.process_covariance)
+    return TableError(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+
+
+def relative_error(found: Array, exact: Array) -> Array:
+    """By how much covariances (n, 3, 3) err at most in the variance of any combination of outputs, relative, (n,)."""
+    whitener = np.linalg.inv(np.linalg.cholesky(exact))
+    eigenvalues = np.linalg.eigvalsh(whitener @ found @ whitener.transpose(0, 2, 1))
+    return np.asarray(np.abs(eigenvalues - 1.0).max(axis=1))
+
+
+def _probes(model: PushModel) -> Array:
+    """Pushes spread evenly over the domain, and training pushes."""
+    rng, known = np.random.default_rng(0), model.training.inputs
+    low, high = known.min(axis=0), known.max(axis=0)
+    low[1], high[1] = 0.0, 1.0
+    spread = rng.uniform(low, high, (20 * CHECKED, 3))
+    spread = spread[model.in_domain(spread)][:CHECKED]
+    return np.concatenate([spread, rng.permutation(known)[:CHECKED]])
+
+
+def _merged(chosen: BoolArray, one: Prediction, other: Prediction) -> Prediction:
+    """Row by row from `one` where chosen (n,), else from `other`."""
+    parts = []
+    for name in ("mean", "covariance", "process_covariance", "in_domain"):
+        first, second = getattr(one, name), getattr(other, name)
+        part = np.empty((len(chosen), *first.shape[1:]), first.dtype)
+        part[chosen], part[~chosen] = first, second
+        parts.append(part)
+    return Prediction(*parts)

@@ -1,0 +1,110 @@
+"""rosbag2's player services: each calls the player's method of the same name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from builtin_interfaces.msg import Duration, Time
+from rclpy.node import Node
+
+from push_predictor.replay.clock import SECOND
+from push_predictor.replay.player import ReplayPlayer
+from push_predictor.replay.range import PlayRange
+from push_predictor_interfaces.srv import (
+    Burst,
+    GetRate,
+    IsPaused,
+    Pause,
+    Play,
+    PlayNext,
+    Resume,
+    Seek,
+    SetRate,
+    Stop,
+    TogglePaused,
+)
+
+
+class ReplayControls:
+    """The services of a player, private to its node."""
+
+    def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
+        self._node, self._player, self._restamps = node, player, restamps
+        for kind, name in (
+            (Pause, "pause"),
+            (Resume, "resume"),
+            (TogglePaused, "toggle_paused"),
+            (IsPaused, "is_paused"),
+            (GetRate, "get_rate"),
+            (SetRate, "set_rate"),
+            (Play, "play"),
+            (PlayNext, "play_next"),
+            (Burst, "burst"),
+            (Seek, "seek"),
+            (Stop, "stop"),
+        ):
+            node.create_service(kind, f"~/{name}", getattr(self, f"_{name}"))
+
+    def _pause(self, request: Any, response: Any) -> Any:
+        self._player.pause()
+        return response
+
+    def _resume(self, request: Any, response: Any) -> Any:
+        self._player.resume()
+        return response
+
+    def _toggle_paused(self, request: Any, response: Any) -> Any:
+        self._player.toggle_paused()
+        return response
+
+    def _is_paused(self, request: Any, response: Any) -> Any:
+        response.paused = self._player.paused
+        return response
+
+    def _get_rate(self, request: Any, response: Any) -> Any:
+        response.rate = self._player.rate
+        return response
+
+    def _set_rate(self, request: Any, response: Any) -> Any:
+        if self._restamps and request.rate != 1.0:
+            self._node.get_logger().warning(f"set_rate: rate {request.rate!r} refused, restamped replay keeps 1.0")
+            response.success = False
+        else:
+            response.success = self._player.set_rate(request.rate)
+        return response
+
+    def _play(self, request: Any, response: Any) -> Any:
+        response.success = self._player.play(
+            PlayRange(
+                max(0, _nanoseconds(request.start_offset)),
+                _limit(request.playback_duration),
+                _limit(request.playback_until_timestamp),
+            )
+        )
+        return response
+
+    def _play_next(self, request: Any, response: Any) -> Any:
+        response.success = self._player.play_next()
+        return response
+
+    def _burst(self, request: Any, response: Any) -> Any:
+        response.actually_burst = self._player.burst(request.num_messages)
+        return response
+
+    def _seek(self, request: Any, response: Any) -> Any:
+        self._player.seek(_nanoseconds(request.time))
+        response.success = True
+        return response
+
+    def _stop(self, request: Any, response: Any) -> Any:
+        self._player.stop()
+        return response
+
+
+def _nanoseconds(time: Time | Duration) -> int:
+    return int(time.sec) * SECOND + int(time.nanosec)
+
+
+def _limit(time: Time | Duration) -> int | None:
+    """A request left empty plays everything, so 0 is no limit here."""
+    return value if (value := _nanoseconds(time)) > 0 else None

@@ -1,0 +1,95 @@
+"""Which models a validator judges: files, or names that predict_server knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from pathlib import Path
+from time import monotonic
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from push_predictor.errors import ModelFileError, RequestError
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model
+from push_predictor_interfaces.srv import ListModels
+
+PAUSE = 1.0  # s after an answer that does not settle all
+PATIENCE = 5.0  # s after which a question without an answer is asked again
+
+
+class ModelSource:
+    """Loads the models wanted: files at once, names by asking the server, again and again, where their files are.
+
+    wanted: paths or names, the main model first; an empty text is the server's default model. Raises ModelFileError for
+    a file that is no model, RequestError for two files that hold models of one name.
+    """
+
+    def __init__(self, node: Node, wanted: Sequence[str]) -> None:
+        self._wanted = list(dict.fromkeys(wanted))
+        self._files = {text: Path(text).expanduser().resolve() for text in self._wanted if _is_path(text)}
+        loaded = {text: load_model(path) for text, path in self._files.items()}
+        self._found = {text: (model.name, model) for text, model in loaded.items()}
+        self._client = node.create_client(ListModels, "list_models")
+        self._asked: Future | None = None
+        self._next = 0.0
+        self.problems: list[str] = []
+        names = [model.name for model in loaded.values()]
+        if repeated := sorted({name for name in names if names.count(name) > 1}):
+            raise RequestError("compare", repeated, "model files that hold models of different names")
+
+    def models(self) -> dict[str, PushModel] | None:
+        """All wanted models by the name to ask for, or None while the server has not told about some of them."""
+        if len(self._found) < len(self._wanted):
+            return None
+        return dict(self._found[text] for text in self._wanted)
+
+    def work(self) -> None:
+        """Ask the server what it has, now and then, until all is settled. Call it often, from the executor's thread."""
+        now = monotonic()
+        if self._asked is not None and self._asked.done():
+            self._learn(self._asked.result())
+            self._asked, self._next = None, now + PAUSE if self.problems else inf
+        if now < self._next or not self._client.service_is_ready():
+            return
+        if self._asked is not None:  # the server went away in between
+            self._client.remove_pending_request(self._asked)
+        self._asked, self._next = self._client.call_async(ListModels.Request()), now + PATIENCE
+
+    def _learn(self, response: ListModels.Response) -> None:
+        files = {name: _file_of(text) for name, text in zip(response.names, response.descriptions, strict=False)}
+        self.problems = [
+            problem for text in self._wanted if (problem := self._settle(text, files, response.default_model))
+        ]
+
+    def _settle(self, text: str, files: Mapping[str, str], default: str) -> str:
+        """Answers what is wrong with a wanted model, in words, empty if nothing."""
+        if text in self._files:
+            return self._difference(self._found[text][0], self._files[text], files)
+        name = text or default
+        if text in self._found:
+            return ""
+        if not files.get(name):
+            known = f"which has {', '.join(files)}" if files else "which has none"
+            return f"model {name!r} is not known to predict_server, {known}"
+        try:
+            self._found[text] = (name, load_model(Path(files[name])))
+        except ModelFileError as error:
+            return f"model {name!r} of predict_server: {error}"
+        return ""
+
+    def _difference(self, name: str, path: Path, files: Mapping[str, str]) -> str:
+        if name not in files:
+            return f"model {name!r} of {path} is not loaded by predict_server"
+        if files[name] and Path(files[name]) != path:
+            return f"model {name!r}: predict_server took it from {files[name]}, not from {path}"
+        return ""
+
+
+def _is_path(text: str) -> bool:
+    return "/" in text or Path(text).is_file()
+
+
+def _file_of(description: str) -> str:
+    return description.partition("file=")[2]

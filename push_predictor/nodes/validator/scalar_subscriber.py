@@ -1,0 +1,209 @@
+"""Scalar topics beside the sensors: subscribed when they appear, with the type and QoS of their publishers.
+
+A message without a header takes the time of /clock where somebody publishes that, else the time at which it was sent.
+push_replay tells each such message's log time on /clock just before it, so it gets the stamp that reading the recording
+gives it.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from time import monotonic, time_ns
+from typing import Any
+
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.validate_topic_name import validate_topic_name
+
+from msg_adapters.scalars import ScalarInbox, SentTimes
+from push_predictor.errors import RequestError
+from push_predictor.nodes.polling import PolledGroup, take_all
+from push_predictor.nodes.qos import DEPTH
+from push_predictor.nodes.replay.topics import message_class
+from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
+from push_predictor.recordings.streams import ScalarStream
+
+LOOK = 0.05  # s between two looks at who publishes what
+UNTOLD = 1_000_000_000  # ns after its sending by which a message's /clock is known, if there is one
+STALE = 5_000_000_000  # ns after the last message of a /clock that is gone, from when on its time is over
+CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
+
+
+class _Reader:
+    """A subscription that follows its publishers: it is made anew where their type or QoS changes."""
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self._node, self._topic, self._group = node, topic, PolledGroup()
+        self._subscription: Subscription | None = None
+        self._suits: tuple[Any, ...] = ()
+
+    def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        """Subscribe to this type, as these publishers offer it."""
+        profile = _suited([publisher.qos_profile for publisher in publishers])
+        suits = kind, profile.durability, profile.reliability
+        if suits == self._suits:
+            return
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription, self._suits = None, ()
+        try:
+            self._subscription = self._node.create_subscription(
+                message_class(kind), self._topic, _nothing, profile, callback_group=self._group, raw=True
+            )
+        except rclpy_implementation.RCLError:
+            return  # the executor still holds the one of another type: at the next call
+        self._suits = suits
+
+    def taken(self) -> Iterator[tuple[bytes, int]]:
+        """What has arrived, each message with the time (ns) at which it was sent."""
+        if self._subscription is not None:
+            yield from ((data, sent) for data, _, sent in take_all(self._subscription))
+
+
+@dataclass(eq=False)
+class _Topic:
+    """A topic as it was asked for. name: as in the covariate; problem: why there are no samples, empty if there are."""
+
+    asked: str
+    name: str
+    reader: _Reader
+    problem: str = ""
+    inbox: ScalarInbox | None = None
+
+
+class ScalarInlet:
+    """Subscribes to scalar topics. names: relative or absolute; topic:/NAME is the covariate, as the name was given.
+
+    `look` and `take` are called in the executor's thread, `drain` in any. Raises RequestError for a name that is none.
+    """
+
+    def __init__(self, node: Node, names: Sequence[str]) -> None:
+        _check(names)
+        self._node = node
+        self._topics = [_Topic(text, _name(text), _Reader(node, text)) for text in names]
+        self._ticks, self._clock = _Reader(node, CLOCK), SentTimes()
+        self._clock_is_there = False
+        self._looked = 0.0
+        self._draining = threading.Lock()
+        self.look()
+
+    @property
+    def names(self) -> list[str]:
+        """What was asked for, as it stands in the covariates."""
+        return [topic.name for topic in self._topics]
+
+    def look(self) -> None:
+        """Subscribe to what has appeared. Call it often."""
+        if not self._topics or monotonic() - self._looked < LOOK:
+            return
+        self._looked = monotonic()
+        with self._draining:
+            for topic in self._topics:
+                self._find(topic)
+            publishers = self._node.get_publishers_info_by_topic(CLOCK)
+            self._clock_is_there = bool(publishers)
+            if publishers:
+                self._ticks.follow(CLOCK_TYPE, publishers)
+
+    def drain(self) -> None:
+        """Bring in what has arrived by now."""
+        with self._draining:
+            for topic in self._topics:
+                for data, sent in topic.reader.taken():
+                    assert topic.inbox is not None
+                    topic.inbox.put(data, sent)
+            for data, sent in self._ticks.taken():
+                self._clock.put(data, sent)
+
+    def waiting(self) -> bool:
+        """Has every topic that is there sent something that was not taken yet?"""
+        return all(len(topic.inbox) > 0 for topic in self._topics if topic.inbox is not None)
+
+    def take(self, near: int | None, last: bool = False) -> dict[str, ScalarStream]:
+        """The samples since the last call of every topic that is or was there. near: a recent stamp (ns) of the poses.
+
+        A message that waits for /clock to tell its time comes in a later call, or, if this is the last one, now.
+        """
+        until, time_of = self._dating()
+        until = sys.maxsize if last else until
+        with self._draining:
+            there = [(topic.name, topic.inbox) for topic in self._topics if topic.inbox is not None]
+            return {name: inbox.take(until, time_of, near) for name, inbox in there}
+
+    def figures(self) -> dict[str, int]:
+        """Counts by topic; rejected also by kind, for the kinds that occurred."""
+        found: dict[str, int] = {}
+        for topic in self._topics:
+            if topic.inbox is not None:
+                found |= {f"topic:{topic.name} samples": topic.inbox.received}
+                found |= {f"topic:{topic.name} rejected {kind}": count for kind, count in topic.inbox.rejected.items()}
+        return found
+
+    def problems(self) -> list[str]:
+        """Which topics bring nothing, and what of the others was not used, in words."""
+        found = [topic.problem for topic in self._topics if topic.problem]
+        for topic in self._topics:
+            if topic.inbox is not None and topic.inbox.rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in topic.inbox.rejected.items())
+                found.append(f"{topic.name}: {topic.inbox.rejected.total()} samples not used ({kinds})")
+        return found
+
+    def _find(self, topic: _Topic) -> None:
+        """Subscribe to a topic that is published, or say why not; one that was there and is gone stays as it is."""
+        publishers = self._node.get_publishers_info_by_topic(topic.asked)
+        kinds = sorted({publisher.topic_type for publisher in publishers})
+        usable = [kind for kind in kinds if kind in SCALAR_LAYOUTS]
+        if len(usable) == 1:
+            if topic.inbox is None or topic.inbox.kind != usable[0]:
+                topic.inbox, topic.problem = ScalarInbox(usable[0]), ""
+            topic.reader.follow(usable[0], [p for p in publishers if p.topic_type == usable[0]])
+        elif kinds:
+            accepted = ", ".join(SCALAR_LAYOUTS)
+            topic.problem = f"scalar topic {topic.name}: of type {', '.join(kinds)}, one of {accepted} is accepted"
+        elif topic.inbox is None:
+            topic.problem = f"scalar topic {topic.name}: nobody publishes it"
+
+    def _dating(self) -> tuple[int, Callable[[int], int | None]]:
+        """Up to which sending time (ns) messages can be dated by now, and how."""
+        newest, at = self._clock.newest, self._clock.at
+        if self._clock_is_there:
+            return newest or 0, at
+        over = 0 if newest is None else newest + STALE
+        return time_ns() - UNTOLD, lambda sent: sent if sent > over else at(sent)
+
+
+def _check(names: Sequence[str]) -> None:
+    for text in names:
+        try:
+            validate_topic_name(text)
+        except InvalidTopicNameException as error:
+            raise RequestError("scalar_topics", text, f"a topic's name ({' '.join(str(error).split())})") from None
+        if text.startswith("~") or [_name(other) for other in names].count(_name(text)) > 1:
+            raise RequestError("scalar_topics", text, "relative or absolute names, each topic once")
+
+
+def _name(asked: str) -> str:
+    """As a recording has it, whatever the node's namespace: with a slash before it."""
+    return f"/{asked.strip('/')}"
+
+
+def _suited(publishers: Sequence[QoSProfile]) -> QoSProfile:
+    """What all publishers offer, as recorders ask for it: what was sent before is had, where they keep it."""
+    kept = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
+    return QoSProfile(
+        depth=DEPTH,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+    )
+
+
+def _nothing(message: object) -> None:
+    """Never called: drain() takes the messages."""

@@ -1,0 +1,57 @@
+"""The markers of a window: the push, what was predicted and what was observed, in the world (docs/visualisation.md)."""
+
+from __future__ import annotations
+
+import numpy as np
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers, prediction_markers, push_markers
+from push_predictor.geometry.frames import to_world
+from push_predictor.geometry.touch import covariance_in_world, displaced
+from push_predictor.models.push_model import Prediction
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.types import Array
+
+LIMIT = 2.795483482915108  # the root of the 95 % quantile of chi-squared with three degrees of freedom
+
+
+def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
+    """Pusher, push, outlines, the 95 % ellipse and what was observed, in frame_id (prediction: n = 1).
+
+    Each has a namespace of its own and id 0, so a window replaces the one before.
+    """
+    heading = np.array([window.push_heading])
+    predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
+    covariance = covariance_in_world(prediction.covariance, heading)[0]
+    start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
+    reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
+    distance = error_in_sd(window, prediction)
+    parts = (
+        push_markers(tip_of(rig, window), rig.pusher_radius, window.push_heading, *where),
+        prediction_markers(rig.outline.vertices, start, predicted, covariance[:2, :2], end, *where),
+        magnified_markers(predicted, covariance, end, reach, window.push_heading, *where),
+        label_marker(_label(window, distance), start[:2], reach, distance > LIMIT, *where),
+    )
+    return MarkerArray(markers=[marker for part in parts for marker in part.markers])
+
+
+def tip_of(rig: Rig, window: PushWindow) -> Array:
+    """The pusher's centre (2,), m, at the window's start: that of a disc that touches the outline at the contact."""
+    contact = np.array([window.contact])
+    body = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
+    return to_world(body, window.slider_start)[0]
+
+
+def error_in_sd(window: PushWindow, prediction: Prediction) -> float:
+    """The Mahalanobis distance of the outcome (dx, dy, dtheta) from the prediction (n = 1)."""
+    away = window.displacement - prediction.mean[0]
+    return float(np.sqrt(away @ np.linalg.solve(prediction.covariance[0], away)))
+
+
+def _label(window: PushWindow, distance: float) -> str:
+    return (
+        f"{window.push_id}, window {window.index}\n"
+        f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {LIMIT:.1f})\n"
+        f"ellipse and dial {MAGNIFICATION:.0f} times enlarged"
+    )

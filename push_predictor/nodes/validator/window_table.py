@@ -1,0 +1,103 @@
+"""The table of windows that a validator keeps on disk while pushes happen: what a trace of the residual starts from.
+
+Every window is on disk as soon as it is found, with its covariates, whatever becomes of the validator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from push_predictor.nodes.validator.residual_recorder import JOURNAL, ResidualJournal
+from push_predictor.recordings.atomic_append import append_lines
+from push_predictor.recordings.rig import Rig, save_rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import rig_path, write_table
+from push_predictor.recordings.windows.push_window import PushWindow
+
+TABLE = "pushes.csv"
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
+
+class WindowTable:
+    """FOLDER/pushes.csv and the rig beside it, anew with the first window that is added."""
+
+    def __init__(self, folder: Path, rig: Rig) -> None:
+        self.path, self._rig = folder / TABLE, rig
+        self._names: tuple[str, ...] | None = None
+        self.cut_off: Path | None = None  # where an earlier score was put that did not come to its end
+
+    def add(
+        self, windows: Sequence[PushWindow], before: Sequence[PushWindow], first: Mapping[str, float] = NOTHING
+    ) -> None:
+        """Append windows; `before` are all those that are in the file.
+
+        first: of scalar topics the first value: what reading a recording gives windows before it. Raises OSError that
+        names the path.
+        """
+        if not windows:
+            return
+        names = tuple(dict.fromkeys(name for window in windows for name in window.covariates))
+        try:
+            if self._names is None or not set(names) <= set(self._names):
+                self._begin(tuple(dict.fromkeys([*(self._names or ()), *names])), before, first)
+            self._append(windows, first)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+
+    def _begin(self, names: tuple[str, ...], before: Sequence[PushWindow], first: Mapping[str, float]) -> None:
+        if self._names is None:
+            self.cut_off = put_aside(self.path.parent)
+            ResidualJournal(self.path.parent).begin()
+        self._names = names
+        write_table(self.path, _table(before, names, first))
+        save_rig(self._rig, rig_path(self.path))
+
+    def _append(self, windows: Sequence[PushWindow], first: Mapping[str, float]) -> None:
+        assert self._names is not None
+        append_lines(self.path, (",".join(_cells(window, self._names, first)) for window in windows))
+
+
+def put_aside(folder: Path) -> Path | None:
+    """Keep the windows and residuals of a score that was cut off from being written over: they go to
+    FOLDER/cut_off_DATE (of the last residual, UTC). None where there is no such. Raises OSError.
+    """
+    journal = folder / JOURNAL
+    if not journal.exists():
+        return None
+    date = datetime.fromtimestamp(journal.stat().st_mtime, timezone.utc)
+    place = folder / f"cut_off_{date:%Y%m%dT%H%M%S%f}"
+    place.mkdir(exist_ok=True)
+    for path in (
+        folder / TABLE,
+        rig_path(folder / TABLE),
+        journal,
+    ):  # the journal, which tells, last
+        if path.exists():
+            path.replace(place / path.name)
+    return place
+
+
+def _table(windows: Sequence[PushWindow], names: Sequence[str], first: Mapping[str, float]) -> PushTable:
+    """The windows as rows with just these covariates; where a window lacks one, the first value, NaN without any."""
+    return PushTable(
+        np.array([[w.velocity, w.contact, w.angle] for w in windows]).reshape(-1, 3),
+        np.array([w.duration for w in windows]),
+        np.array([w.displacement for w in windows]).reshape(-1, 3),
+        np.array([w.push_id for w in windows], dtype=np.str_),
+        {name: np.array([_value(w, name, first) for w in windows]) for name in names},
+    )
+
+
+def _cells(w: PushWindow, names: Sequence[str], first: Mapping[str, float]) -> list[str]:
+    numbers = [w.velocity, w.contact, w.angle, w.duration, *w.displacement.tolist()]
+    others = [_value(w, name, first) for name in names]
+    return [*map(repr, map(float, numbers)), w.push_id, *map(repr, others)]
+
+
+def _value(window: PushWindow, name: str, first: Mapping[str, float]) -> float:
+    return float(window.covariates.get(name, first.get(name, np.nan)))

@@ -1,0 +1,122 @@
+"""Validation while windows arrive: which were predicted by whom, and what that says so far. No ROS in here."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.online.row_file import RowFile
+from push_predictor.online.running_score import RunningScore
+from push_predictor.online.window_log import Refusal, write_window_log
+from push_predictor.online.window_rows import WindowRows
+from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
+from push_predictor.types import Array, IntArray
+
+MAIN_RESULT = "validation.json"
+_ANSWER = struct.Struct("<q12d")  # number of the window, mean, covariance
+_NUMBER = struct.Struct("<q")
+
+
+class LiveValidation:
+    """Windows in the order they were found, and the predictions of each model as they come in.
+
+    models: by the name they are asked for; the first is the main one, and a model's number is its place. All of it is
+    kept in temporary files: a window takes some twenty bytes of memory until the result is written.
+    """
+
+    def __init__(self, models: Mapping[str, PushModel]) -> None:
+        self.names, self.models = tuple(models), tuple(models.values())
+        self.windows = WindowRows()
+        self.scores = tuple(RunningScore(model.training_mean) for model in self.models)
+        self._answers = tuple(_Answers() for _ in self.models)
+        self._refused = tuple(RowFile() for _ in self.models)
+
+    def add(self, window: PushWindow) -> int:
+        """Take a window; returns its number."""
+        self.windows.append(window)
+        return len(self.windows) - 1
+
+    def record(self, model: int, number: int, prediction: Prediction) -> None:
+        """Take what a model predicted for a window (n = 1), once."""
+        window, mean, covariance = self.windows[number], prediction.mean[0], prediction.covariance[0]
+        self._answers[model].add(number, mean, covariance)
+        self.scores[model].add(window.push_id, mean, covariance, window.displacement)
+
+    def refuse(self, model: int, number: int, reason: str) -> None:
+        """Take note that a model has no prediction for a window, and why."""
+        self._refused[model].append(_NUMBER.pack(number) + reason.encode())
+
+    def predicted(self, model: int = 0) -> WindowRows:
+        """The windows that a model has answered, in order."""
+        return self.windows.take(self._answers[model].sorted()[0])
+
+    def refused(self, model: int = 0) -> list[Refusal]:
+        """The windows that it has refused, in order."""
+        pairs = sorted((*_NUMBER.unpack_from(row), row[_NUMBER.size :].decode()) for row in self._refused[model])
+        return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
+
+    def unanswered(self, model: int = 0) -> int:
+        """How many windows it has neither answered nor refused."""
+        return len(self.windows) - len(self._answers[model]) - len(self._refused[model])
+
+    def comparison(self, model: int = 0) -> Comparison:
+        """What a model predicted beside what was observed, for the windows it has answered."""
+        numbers, mean, covariance = self._answers[model].sorted()
+        table = windows_to_table(self.windows.take(numbers))
+        return comparison_of(self.models[model], table, mean, covariance)
+
+    def residuals(self) -> Iterator[tuple[str, PushWindow, Array, Array]]:
+        """Name of the model, window, mean (3,) and covariance (3, 3) of every answer, in the order of the windows."""
+        answers = [zip(*stored.sorted(), strict=True) for stored in self._answers]
+        rows = [(number, k, mean, covariance) for k, each in enumerate(answers) for number, mean, covariance in each]
+        for number, k, mean, covariance in sorted(rows, key=lambda row: row[:2]):
+            yield self.names[k], self.windows[number], mean, covariance
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write validation.json of the main model, validation_NAME.json of the others, and their windows one by one.
+
+        Raises OSError.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        return [self._write(folder, k) for k in range(len(self.models))]
+
+    def _write(self, folder: Path, model: int) -> Path:
+        suffix = f"_{_file_name(self.names[model])}" if model else ""
+        comparison, path = self.comparison(model), folder / MAIN_RESULT.replace(".json", f"{suffix}.json")
+        windows, refused = self.predicted(model), self.refused(model)
+        write_window_log(folder / f"windows{suffix}.json", windows, comparison, refused, self.unanswered(model))
+        write_whole(path, (json.dumps(metrics_json(comparison), indent=2, allow_nan=False) + "\n").encode())
+        return path
+
+
+class _Answers:
+    """Means and covariances by number of window, packed."""
+
+    def __init__(self) -> None:
+        self._rows = RowFile()
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def add(self, number: int, mean: Array, covariance: Array) -> None:
+        self._rows.append(_ANSWER.pack(number, *mean.tolist(), *covariance.ravel().tolist()))
+
+    def sorted(self) -> tuple[IntArray, Array, Array]:
+        """Numbers (n,), means (n, 3), covariances (n, 3, 3), by number."""
+        data = np.frombuffer(b"".join(self._rows), dtype=[("number", "<i8"), ("values", "<f8", 12)])
+        data = data[np.argsort(data["number"])]
+        values = data["values"]
+        return data["number"].copy(), values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
+
+
+def _file_name(name: str) -> str:
+    """A model's name as part of a file's: a server may call its models anything."""
+    return re.sub(r"[^\w.-]", "_", name)

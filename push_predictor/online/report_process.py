@@ -1,0 +1,63 @@
+"""The HTML report of a validation, made by a process of its own: pictures take seconds, samples come meanwhile."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import sys
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.errors import PushPredictorError
+from push_predictor.evaluation.offline import report_windows
+from push_predictor.evaluation.validation import Comparison
+from push_predictor.models.push_model import PushModel
+from push_predictor.online.live_validation import LiveValidation
+from push_predictor.online.window_rows import WindowRows
+
+
+class ReportWriter:
+    """Writes one report at a time."""
+
+    def __init__(self) -> None:
+        self._process: BaseProcess | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Is a report being written?"""
+        return self._process is not None and self._process.is_alive()
+
+    @property
+    def failed(self) -> bool:
+        """Did the last report come to nothing?"""
+        return self._process is not None and self._process.exitcode not in (None, 0)
+
+    def start(self, validation: LiveValidation, folder: Path) -> None:
+        """Write FOLDER/report.html about the models that answered for the windows of the main one."""
+        self.stop()
+        comparisons = [validation.comparison(k) for k in range(len(validation.models))]
+        whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
+        models, shown = [validation.models[k] for k in whole], [comparisons[k] for k in whole]
+        # spawned: a fork would inherit the threads' locks of the middleware
+        context = multiprocessing.get_context("spawn")
+        self._process = context.Process(
+            target=_write, args=(models, validation.predicted(), shown, folder), daemon=True
+        )
+        self._process.start()
+
+    def stop(self) -> None:
+        """End a report that is being written; it is not left in halves."""
+        if self._process is not None and self._process.is_alive():
+            self._process.terminate()
+            self._process.join()
+
+
+def _write(models: list[PushModel], windows: WindowRows, comparisons: list[Comparison], folder: Path) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that unfinished files are removed
+    try:
+        report_windows(models, windows, comparisons, folder, "online validation")
+    except (PushPredictorError, OSError) as error:
+        sys.exit(f"report: {' '.join(str(error).split())}")

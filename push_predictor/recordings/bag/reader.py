@@ -1,0 +1,134 @@
+"""A bag: one MCAP file, or a folder of them as rosbag2 writes it. Raw messages in file order."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.compression import unpack_file, unpack_message
+from push_predictor.recordings.bag.mcap_file import McapFile, RawMessage
+from push_predictor.recordings.bag.metadata import (
+    METADATA_FILE,
+    BagMetadata,
+    embedded_records,
+    read_bag_metadata,
+)
+
+__all__ = ["Bag", "RawMessage", "open_bag"]
+
+
+class Bag:
+    """The files of a bag as one.
+
+    path: what was opened; name: its stem. messages() goes through the files in the bag's order; notes grows
+    while messages are read.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        files: list[McapFile],
+        described: BagMetadata,
+        scratch: tempfile.TemporaryDirectory[str] | None = None,
+    ) -> None:
+        self.path = path
+        self.name = path.name if path.is_dir() else path.stem
+        self.files = files
+        self._described = described
+        self._scratch = scratch  # where unpacked files lie as long as the bag lives
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """{topic: type}, by topic name."""
+        merged = {topic: kind for file in self.files[::-1] for topic, kind in file.topics.items()}
+        return dict(sorted(merged.items()))
+
+    @property
+    def schemas(self) -> dict[str, str]:
+        """{type: definition text}."""
+        return {kind: text for file in self.files for kind, text in file.schemas.items()}
+
+    @property
+    def qos(self) -> dict[str, str]:
+        """{topic: the offered QoS profiles as rosbag2's YAML text, '' where unknown}."""
+        return {topic: text for file in self.files for topic, text in file.qos.items()}
+
+    @property
+    def metadata(self) -> dict[str, Mapping[str, object]]:
+        """{record name: {key: value}}: the files' records; the custom_data of rosbag2 fills in what they lack."""
+        records = {name: record for file in self.files for name, record in file.metadata.items()}
+        return {**embedded_records(records), **self._described.custom_data, **records}
+
+    @property
+    def notes(self) -> list[str]:
+        """What was found damaged or out of order so far, in words."""
+        own = [*self._described.notes, *(note for file in self.files for note in file.notes)]
+        return own + [
+            f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which counts"
+            for name, record in self._described.custom_data.items()
+            if any(file.metadata.get(name, record) != record for file in self.files)
+        ]
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
+        """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note."""
+        for file in self.files:
+            yield from file.messages(topics)
+
+
+def open_bag(path: Path) -> Bag:
+    """Open a .mcap file, or a folder with .mcap files, with or without metadata.yaml.
+
+    Raises RecordingError if there is none, or if all files are empty or foreign; one among others becomes a note.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        return Bag(path, [McapFile(path)], BagMetadata())
+    described = read_bag_metadata(path)
+    if not (files := _listed(path, described) or _found(path)):
+        raise RecordingError(f"{path}: holds no .mcap file, give an MCAP bag")
+    scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
+    folder = None if scratch is None else Path(scratch.name)
+    return Bag(path, _opened(files, described, folder), described, scratch)
+
+
+def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[McapFile]:
+    """The files that can be read. Raises the first one's error if none can."""
+    opened: list[McapFile] = []
+    refused: list[RecordingError] = []
+    for file in files:
+        try:
+            opened.append(_open(file, described, scratch))
+        except RecordingError as error:
+            refused.append(error)
+    if not opened:
+        raise refused[0]
+    described.notes.extend(f"{error}; the other files are used" for error in refused)
+    return opened
+
+
+def _open(file: Path, described: BagMetadata, scratch: Path | None) -> McapFile:
+    if scratch is not None:
+        unpacked = unpack_file(file, scratch, described.notes)
+        return McapFile(unpacked, name=str(file) if unpacked == file else f"{file}, unpacked,")
+    return McapFile(file, unpack=unpack_message if described.compression == "message" else None)
+
+
+def _listed(folder: Path, described: BagMetadata) -> list[Path]:
+    """The files that metadata.yaml names and that are there, in its order."""
+    # Older bags put the folder's own name before the file's.
+    named = [folder / Path(name).name for name in described.files]
+    absent = [file.name for file in named if not file.is_file()]
+    described.notes.extend(f"{folder}: {name} is in {METADATA_FILE} but not there" for name in absent)
+    return [file for file in named if file.is_file()]
+
+
+def _found(folder: Path) -> list[Path]:
+    """The folder's .mcap files, bag_2 before bag_10."""
+    return sorted(folder.glob("*.mcap"), key=_numbered)
+
+
+def _numbered(file: Path) -> list[tuple[str, int]]:
+    return [(text, int(part or -1)) for text, part in re.findall(r"(\D*)(\d*)", file.name)]

@@ -1,0 +1,183 @@
+"""Write a rosbag2 bag of any messages: it appears under its name when it is complete, not before."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+from mcap.writer import CompressionType, Writer
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.atomic import write_whole
+from push_predictor.recordings.bag.metadata import METADATA_FILE, TopicInfo, bag_metadata_text, qos_text
+
+COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
+CHUNK_SIZE = 1 << 20
+LARGEST_STAMP = 2**63 - 1
+
+
+class BagWriter:
+    """A context manager. path: a folder (metadata.yaml and NAME_0.mcap, for `ros2 bag play`) or a bare NAME.mcap.
+
+    An earlier bag of that name is replaced; an exception inside the context leaves it as it was. The same calls
+    write the same bytes. Raises RecordingError if path holds something else, cannot be written, or for an unknown
+    compression (zstd, lz4 and none are known).
+    """
+
+    def __init__(self, path: Path, *, compression: str = "zstd") -> None:
+        if compression not in COMPRESSIONS:
+            raise RecordingError(f"compression: {compression!r}, give one of {', '.join(COMPRESSIONS)}")
+        self.path = Path(os.path.abspath(path))
+        self._bare = self.path.suffix == ".mcap"
+        _check_target(self.path, self._bare)
+        self._unfinished = self.path.with_name(f".{self.path.name}.{os.getpid()}.unfinished")
+        self._file_name = self.path.name if self._bare else f"{self.path.name}_0.mcap"
+        self._compression = COMPRESSIONS[compression]
+        self._topics: dict[str, TopicInfo] = {}
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._records: dict[str, Mapping[str, str]] = {}
+        self._counts: dict[str, int] = {}
+        self._first, self._last = LARGEST_STAMP, 0
+
+    def __enter__(self) -> BagWriter:
+        try:
+            with self._told():
+                self._stream = self._create().open("wb")
+        except RecordingError:
+            with suppress(OSError):
+                _remove(self._unfinished)
+            raise
+        self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
+        self._writer.start(profile="ros2", library="push_predictor")  # a few bytes, into the stream's buffer
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                with self._told():
+                    self._finish()
+        finally:
+            with suppress(OSError):  # what the disk did not take is tried once more, and thrown away
+                self._stream.close()
+            _remove(self._unfinished)
+
+    def add_topic(
+        self,
+        name: str,
+        type: str,
+        schema_text: str,
+        *,
+        type_hash: str = "",
+        depth: int = 10,
+        durability: str = "volatile",
+    ) -> None:
+        """Announce a topic (reliable, keep last). schema_text: ros2msg, with all definitions it refers to."""
+        topic = TopicInfo(absolute(name), type, 0, type_hash, depth, durability)
+        metadata = {"offered_qos_profiles": qos_text(topic), "topic_type_hash": type_hash}
+        with self._told():
+            if type not in self._schemas:
+                self._schemas[type] = self._writer.register_schema(type, "ros2msg", schema_text.encode())
+            self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
+        self._topics[topic.name] = topic
+        self._counts[topic.name] = 0
+
+    def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
+        """Write an MCAP Metadata record; a folder's metadata.yaml carries it too."""
+        self._records[name] = dict(record)
+        with self._told():
+            self._writer.add_metadata(name, dict(record))
+
+    def write(self, topic: str, stamp: int, data: bytes) -> None:
+        """Write a CDR message with stamp (ns) as log and publish time.
+
+        Raises RecordingError for a stamp that MCAP cannot hold and for a full disk, KeyError for a topic that was not
+        added.
+        """
+        name = absolute(topic)
+        if not 0 <= stamp <= LARGEST_STAMP:
+            raise RecordingError(f"{self.path}: {name} stamp {stamp}, give ns from 0 to {LARGEST_STAMP}")
+        try:
+            self._writer.add_message(self._channels[name], stamp, data, stamp)
+        except OSError as error:
+            raise self._unwritten(error) from None
+        self._counts[name] += 1
+        self._first, self._last = min(self._first, stamp), max(self._last, stamp)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """What the disk refuses is told by the name of the bag."""
+        try:
+            yield
+        except OSError as error:
+            raise self._unwritten(error) from None
+
+    def _unwritten(self, error: OSError) -> RecordingError:
+        return RecordingError(f"{self.path}: cannot be written ({error.strerror})")
+
+    def _create(self) -> Path:
+        """A place for the unfinished file."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        _remove(self._unfinished)
+        if self._bare:
+            return self._unfinished
+        self._unfinished.mkdir()
+        return self._unfinished / self._file_name
+
+    def _finish(self) -> None:
+        self._writer.finish()
+        self._stream.flush()
+        os.fsync(self._stream.fileno())
+        self._stream.close()
+        if self._bare:
+            self._unfinished.replace(self.path)
+            return
+        write_whole(self._unfinished / METADATA_FILE, self._metadata_text().encode())
+        _replace_folder(self.path, self._unfinished)
+
+    def _metadata_text(self) -> str:
+        topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
+        start = min(self._first, self._last)
+        return bag_metadata_text(self._file_name, start, self._last - start, topics, self._records)
+
+
+def absolute(topic: str) -> str:
+    """The topic's name as rosbag2 records it."""
+    return "/" + topic.lstrip("/")
+
+
+def _check_target(path: Path, bare: bool) -> None:
+    if bare and path.is_dir():
+        raise RecordingError(f"{path}: is a folder, give a file name or a folder name without .mcap")
+    if bare or not path.exists():
+        return
+    if not path.is_dir() or any(p.name != METADATA_FILE and p.suffix != ".mcap" for p in path.iterdir()):
+        raise RecordingError(f"{path}: exists and is not a bag, give another name or remove it")
+
+
+def _replace_folder(path: Path, new: Path) -> None:
+    """Let a folder take the place of an earlier one, which is back where that fails."""
+    earlier = new.with_suffix(".earlier")
+    if path.is_dir():
+        path.rename(earlier)
+    try:
+        new.replace(path)
+    except OSError:
+        if earlier.is_dir():
+            earlier.rename(path)
+        raise
+    _remove(earlier)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,4 @@
+"""Importer of the MCube lab's preliminary pushes (August 2015).
+
+Import `pushes`; `rig` holds the two blocks and their frames.
+"""

@@ -1,0 +1,4 @@
+"""Importers of the MIT push data set and of the `mit_square` table made from it.
+
+Import `pushes` and `square_windows`; `source` and `listing` read the files.
+"""

@@ -1,0 +1,150 @@
+"""Following pushes sample by sample: when contact and motion hold, and which stretches can carry windows."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from push_predictor.recordings.windows.contact import Judged
+from push_predictor.recordings.windows.cut import PushContext
+from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
+from push_predictor.recordings.windows.track import NANOSECOND
+from push_predictor.types import Array
+
+FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
+TARE_SAMPLES = 30
+NOISE_FACTOR = 5.0
+CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
+LEAST_CLOSING = 0.001  # m/s, below the noise of a tracker
+INSIDE = 0.005  # m; a tip this deep inside the outline is not where it seems: clocks are apart, or frames
+LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
+
+
+class PushTracker:
+    """Feed it judged samples in order; it says which windows (start, end in ns) have become complete."""
+
+    def __init__(self, options: WindowOptions) -> None:
+        self.options = options
+        self.counts = {"resets": 0, "inside": 0}
+        self.push: PushContext | None = None
+        self._start: int | None = None  # of the window being filled
+        self._last_good = -np.inf
+        self._last_time = -np.inf
+        self._idle = 0.0
+        self._pushes = 0
+        self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
+        self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # near the slider, before the first push
+        self._touching = False
+        self._inside = False
+        self._first_touch: int | None = None
+        self._last_contact: int | None = None
+
+    @property
+    def start(self) -> int | None:
+        """Start (ns) of the window that is being filled."""
+        return self._start
+
+    def step(self, sample: Judged) -> list[tuple[int, int]]:
+        """Take one sample; returns the windows that end by it."""
+        self._note_interruptions(sample)
+        self._note_free_force(sample)
+        self._touching = touching = not (sample.blind or self._inside) and self._touches(sample)
+        if touching and self._first_touch is None:
+            self._first_touch = sample.stamp
+        if touching and sample.speed >= self.options.least_speed:
+            return self._pushing(sample)
+        self._not_pushing(sample, touching)
+        return []
+
+    def _note_interruptions(self, sample: Judged) -> None:
+        lapse, self._last_time = sample.time - self._last_time, sample.time
+        if sample.broken:
+            self._start = None
+        else:
+            self._idle += lapse if np.isfinite(lapse) else 0.0
+        if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.blind:
+            self.counts["inside"] += not self._inside
+            self._start = None
+        self._inside = inside
+        if sample.jumped or (sample.broken and lapse > LONGEST_BREAK):
+            self.counts["resets"] += sample.jumped
+            self._end_push()
+
+    def _note_free_force(self, sample: Judged) -> None:
+        if sample.force is None or sample.blind:
+            return
+        if sample.height > self.options.lift or sample.gap > FREE_GAP:
+            self._free_force.append(sample.force)
+        elif sample.speed < self.options.least_speed and self.push is None:
+            self._resting_force.append(sample.force)
+
+    def _touches(self, sample: Judged) -> bool:
+        if sample.height > self.options.lift:
+            return False
+        pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
+        if sample.force is not None and self._free_force:
+            return pressed
+        # What a resting tip reads may be a preload: it can keep a contact but not tell where one begins or ends.
+        near = sample.gap <= self.options.touch_gap_alone
+        return (near and self._stays(sample)) or (self._touching and pressed)
+
+    def _stays(self, sample: Judged) -> bool:
+        """Whether the gap shrinks no more, as it does before the touch; without any force, nor grows, as after it."""
+        limit = max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
+        parts = sample.force is None and sample.closing < -limit
+        return not parts and (self._touching or sample.closing <= limit)
+
+    def _presses(self, force: Array | None) -> bool:
+        zero, noise = self._zero()
+        if force is None or zero is None:
+            return False
+        return float(np.hypot(*(force - zero))) > max(self.options.least_force, NOISE_FACTOR * noise)
+
+    def _zero(self) -> tuple[Array | None, float]:
+        """The sensor's reading and its noise (N) in free motion, before any near the slider at rest, else None."""
+        if not (seen := self._free_force or self._resting_force):
+            return None, 0.0
+        readings = np.array(seen)
+        return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
+
+    def _pushing(self, sample: Judged) -> list[tuple[int, int]]:
+        if self.push is None or self._idle > self.options.push_pause:
+            self._begin_push(sample)
+        self._idle = 0.0
+        self._last_good, self._last_contact = sample.time, sample.stamp
+        if self._start is None and sample.underway:
+            self._start = sample.stamp
+        return self._complete(sample.stamp)
+
+    def _complete(self, until: int) -> list[tuple[int, int]]:
+        length = round(self.options.duration * 1e9)
+        stride = round((self.options.stride or self.options.duration) * 1e9)
+        done = []
+        while self._start is not None and self._start + length <= until:
+            done.append((self._start, self._start + length))
+            self._start += stride
+        return done
+
+    def _not_pushing(self, sample: Judged, touching: bool) -> None:
+        if sample.time - self._last_good > self.options.bounce:
+            self._start = None
+        if not touching and self._idle > self.options.push_pause:
+            self._first_touch = None
+
+    def _begin_push(self, sample: Judged) -> None:
+        first = self._first_touch if self._first_touch is not None else sample.stamp
+        if self.push is not None and first == self.push.first_touch:
+            first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again
+        dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
+        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._zero()[0], None, 0)
+        self._pushes += 1
+        self._start = None
+
+    def _end_push(self) -> None:
+        self.push, self._start, self._first_touch = None, None, None
+
+
+def _push_id(stamp: int) -> str:
+    """Named by its first touch, so that the same push has the same name online, offline and in a copy."""
+    return f"{TIMED_ID}{stamp // 10**9}.{stamp % 10**9 // 10**6:03d}"

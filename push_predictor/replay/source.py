@@ -1,0 +1,95 @@
+"""Messages of a bag from any time on, by log time, through a read-ahead window."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Collection, Iterator
+from typing import Protocol
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.reader import Bag, RawMessage
+
+
+class Source(Protocol):
+    """What a player plays."""
+
+    @property
+    def start(self) -> int:
+        """Log time of the first message, ns."""
+
+    def messages(self, start: int) -> Iterator[RawMessage]:
+        """Messages with a log time of at least start, nearly in order."""
+
+
+class BagSource:
+    """Chosen topics of a bag.
+
+    start: log time of the first message of any topic, ns (0 in an empty bag). damage: what could not be read so far.
+    """
+
+    def __init__(self, bag: Bag, topics: Collection[str]) -> None:
+        self._bag = bag
+        self._topics = topics
+        self._refused: list[str] = []
+        self.start = min((m.log_time for m in self._head(None)), default=0)
+
+    @property
+    def damage(self) -> list[str]:
+        """In words, with file and place."""
+        return [*self._bag.notes, *self._refused]
+
+    def messages(self, start: int) -> Iterator[RawMessage]:
+        """Messages of the chosen topics from a log time on, in file order; what is unreadable becomes damage."""
+        try:
+            yield from (m for m in self._bag.messages(self._topics) if m.log_time >= start)
+        except RecordingError as error:
+            self._refuse(error)
+
+    def _head(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
+        """The first few messages, enough to see the earliest of them."""
+        try:
+            yield from (message for _, message in zip(range(100), self._bag.messages(topics), strict=False))
+        except RecordingError as error:
+            self._refuse(error)
+
+    def _refuse(self, error: RecordingError) -> None:
+        if str(error) not in self._refused:
+            self._refused.append(str(error))
+
+
+class ReadAhead:
+    """The next messages, ordered by log time within a window of so many.
+
+    Recordings are written nearly in order, so a message that comes later than its place in the window allows is rare:
+    it goes out as soon as it is read.
+    """
+
+    def __init__(self, messages: Iterator[RawMessage], size: int) -> None:
+        self._messages = messages
+        self._size = size
+        self._read = 0
+        self._window: list[tuple[int, int, RawMessage]] = []
+        self.fill(lambda: True)
+
+    def peek(self) -> RawMessage | None:
+        """The next message; None after the last."""
+        if not self._window:
+            self._pull()
+        return self._window[0][2] if self._window else None
+
+    def pop(self) -> None:
+        """Go on to the one after."""
+        heapq.heappop(self._window)
+
+    def fill(self, has_time: Callable[[], bool]) -> None:
+        """Read on while there is time, and without it as far as half the window."""
+        while len(self._window) < self._size and (2 * len(self._window) < self._size or has_time()):
+            if not self._pull():
+                return
+
+    def _pull(self) -> bool:
+        if (message := next(self._messages, None)) is None:
+            return False
+        self._read += 1
+        heapq.heappush(self._window, (message.log_time, self._read, message))
+        return True

@@ -1,0 +1,4 @@
+"""What all report pages share: HTML and matplotlib conventions.
+
+Import `html` and `canvas`.
+"""

@@ -1,0 +1,168 @@
+"""New windows against the training windows: what is there in the one and not in the other, on any recorded quantity.
+
+Rows of both tables are stacked; a column that lives on the new rows alone, beside the same column on all rows in the
+basis, has as its coefficient the new relation less that of the training windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.residuals import blocks_of
+from push_predictor.residuals.selection.screening import Screened, Without, block_scores, screen, sums_by
+from push_predictor.types import Array, BoolArray, IntArray
+
+DRAWS = 1000
+FOLDS = 5
+GROSS = 5.0  # robust standard deviations; windows farther out are left aside
+TRIMMING_ROUNDS = 4
+FEWEST_PUSHES = 12  # of a table that is to be relied on
+MAD_TO_SD = 1.4826
+COLLINEAR = 1e-6  # share of a column's square that the basis leaves; below it the column cannot be told from the basis
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """What may explain a quantity: columns (n, k, p), zero outside the new rows; shared (n, m) with training."""
+
+    mechanism: str
+    covariate: str
+    form: Form
+    columns: Array
+    shared: Array
+
+    def take(self, rows: BoolArray) -> Tried:
+        """The given rows."""
+        return replace(self, columns=self.columns[rows], shared=self.shared[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Stacked:
+    """n rows, the training windows first: their table, which are new, the block of pushes each belongs to."""
+
+    tables: tuple[PushTable, ...]
+    new: BoolArray
+    block: IntArray
+
+    def joined(self, columns: list[Array]) -> Array:
+        """What was computed table by table, one after the other."""
+        return np.concatenate(columns)
+
+
+def stacked(windows: PushTable, baseline: PushTable | None, needed: tuple[str, ...]) -> Stacked:
+    """The new windows after those of the baseline, which is left out where it lacks what is needed or is tiny."""
+    usable = (
+        baseline is not None
+        and all(name in baseline.covariates for name in needed)
+        and len(baseline.pushes) >= FEWEST_PUSHES
+    )
+    tables = (baseline, windows) if usable and baseline is not None else (windows,)
+    blocks, begin = [], 0
+    for table in tables:
+        blocks.append(blocks_of(table) + begin)
+        begin = int(blocks[-1].max()) + 1
+    new = np.concatenate([np.full(len(table), table is windows) for table in tables])
+    return Stacked(tables, new, np.concatenate(blocks))
+
+
+def side_by_side(columns: list[Array]) -> Array:
+    """Columns of each table (n_k, m), each on its own rows alone: (sum n_k, sum m)."""
+    wide = np.zeros((sum(map(len, columns)), sum(c.shape[1] for c in columns)))
+    row = column = 0
+    for part in columns:
+        wide[row : row + len(part), column : column + part.shape[1]] = part
+        row, column = row + len(part), column + part.shape[1]
+    return wide
+
+
+def inliers(z: Array, columns: Array, basis: Array) -> BoolArray:
+    """Rows (n,) of z (n, k) that lie within GROSS of their fit by the basis (n, m) and the columns (n, k, p)."""
+    keep = np.ones(len(z), dtype=np.bool_)
+    for _ in range(TRIMMING_ROUNDS):
+        left = np.column_stack(
+            [_left(z[:, k], np.column_stack([basis, columns[:, k]]), keep) for k in range(z.shape[1])]
+        )
+        spread = MAD_TO_SD * np.median(np.abs(left[keep]), axis=0)
+        keep = np.all(np.abs(left) <= GROSS * np.maximum(spread, np.finfo(float).tiny), axis=1)
+    return keep
+
+
+def screened(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, seed: int = 0) -> Screened:
+    """Screen what is tried on z (n, k); each has taken out of it what it shares with the training windows."""
+    scores = [block_scores(z, each.columns, np.column_stack([basis, each.shared]), block) for each in tried]
+    return screen(scores, seed)
+
+
+def best_first(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, seed: int = 0) -> list[Tried]:
+    """The one with the largest gain out of sample, then those that are not surely worse: 95 % of paired draws."""
+    gains = [_gains(z, each, basis, block) for each in tried]
+    order = np.argsort([-float(gain.sum()) for gain in gains], kind="stable").tolist()
+    best = gains[order[0]]
+    weights = _weights(len(best), seed)
+    level = 0.05 / max(len(order) - 1, 1)  # the best was chosen among them all, so that it looks better than it is
+    alike = [k for k in order[1:] if float(np.quantile(weights @ (best - gains[k]), level)) <= 0.0]
+    return [tried[k] for k in (order[0], *alike)]
+
+
+def estimated(
+    z: Array, columns: Array, basis: Array, shared: Array, block: IntArray, seed: int = 0
+) -> tuple[Array, Array]:
+    """Coefficients (p,) of columns (n, k, p) for z (n, k), and draws (DRAWS, p) of them: blocks drawn anew."""
+    without = Without(np.column_stack([basis, shared]))
+    left, flat = without(z), without(columns)
+    p = flat.shape[2]
+    square = sums_by(block, np.einsum("nkp,nkq->npq", flat, flat).reshape(len(z), -1)).reshape(-1, p, p)
+    score = sums_by(block, np.einsum("nkp,nk->np", flat, left))
+    weights = _weights(len(score), seed)
+    draws = _solved(np.tensordot(weights, square, axes=1), weights @ score)
+    return _solved(square.sum(axis=0)[None], score.sum(axis=0)[None])[0], draws
+
+
+def tells(each: Tried, basis: Array) -> bool:
+    """Whether every column of it holds something that the basis (n, m) and what is shared do not."""
+    without = Without(np.column_stack([basis, each.shared]))
+    size, left = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, without(each.columns)))
+    return bool(np.all(left > COLLINEAR * size) and np.all(size > 0.0))
+
+
+def robust_deviation(values: Array) -> float:
+    """Standard deviation of values (n,), whatever their tails."""
+    return float(MAD_TO_SD * np.median(np.abs(values - np.median(values))))
+
+
+def _gains(z: Array, each: Tried, basis: Array, block: IntArray) -> Array:
+    """Gain (b,) in nats of each block, fitted on the folds that it is not in."""
+    without = Without(np.column_stack([basis, each.shared]))
+    left, flat = Without(basis)(z), without(each.columns)
+    gains = np.zeros((len(z), 1))
+    for fold in range(FOLDS):
+        test = block % FOLDS == fold
+        x = flat[~test].reshape(-1, flat.shape[2])
+        after = left - flat @ np.linalg.lstsq(x, left[~test].ravel(), rcond=None)[0]
+        before_log, after_log = (_log_density(r[test], np.mean(r[~test] ** 2, axis=0)) for r in (left, after))
+        gains[test, 0] = after_log - before_log
+    return sums_by(block, gains)[:, 0]
+
+
+def _log_density(residual: Array, variance: Array) -> Array:
+    return np.asarray(-0.5 * np.sum(np.log(variance) + residual**2 / variance, axis=1))
+
+
+def _weights(blocks: int, seed: int) -> Array:
+    draws = np.random.default_rng(seed).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=DRAWS)
+    return draws.astype(np.float64)
+
+
+def _left(z: Array, design: Array, rows: BoolArray) -> Array:
+    coefficients = np.linalg.lstsq(design[rows], z[rows], rcond=None)[0]
+    return np.asarray(z - design @ coefficients)
+
+
+def _solved(square: Array, score: Array) -> Array:
+    """Coefficients (d, p) of d systems, of least length where one is singular."""
+    return np.asarray(np.einsum("dpq,dq->dp", np.linalg.pinv(square, rcond=1e-12, hermitian=True), score))

@@ -1,0 +1,78 @@
+"""Where the force of each window lies on the limit surface: its load, its direction, what a bias would do to both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.limit_surface import contact_force
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+FORCES = ("normal_force", "tangential_force")
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Of each window: log of the load on the limit surface, direction (rad, from the inward normal), what the
+    prediction says of it, and the change of the two (n, 2, 2) per N of bias in the world."""
+
+    size: Array
+    direction: Array
+    predicted: Array
+    bias: Array
+
+
+def loads(table: PushTable, physics: AnalyticalPush) -> Load:
+    """Load, direction and their sensitivity to a bias, of windows with both forces."""
+    normal_force, left_force = (table.covariates[name] for name in FORCES)
+    velocity, contact, angle = table.inputs.T
+    normal = physics.outline.inward_normal(contact)
+    left = np.column_stack([-normal[:, 1], normal[:, 0]])
+    arm = (physics.outline.point(contact) - np.asarray(physics.support.centre)) / physics.support.length
+    p = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+    q = arm[:, 0] * left[:, 1] - arm[:, 1] * left[:, 0]
+    moment = p * normal_force + q * left_force
+    square = normal_force**2 + left_force**2 + moment**2
+    along, across = velocity * np.cos(angle), velocity * np.sin(angle)
+    fn, ft, _ = contact_force(1.0 + p * p, p * q, 1.0 + q * q, along, across, physics.contact_friction)
+    by_load = np.column_stack([normal_force + p * moment, left_force + q * moment]) / square[:, None]
+    by_turn = np.column_stack([-left_force, normal_force]) / (normal_force**2 + left_force**2)[:, None]
+    axes = _world_axes(table, angle)
+    bias = -np.stack([np.einsum("nk,nkw->nw", by, axes) for by in (by_load, by_turn)], axis=1)
+    return Load(0.5 * np.log(square), np.arctan2(left_force, normal_force), np.arctan2(ft, fn), bias)
+
+
+def _world_axes(table: PushTable, angle: Array) -> Array:
+    """Inward normal and its left in the world (n, 2, 2), rows; zero where no heading was recorded."""
+    heading = table.covariates.get("push_heading")
+    if heading is None:
+        return np.zeros((len(table), 2, 2))
+    normal = rotate(np.array([[1.0, 0.0]]), heading - angle)
+    return np.stack([normal, np.column_stack([-normal[:, 1], normal[:, 0]])], axis=1)
+
+
+def inputs_of(table: PushTable, physics: AnalyticalPush, most: int) -> Array:
+    """A basis (n, m) of the model's inputs, at most so many columns: few pushes bear no more, and need no more."""
+    velocity, contact, angle = table.inputs.T
+    turn = 2.0 * np.pi * contact
+    normal = physics.outline.inward_normal(contact)
+    arm = physics.outline.point(contact) / physics.support.length
+    lever = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+    columns = [
+        np.ones_like(turn),
+        lever**2,
+        velocity,
+        np.cos(turn),
+        np.sin(turn),
+        angle**2,
+        lever * angle,
+        angle,
+        lever,
+    ]
+    columns += [np.cos(2.0 * turn), np.sin(2.0 * turn), angle**3, lever * angle**2, lever**2 * angle, lever**3]
+    columns += [np.cos(4.0 * turn), np.sin(4.0 * turn)]
+    return np.column_stack(columns[:most])

@@ -1,0 +1,242 @@
+"""Errors of the measurement itself: clocks that disagree, a tracker's frame turned or shifted against the robot's.
+
+While the tip pushes, the gap between tip and outline is zero; what the windows' contact_gap shows instead is the
+measurement. Of the slider's stream (the tracker's), against the robot's frame and clock: a shift s in the world opens
+the gap by -n.s (n: outward normal at the contact), a turn e about the world's origin by -n.(e x contact point), stamps
+that come late by d by -v cos(angle) d. Whatever depends on the contact alone is geometry (radius, outline, a marker's
+place on the slider) and is taken out, as is the give of the contact under its force.
+
+The clock is judged on windows after a push's first: at the touch the slider was at rest, and a late stream shows that
+rest. Later windows hold under acceleration too, v being the speed at the window's start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.contrast import (
+    Stacked,
+    Tried,
+    best_first,
+    estimated,
+    inliers,
+    robust_deviation,
+    screened,
+    side_by_side,
+    stacked,
+    tells,
+)
+from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
+from push_predictor.residuals.outcome import Sized, Tested
+from push_predictor.residuals.selection.screening import Without
+from push_predictor.types import Array, BoolArray, IntArray
+
+NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")
+PARAMETERS = {
+    "clock_offset": (("lateness of the slider's stamps", "s"),),
+    "frame_rotation": (("turn of the tracker's frame", "rad"),),
+    "frame_shift": (("shift of the tracker's frame along x", "m"), ("shift of the tracker's frame along y", "m")),
+}
+ALIKE = {"frame_shift": ("tool_offset",)}  # a tip that is off by -s, as long as the tool does not turn
+MOST_EDGES = 8  # of an outline whose edges are told apart; others are smooth
+FEWEST_ROWS = 2.0  # per column
+CORNER = 0.002  # m; contacts as near to a corner may be on either side of it
+LEAST_SIZE = 1.0  # of an effect on the gap, root mean square, in units of the gap's noise
+
+
+@dataclass(frozen=True)
+class MeasurementError:
+    """One error with its parameters (the slider's stream against the robot's), family-wise p, and the names of what
+    these data cannot tell from it. size: root mean square of what it does to the gap, m (to the force, N)."""
+
+    mechanism: str
+    parameters: tuple[Sized, ...]
+    p_value: float
+    rivals: tuple[str, ...]
+    size: float
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The parameters' estimates, as corrections.correct takes them."""
+        return tuple(parameter.value for parameter in self.parameters)
+
+
+@dataclass(frozen=True)
+class MeasurementFinding:
+    """errors: the strongest first, none where the measurement is sound; tested: all that was tried.
+
+    noise: robust standard deviation of the gap, m. against_training: whether the training windows' own gap was
+    subtracted.
+    """
+
+    errors: tuple[MeasurementError, ...]
+    tested: tuple[Tested, ...]
+    noise: float
+    against_training: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Gap:
+    """The gap z (n, 1) m, its basis (n, m), blocks of pushes, what is tried, which rows are new."""
+
+    z: Array
+    basis: Array
+    block: IntArray
+    tried: tuple[Tried, ...]
+    new: BoolArray
+
+    def take(self, rows: BoolArray) -> _Gap:
+        tried = tuple(each.take(rows) for each in self.tried)
+        return _Gap(self.z[rows], self.basis[rows], self.block[rows], tried, self.new[rows])
+
+
+def measurement_errors(
+    windows: PushTable, baseline: PushTable | None, rig: Rig, alpha: float = 0.01, seed: int = 0
+) -> MeasurementFinding | None:
+    """Errors of measurement in new windows that the baseline (the model's training windows) does not have.
+
+    None where the windows do not tell: no contact_gap or pose, or too few of them.
+    """
+    if any(name not in windows.covariates for name in NEEDED):
+        return None
+    base = None if baseline is None else _off_corners(baseline, rig.outline)
+    both = stacked(_off_corners(windows, rig.outline), base, NEEDED)
+    gap = _gap_of(both, rig.outline)
+    if len(gap.z) < FEWEST_ROWS * gap.basis.shape[1] or not gap.tried:
+        return None
+    gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.basis))
+    return _searched(gap, alpha, seed, len(both.tables) > 1)
+
+
+def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
+    """Change of the gap (n, p) m per unit of each mechanism's parameters: s, rad, m along the world's x and y."""
+    velocity, contact, angle = table.inputs.T
+    heading = table.covariates["slider_heading"]
+    outward = -rotate(outline.inward_normal(contact), heading)
+    place = np.column_stack([table.covariates["slider_x"], table.covariates["slider_y"]])
+    touch = place + rotate(outline.point(contact), heading)
+    turned = np.column_stack([-touch[:, 1], touch[:, 0]])
+    return {
+        "clock_offset": (-velocity * np.cos(angle) * _settled(table))[:, None],
+        "frame_rotation": -np.sum(outward * turned, axis=1)[:, None],
+        "frame_shift": -outward,
+    }
+
+
+def _gap_of(both: Stacked, outline: Outline) -> _Gap:
+    basis = side_by_side([_geometry(table, outline) for table in both.tables])
+    responses = [gap_responses(table, outline) for table in both.tables]
+    stack = {name: both.joined([r[name] for r in responses]) for name in PARAMETERS}
+    if len(both.tables) > 1:
+        basis = np.column_stack([basis, *stack.values()])
+    nothing = np.zeros((len(both.new), 0))
+    tried = [
+        Tried(name, CONSTANT, Form("constant"), (column * both.new[:, None])[:, None, :], nothing)
+        for name, column in stack.items()
+    ]
+    z = both.joined([table.covariates["contact_gap"] for table in both.tables])[:, None]
+    return _Gap(z, basis, both.block, tuple(each for each in tried if tells(each, basis)), both.new)
+
+
+def _geometry(table: PushTable, outline: Outline) -> Array:
+    """What a gap may be without any of the mechanisms (n, m): a function of the contact, give, shock of the touch."""
+    shape = _edges(table.inputs[:, 1], outline) if len(outline.vertices) <= MOST_EDGES else _around(table.inputs[:, 1])
+    first = 1.0 - _settled(table)
+    columns = [shape, first, first * table.inputs[:, 0], first * table.inputs[:, 0] * np.cos(table.inputs[:, 2])]
+    if "normal_force" in table.covariates:
+        columns.append(table.covariates["normal_force"])
+    return np.column_stack(columns)
+
+
+def _off_corners(table: PushTable, outline: Outline) -> PushTable:
+    """The windows whose normal is beyond doubt."""
+    if len(outline.vertices) > MOST_EDGES:
+        return table
+    edge, fraction = outline.edge(table.inputs[:, 1])
+    length = np.diff(outline.edge_starts)[edge] * outline.perimeter
+    return table.take(np.minimum(fraction, 1.0 - fraction) * length >= CORNER)
+
+
+def _edges(contact: Array, outline: Outline) -> Array:
+    edge, fraction = outline.edge(contact)
+    on = (edge[:, None] == np.unique(edge)).astype(np.float64)
+    return np.column_stack([on, on * fraction[:, None]])
+
+
+def _around(contact: Array) -> Array:
+    turn = 2.0 * np.pi * contact
+    return np.column_stack([np.ones_like(turn), *(f(k * turn) for k in (1, 2, 3) for f in (np.cos, np.sin))])
+
+
+def _settled(table: PushTable) -> Array:
+    since = table.covariates.get("time_since_contact")
+    return np.ones(len(table)) if since is None else (since >= SETTLED).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was found, its family-wise p, the names of what cannot be told from it."""
+
+    what: Tried
+    p_value: float
+    rivals: tuple[str, ...]
+
+
+def _searched(gap: _Gap, alpha: float, seed: int, against_training: bool) -> MeasurementFinding:
+    """Strongest first, each looked for in what those before it leave."""
+    basis, left = gap.basis, list(gap.tried)
+    found: list[_Found] = []
+    tested: tuple[Tested, ...] = ()
+    while left:
+        p_values = screened(gap.z, left, basis, gap.block, seed).p_value.tolist()
+        tested = tested or tuple(Tested(t.mechanism, CONSTANT, p) for t, p in zip(left, p_values, strict=True))
+        significant = {t.mechanism: p for t, p in zip(left, p_values, strict=True) if p <= alpha}
+        if not significant:
+            break
+        alike = best_first(gap.z, [t for t in left if t.mechanism in significant], basis, gap.block, seed)
+        best = alike[0]
+        found.append(_Found(best, significant[best.mechanism], _names(alike)))
+        basis = np.column_stack([basis, best.columns[:, 0]])
+        left = [t for t in left if t is not best and tells(t, basis)]
+    errors, noise = _sized(gap, found, seed)
+    return MeasurementFinding(errors, tested, noise, against_training)
+
+
+def _names(alike: Sequence[Tried]) -> tuple[str, ...]:
+    names = [t.mechanism for t in alike]
+    return tuple(name for each in names for name in (each, *ALIKE.get(each, ())) if name != names[0])
+
+
+def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementError, ...], float]:
+    """Estimates of all errors together; those that are lost in the noise of a single window are left out."""
+    columns = [f.what.columns for f in found]
+    without = Without(np.column_stack([gap.basis, *(c[:, 0] for c in columns)]))
+    noise = robust_deviation(without(gap.z)[:, 0])
+    if not found:
+        return (), noise
+    nothing = np.zeros((len(gap.z), 0))
+    values, draws = estimated(gap.z, np.concatenate(columns, axis=2), gap.basis, nothing, gap.block, seed)
+    errors, begin = [], 0
+    for each in found:
+        part = slice(begin, begin := begin + each.what.columns.shape[2])
+        size = float(np.sqrt(np.mean((each.what.columns[gap.new, 0] @ values[part]) ** 2)))
+        if size >= LEAST_SIZE * noise:
+            parameters = _parameters(each.what.mechanism, values[part], draws[:, part])
+            errors.append(MeasurementError(each.what.mechanism, parameters, each.p_value, each.rivals, size))
+    return tuple(errors), noise
+
+
+def _parameters(mechanism: str, values: Array, draws: Array) -> tuple[Sized, ...]:
+    low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+    return tuple(
+        Sized(name, float(values[k]), float(low[k]), float(high[k]), unit)
+        for k, (name, unit) in enumerate(PARAMETERS[mechanism])
+    )

@@ -1,0 +1,189 @@
+"""Effects on the scatter: what makes outcomes vary more, once effects on their mean are out.
+
+By ranks of the squared residuals, so that a few wild pushes decide nothing; the inputs are taken out as in the search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.push_model import PushModel
+from push_predictor.normal_scores import normal_scores
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.residuals.evidence.baseline import Baseline
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_forms
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.residuals import Evidence
+from push_predictor.residuals.selection.screening import Scores, Screened, Without, block_scores, screen
+from push_predictor.types import Array
+
+TINY = 1e-12
+ALL = "all"
+MATERIAL = 1.25  # ratio to training that counts: a base that saw few pushes is somewhat wrong about its own scatter
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """A driver of the scatter. outputs: which vary with it; p_value: family-wise.
+
+    ratio: deviation of the residuals where the driver makes it largest over that where it makes it smallest, by the
+    form fitted; for a constant, new data over training data.
+    """
+
+    covariate: str
+    form: Form
+    outputs: tuple[str, ...]
+    p_value: float
+    ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceFinding:
+    """found: significant drivers of the scatter, each once, the strongest first; tested: all, with their p values.
+
+    rivals: drivers that are as significant, but nothing of the first's trend is left for them.
+    """
+
+    found: tuple[Scatter, ...]
+    tested: tuple[Scatter, ...]
+    rivals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    covariate: str
+    form: Form
+    output: str
+    score: Scores
+    ratio: float
+
+
+def variance_effects(
+    model: PushModel,
+    evidence: Evidence,
+    left: Array,
+    alpha: float,
+    seed: int = 0,
+    *,
+    names: Sequence[str] | None = None,
+    baseline: Baseline | None = None,
+) -> VarianceFinding:
+    """Test the scatter of residuals left (n, 3), mean effects out, against every driver and against training.
+
+    What differs from training is told where nothing drives it.
+    """
+    first = _tested(model, evidence, left, alpha, seed, names, baseline)
+    driven = tuple(s for s in first.found if s.covariate != CONSTANT)
+    if len(driven) < 2:
+        return replace(first, found=driven or first.found)
+    levelled = left / _trend(evidence, left, driven[0])
+    again = {s.covariate for s in _tested(model, evidence, levelled, alpha, seed, names, baseline).found}
+    found = (driven[0], *(s for s in driven[1:] if s.covariate in again))
+    return replace(first, found=found, rivals=tuple(s.covariate for s in driven[1:] if s.covariate not in again))
+
+
+def _trend(evidence: Evidence, left: Array, scatter: Scatter) -> Array:
+    """Relative deviation (n, 3) of the residuals as a driver has it, one in the outputs that it does not touch."""
+    values = scatter.form.values(evidence.table.covariates, len(left))
+    on = np.array([name in scatter.outputs for name in OUTPUTS])
+    size = _log_squares(left)[:, on].mean(axis=1)
+    design = np.column_stack([np.ones(len(values)), values])
+    slope, *_ = np.linalg.lstsq(design, size, rcond=None)
+    fitted = design @ slope
+    return np.asarray(np.exp(0.5 * (fitted - fitted.mean())[:, None] * on))
+
+
+def _tested(
+    model: PushModel,
+    evidence: Evidence,
+    left: Array,
+    alpha: float,
+    seed: int,
+    names: Sequence[str] | None,
+    baseline: Baseline | None,
+) -> VarianceFinding:
+    basis = inputs_basis(model, evidence.table).columns
+    size = _log_squares(Without(basis)(left))
+    trials = [t for name, form in _forms(evidence, names) for t in _along(evidence, size, basis, name, form)]
+    there = 0
+    if baseline is not None:
+        constant = _constant(model, evidence, left, baseline)
+        there = len(constant[0].score.rows) - len(trials[0].score.rows) if trials else 0
+        trials = [*(_padded(t, there) for t in trials), *constant]
+    return _finding(trials, alpha, seed) if trials else VarianceFinding((), ())
+
+
+def _log_squares(residual: Array) -> Array:
+    return np.asarray(np.log(residual**2 + TINY))
+
+
+def _forms(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, Form]]:
+    return [(name, form) for name, form in screening_forms(evidence.table, names) if name not in LOCAL]
+
+
+def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: Form) -> list[_Trial]:
+    """A driver against the scatter of each output, and against that of all."""
+    values = form.values(evidence.table.covariates, len(size))
+    z, block = normal_scores(size), evidence.block
+    slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
+    trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
+    return [_Trial(name, form, output, block_scores(z, on[:, :, None] * values[:, None, :], basis, block),
+                   float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum())))))
+            for output, on in _outputs(len(values))]  # fmt: skip
+
+
+def _constant(model: PushModel, evidence: Evidence, left: Array, baseline: Baseline) -> list[_Trial]:
+    """The scatter in the new data against that in training, at like inputs."""
+    tables = (evidence.table, baseline.evidence.table)
+    basis = inputs_basis(model, _inputs_of(tables)).columns
+    # As they are: what a base learnt wrongly adds to both alike, and taking it out would not take it out of both alike.
+    parts = (_log_squares(left), _log_squares(baseline.evidence.z))
+    z, new = normal_scores(np.vstack(parts)), np.arange(len(basis)) < len(left)
+    block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
+    ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
+    return [_Trial(CONSTANT, Form("constant"), output, block_scores(z, (on * new[:, None])[:, :, None], basis, block),
+                   float(np.prod(ratio ** (on[0] / on[0].sum()))))
+            for output, on in _outputs(len(basis))]  # fmt: skip
+
+
+def _inputs_of(tables: tuple[PushTable, PushTable]) -> PushTable:
+    names = [np.char.add(prefix, t.push_id) for prefix, t in zip(("new ", "old "), tables, strict=True)]
+    return PushTable(
+        np.vstack([t.inputs for t in tables]),
+        np.concatenate([t.duration for t in tables]),
+        np.vstack([t.outcomes for t in tables]),
+        np.concatenate(names),
+    )
+
+
+def _outputs(n: int) -> list[tuple[str, Array]]:
+    each = [(name, np.tile(np.eye(len(OUTPUTS))[k], (n, 1))) for k, name in enumerate(OUTPUTS)]
+    return [(ALL, np.ones((n, len(OUTPUTS)))), *each]
+
+
+def _padded(trial: _Trial, rows: int) -> _Trial:
+    return replace(trial, score=trial.score.padded(rows))
+
+
+def _finding(trials: list[_Trial], alpha: float, seed: int) -> VarianceFinding:
+    screened = screen([t.score for t in trials], seed)
+    ranked = sorted(range(len(trials)), key=lambda k: -screened.statistic[k])
+    first: dict[str, Scatter] = {}
+    for k in ranked:
+        first.setdefault(trials[k].covariate, _scatter(trials, screened, k))
+    tested = tuple(first.values())
+    return VarianceFinding(tuple(s for s in tested if s.p_value <= alpha and _counts(s)), tested)
+
+
+def _counts(scatter: Scatter) -> bool:
+    return scatter.covariate != CONSTANT or abs(np.log(scatter.ratio)) > np.log(MATERIAL)
+
+
+def _scatter(trials: list[_Trial], screened: Screened, k: int) -> Scatter:
+    trial = trials[k]
+    outputs = OUTPUTS if trial.output == ALL else (trial.output,)
+    return Scatter(trial.covariate, trial.form, outputs, float(screened.p_value[k]), trial.ratio)

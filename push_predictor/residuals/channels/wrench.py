@@ -1,0 +1,241 @@
+"""The wrench channel: what changes the force of a push and need not change its motion.
+
+Quasi-statically the force on the slider lies on the limit surface (f / fmax)^2 + (m / mmax)^2 = 1 whatever the motion,
+so every window's mean force gives fmax, its friction on the surface, by itself: L^2 = fn^2 + ft^2 + (moment / c)^2. The
+contact friction and the direction of the push only choose the place on the surface. log L is searched for drivers as
+the motion's residuals are; a bias of the sensor, constant in the world, also turns the force, which is held against the
+direction that the model predicts. Nothing here touches the motion model.
+
+What the training windows have too (a place that grips better, a topic that matters) is subtracted where they tell it.
+The window finder sets the sensor to zero between pushes: a bias shows only where it comes with the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.contrast import (
+    Stacked,
+    Tried,
+    best_first,
+    estimated,
+    inliers,
+    robust_deviation,
+    screened,
+    stacked,
+    tells,
+)
+from push_predictor.residuals.candidates.limit_load import FORCES, inputs_of, loads
+from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL, PLACE, screening_forms
+from push_predictor.residuals.outcome import Sized, Tested
+from push_predictor.residuals.selection.screening import Without
+from push_predictor.types import Array, IntArray
+
+SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
+LEAST_FORCE = 0.05  # of the median normal force; below it a window tells nothing
+MOST_TERMS = 3
+PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the basis: all windows of a push share a contact and an angle
+FEWEST_PUSHES = 12
+OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # tell nothing of the surface: inputs, or outcomes
+COMPARED = (*PLACE, *HEADINGS, "velocity")  # differ on any table: news only against the training windows
+SESSION = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
+
+
+@dataclass(frozen=True)
+class WrenchEffect:
+    """surface_friction: its driver and form, and the relative change of the force over the driver's range (5 to 95 % of
+    its windows; against the training windows where the driver is model_inputs). wrench_bias: the force (N, N) that the
+    sensor reads too much, in world axes. rivals: drivers that these data cannot tell from this one."""
+
+    mechanism: str
+    covariate: str
+    form: str
+    parameters: tuple[Sized, ...]
+    p_value: float
+    rivals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class WrenchFinding:
+    """effects: the strongest first, none where the force is as it was; tested: all that was tried.
+
+    against_training: whether the training windows' own relations were subtracted. scatter: robust standard deviation
+    of the logarithm of the force from window to window.
+    """
+
+    effects: tuple[WrenchEffect, ...]
+    tested: tuple[Tested, ...]
+    scatter: float
+    against_training: bool
+
+
+NOTHING = WrenchFinding((), (), float("nan"), False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Force:
+    """z (n, 2): log load, direction less its prediction (rad), each in robust deviations (unit (2,)); see limit_load.
+
+    basis (n, m) of the model's inputs; level (n, 1) of the new windows, no column where they stand alone; block (n,)
+    of pushes; what is tried; the new windows.
+    """
+
+    z: Array
+    unit: Array
+    basis: Array
+    level: Array
+    block: IntArray
+    tried: tuple[Tried, ...]
+    table: PushTable
+    against_training: bool
+
+    @property
+    def levelled(self) -> Array:
+        """The basis with the level."""
+        return np.column_stack([self.basis, self.level])
+
+
+def wrench_effects(
+    table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float = 0.01, seed: int = 0
+) -> WrenchFinding:
+    """What drives the force of new windows, beside what drives it in the baseline (the model's training windows)."""
+    if any(name not in table.covariates for name in FORCES):
+        return NOTHING
+    windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
+    if len(windows.pushes) < FEWEST_PUSHES:
+        return NOTHING
+    force = _force_of(stacked(windows, base, FORCES), physics)
+    return _searched(force, alpha, seed)
+
+
+def _pressing(table: PushTable) -> PushTable:
+    """The windows in which the pusher presses."""
+    if any(name not in table.covariates for name in FORCES) or not len(table):
+        return table
+    force = table.covariates["normal_force"]
+    return table.take(force > LEAST_FORCE * max(float(np.median(force)), np.finfo(float).tiny))
+
+
+def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
+    each = [loads(table, physics) for table in stack.tables]
+    z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
+    most = max(FEWEST_INPUTS, sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT)
+    basis = stack.joined([inputs_of(table, physics, most) for table in stack.tables])
+    unit = np.maximum([robust_deviation(column) for column in Without(basis)(z).T], 1e-12)
+    tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
+    tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))
+    rows = inliers(z / unit, np.zeros((len(z), 2, 0)), basis)
+    told = tuple(t.take(rows) for t in tried if tells(t, basis))
+    compared = len(stack.tables) > 1
+    return _Force(
+        z[rows] / unit, unit, basis[rows], _level(stack)[rows], stack.block[rows], told, stack.tables[-1], compared
+    )
+
+
+def _level(stack: Stacked) -> Array:
+    """One on the new windows (n, 1), no column where they stand alone."""
+    return stack.new[:, None].astype(np.float64)[:, : len(stack.tables) - 1]
+
+
+def _drivers(stack: Stacked) -> list[tuple[str, Form]]:
+    """Drivers of the surface's friction; level and place only where there are others to compare them with."""
+    table, before = stack.tables[-1], stack.tables[:-1]
+    known = [name for name in COMPARED if all(name in t.covariates for t in before) and before]
+    left_out = (*OWN, *(name for name in COMPARED if name not in known))
+    kept = {name: column for name, column in table.covariates.items() if name not in left_out}
+    forms = screening_forms(replace(table, covariates=kept))
+    return [(CONSTANT, Form("constant")), *forms] if before else forms
+
+
+def _of_friction(stack: Stacked, unit: Array, covariate: str, form: Form) -> Tried:
+    """A change of the load, not of its direction, over the new windows; about their mean unless it is the level."""
+    table = stack.tables[-1]
+    values = form.values(table.covariates, len(table))
+    values = values if covariate == CONSTANT else values - values.mean(axis=0)
+    columns = np.zeros((len(stack.new), 2, values.shape[1]))
+    columns[stack.new, 0] = values / unit[0]
+    shared = np.zeros((len(stack.new), 0)) if covariate == CONSTANT else _level(stack)
+    if covariate not in (*SESSION, CONSTANT) and all(d in t.covariates for t in stack.tables for d in form.drivers):
+        in_both = stack.joined([form.values(t.covariates, len(t)) for t in stack.tables])
+        shared = np.column_stack([shared, in_both]) if len(stack.tables) > 1 else shared
+    return Tried(SURFACE_FRICTION, covariate, form, columns, shared)
+
+
+def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Tried:
+    columns = bias / unit[:, None]
+    in_both = columns.reshape(len(columns), -1) if len(stack.tables) > 1 else np.zeros((len(columns), 0))
+    own = columns * stack.new[:, None, None]
+    return Tried(WRENCH_BIAS, CONSTANT, Form("constant"), own, np.column_stack([_level(stack), in_both]))
+
+
+def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
+    """Drivers first, strongest first; the level of the force is told only where nothing drives it."""
+    z, left = force.z, list(force.tried)
+    effects: list[WrenchEffect] = []
+    tested: tuple[Tested, ...] = ()
+    while left and len(effects) < MOST_TERMS:
+        p_values = screened(z, left, force.basis, force.block, seed).p_value.tolist()
+        tested = tested or tuple(Tested(t.mechanism, t.covariate, p) for t, p in zip(left, p_values, strict=True))
+        significant = [t for t, p in zip(left, p_values, strict=True) if p <= alpha]
+        driven = [t for t in significant if not _is_level(t)]
+        if not (driven or (significant and not effects)):
+            break
+        best, alike = _chosen(force, z, driven or significant, seed)
+        values, draws = estimated(z, best.columns, force.basis, best.shared, force.block, seed)
+        p_value = p_values[next(k for k, t in enumerate(left) if t is best)]
+        sized = _sized(force, best, values, draws)
+        effects.append(
+            WrenchEffect(best.mechanism, best.covariate, best.form.name, sized, p_value, _names(best, alike))
+        )
+        z = z - best.columns @ values
+        left = [t for t in left if t is not best]
+    scatter = float(force.unit[0] * robust_deviation(Without(force.levelled)(z)[:, 0]))
+    return WrenchFinding(tuple(effects), tested, scatter, force.against_training)
+
+
+def _chosen(force: _Force, z: Array, significant: Sequence[Tried], seed: int) -> tuple[Tried, list[Tried]]:
+    """The best, in the simplest form of its driver that is not surely worse, and all that are not."""
+    basis = force.basis if _is_level(significant[0]) else force.levelled
+    alike = best_first(z, significant, basis, force.block, seed)
+    same = [t for t in alike if (t.mechanism, t.covariate) == (alike[0].mechanism, alike[0].covariate)]
+    return min(same, key=lambda t: t.columns.shape[2]), alike
+
+
+def _is_level(tried: Tried) -> bool:
+    return tried.mechanism == SURFACE_FRICTION and tried.covariate == CONSTANT
+
+
+def _names(best: Tried, alike: Sequence[Tried]) -> tuple[str, ...]:
+    """Rivals by driver, or by mechanism where that differs."""
+    names = [t.covariate if t.mechanism == SURFACE_FRICTION else WRENCH_BIAS for t in (best, *alike)]
+    return tuple(name for name in dict.fromkeys(names[1:]) if name != names[0])
+
+
+def _sized(force: _Force, best: Tried, values: Array, draws: Array) -> tuple[Sized, ...]:
+    if best.mechanism == WRENCH_BIAS:
+        low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+        names = ("force read too much along x", "force read too much along y")
+        return tuple(Sized(n, float(values[k]), float(low[k]), float(high[k]), "N") for k, n in enumerate(names))
+    changes = np.concatenate([values[None], draws]) @ (_over_range(force, best) * force.unit[0]).T
+    range_ = changes[:, 0] if changes.shape[1] == 1 else np.subtract(*np.quantile(changes, [0.95, 0.05], axis=1))
+    relative = np.expm1(range_)
+    low, high = np.quantile(relative[1:], [0.025, 0.975])
+    name = "relative change of the force over the driver's range"
+    return (Sized(name, float(relative[0]), float(low), float(high), "1"),)
+
+
+def _over_range(force: _Force, best: Tried) -> Array:
+    """Rows (k, p) of the form over the new windows, in units of z: one difference if it is one column."""
+    if best.covariate == CONSTANT:
+        return np.array([[1.0 / force.unit[0]]])
+    table = force.table
+    values = best.form.values(table.covariates, len(table)) / force.unit[0]
+    if values.shape[1] > 1:
+        return np.asarray(values)
+    return np.asarray(np.subtract(*np.quantile(values, [0.95, 0.05], axis=0))[None])

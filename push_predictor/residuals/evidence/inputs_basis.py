@@ -1,0 +1,90 @@
+"""What a base model could have learnt in its own inputs: a rich basis of velocity, contact and angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.features import EDGE_SPACING, push_features
+from push_predictor.models.predictors import AnalyticalBody
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+Kind = Literal["driven", "speed", "constant"]  # of an effect: by something beside the inputs, by the speed, by nothing
+
+DEGREES = (5, 4, 3, 2, 1)
+PUSHES_PER_COLUMN = 5
+VARIES = 0.01  # of the logarithm of velocity; below it there is one speed
+
+
+@dataclass(frozen=True, eq=False)
+class InputsBasis:
+    """The basis at n windows, the constant included.
+
+    columns (n, m): contact, angle and speed; still (n, k): contact and angle alone. learnt: the base was fitted in its
+    inputs. folds: it takes sides of the outline for one. knows_speed: it has seen different speeds.
+    """
+
+    columns: Array
+    still: Array
+    learnt: bool = True
+    folds: bool = False
+    knows_speed: bool = False
+
+
+def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
+    """The basis of a table's inputs, as rich as its number of pushes allows; sides that a symmetry folds are one."""
+    base, outline = model.base, model.rig.outline
+    most = len(table.pushes) // PUSHES_PER_COLUMN
+    bases = (_of_degree(outline, table.inputs, degree) for degree in DEGREES)
+    columns, still = next((b for b in bases if b[0].shape[1] <= most), _of_degree(outline, table.inputs, 1))
+    learnt = not isinstance(base.body, AnalyticalBody)
+    speed = _log_speed(base.training.inputs)
+    return InputsBasis(
+        columns, still, learnt, learnt and outline.rotational_symmetry != 1, learnt and float(speed.std()) > VARIES
+    )
+
+
+def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
+    """What of the inputs (n, m) is taken out of a candidate and the residual: nothing, where it lies in them itself."""
+    if kind == "constant":
+        return basis.columns[:, :0]
+    return basis.still if kind == "speed" else basis.columns
+
+
+def _of_degree(outline: Outline, inputs: Array, degree: int) -> tuple[Array, Array]:
+    features = push_features(outline, inputs)[:, 1:]
+    place, kinds = _place(outline, features[:, :-1])
+    angle = features[:, -1]
+    smooth = np.column_stack([_powers(place, angle, degree)])
+    still = np.column_stack([smooth * (kinds == kind)[:, None] for kind in np.unique(kinds)])
+    speed = _log_speed(inputs)
+    if speed.std() <= VARIES:
+        return still, still
+    speed = (speed - speed.mean()) / speed.std()
+    moving = np.column_stack([_powers(place, angle, max(degree - 2, 1)) * speed[:, None], speed**2])
+    return np.column_stack([still, moving]), still
+
+
+def _place(outline: Outline, contact: Array) -> tuple[Array, Array]:
+    """Smooth coordinates (n, k) of the contact, and the number (n,) of the kind of side that it lies on."""
+    n = len(contact)
+    if outline.semi_axes is not None or not contact.shape[1]:
+        return contact, np.zeros(n)
+    side = np.floor(contact[:, 0] / EDGE_SPACING + 1e-9)
+    return 2.0 * (contact - EDGE_SPACING * side[:, None]) - 1.0, side
+
+
+def _powers(place: Array, angle: Array, degree: int) -> Array:
+    coordinates = np.column_stack([place, angle])
+    exponents = (e for e in product(range(degree + 1), repeat=coordinates.shape[1]) if sum(e) <= degree)
+    return np.column_stack([np.prod(coordinates ** np.array(e), axis=1) for e in exponents])
+
+
+def _log_speed(inputs: Array) -> Array:
+    return np.asarray(np.log(np.maximum(inputs[:, 0], 1e-6)))

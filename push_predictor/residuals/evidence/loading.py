@@ -1,0 +1,145 @@
+"""Data to judge a model on: recordings and push tables alike, with every covariate that could drive an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.load import distinct_pushes, load_rig_for
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import INPUTS, PushTable, concatenate
+from push_predictor.recordings.table_file import is_recording, read_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
+from push_predictor.recordings.windows.track import NANOSECOND
+from push_predictor.residuals.evidence.residuals import push_order
+from push_predictor.types import Array
+
+RUNNING_ON = ("elapsed_time", "push_index", "slid_distance")  # count over all recordings, not from each one's start
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """The windows in order of time; the recordings they were cut from (None where a table was given); the rig.
+
+    left_out: covariates that some rows lack, each with how many of how many rows.
+    """
+
+    table: PushTable
+    recordings: tuple[Recording, ...] | None
+    rig: Rig
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def load_evidence(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> Loaded:
+    """Load recordings and push tables. rig takes the place of what they say.
+
+    Raises RecordingError (also if there is no window in any of them), TableError or RigError.
+    """
+    rig = rig or load_rig_for(paths)
+    bags = [path for path in paths if is_recording(Path(path))]
+    recordings = sorted((read_recording(Path(path), rig=rig) for path in bags), key=_first_stamp)
+    files = [Path(path) for path in paths if not is_recording(Path(path))]
+    tables = [*_cut(recordings, rig, options), *(_read(path, rig) for path in files)]
+    if not any(map(len, tables)):
+        raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
+    names = [*(recording.name for recording in recordings), *(path.name for path in files)]
+    table, left_out = _joined(distinct_pushes(names, tables))
+    return Loaded(table, None if files else tuple(recordings), rig, left_out)
+
+
+def cut_anew(recordings: Sequence[Recording], rig: Rig, options: WindowOptions = WindowOptions()) -> PushTable:
+    """The table of recordings in order of time, for one who has corrected their streams or the rig."""
+    tables = _cut(recordings, rig, options)
+    return _joined(distinct_pushes([recording.name for recording in recordings], tables))[0]
+
+
+def with_inputs(table: PushTable) -> PushTable:
+    """The table with the model's inputs among the covariates: they can drive what the model has constant."""
+    inputs = dict(zip(INPUTS, table.inputs.T, strict=True))
+    return replace(table, covariates={**table.covariates, **inputs})
+
+
+def previous_residual(table: PushTable, z: Array) -> Array:
+    """The covariate previous_residual (n,), from residuals z (n, 3) in units of the prediction.
+
+    It is the mean of z over all windows of the push before and over the three outputs, with its sign; zero for the
+    first push of each recording.
+    """
+    push = push_order(table)
+    mean = np.bincount(push, z.mean(axis=1)) / np.bincount(push)
+    recording = table.covariates.get("recording", np.zeros(len(table)))
+    of_push = np.zeros(len(mean))
+    of_push[push] = recording
+    follows = np.concatenate([[False], of_push[1:] == of_push[:-1]])
+    return np.asarray(np.where(follows, np.roll(mean, 1), 0.0)[push])
+
+
+def _first_stamp(recording: Recording) -> int:
+    return min((int(s.stamp[0]) for s in (recording.slider, recording.pusher) if len(s)), default=0)
+
+
+def _cut(recordings: Sequence[Recording], rig: Rig, options: WindowOptions) -> list[PushTable]:
+    windows = [find_windows(recording, rig, options) for recording in recordings]
+    return [with_inputs(windows_to_table(found)) for found in _running_on(windows)]
+
+
+def _running_on(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
+    """Windows whose time, index and way go on from one recording to the next, by the clock of their stamps."""
+    begin: int | None = None
+    pushes, slid = 0.0, 0.0
+    moved: list[list[PushWindow]] = []
+    for windows in recordings:
+        if not windows:
+            moved.append([])
+            continue
+        own = windows[0].start - round(windows[0].covariates["elapsed_time"] / NANOSECOND)
+        begin = own if begin is None else begin
+        added = np.array([(own - begin) * NANOSECOND, pushes, slid])
+        moved.append([_later(window, added) for window in windows])
+        last = moved[-1][-1].covariates
+        pushes = last["push_index"] + 1.0
+        slid = last["slid_distance"] + float(np.hypot(*windows[-1].displacement[:2]))
+    return moved
+
+
+def _later(window: PushWindow, added: Array) -> PushWindow:
+    later = {name: window.covariates[name] + float(more) for name, more in zip(RUNNING_ON, added, strict=True)}
+    return replace(window, covariates={**window.covariates, **later})
+
+
+def _read(path: Path, rig: Rig) -> PushTable:
+    table = with_inputs(read_table(path))
+    edge = rig.outline.edge(table.inputs[:, 1])[0].astype(np.float64)
+    return replace(table, covariates={"edge": edge, **table.covariates})
+
+
+def _joined(tables: Sequence[PushTable]) -> tuple[PushTable, dict[str, str]]:
+    """One table of all, with the number of each row's recording, and the covariates that some rows lack."""
+    full = [(number, table) for number, table in enumerate(tables) if len(table)]
+    numbered = [_numbered(number, table) for number, table in full]
+    table = _indexed(concatenate(numbered))
+    left_out = {}
+    names = dict.fromkeys(name for part in numbered for name in part.covariates if name != "push_index")
+    for name in names:
+        having = sum(int(np.isfinite(part.covariates[name]).sum()) for part in numbered if name in part.covariates)
+        if having < len(table):
+            left_out[name] = f"{len(table) - having} of {len(table)} windows lack it"
+    kept = {name: column for name, column in table.covariates.items() if name not in left_out}
+    return replace(table, covariates=kept), left_out
+
+
+def _indexed(table: PushTable) -> PushTable:
+    """The table with its pushes counted in the order of its rows, where they were not counted when recorded."""
+    return replace(table, covariates={"push_index": push_order(table).astype(np.float64), **table.covariates})
+
+
+def _numbered(number: int, table: PushTable) -> PushTable:
+    """The table with its number, unless it says itself from which recordings its rows come."""
+    return replace(table, covariates={"recording": np.full(len(table), float(number)), **table.covariates})

@@ -1,0 +1,32 @@
+"""Pushes for the analysis, and pushes held out from it: whole blocks in turn, looked at once, at the end."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.residuals import push_order
+from push_predictor.types import BoolArray
+
+BLOCK = 10  # pushes
+FEWEST_BLOCKS = 9  # with fewer pushes the blocks are smaller
+EVERY = 3  # one block in so many is held out
+RULE = f"every third block of up to {BLOCK} successive pushes is held out"
+
+
+def held_out_rows(table: PushTable) -> BoolArray:
+    """Mask (n,) of the rows of held-out pushes: interleaved, so that both parts span the whole time."""
+    order = push_order(table)
+    count = int(order.max()) + 1 if len(order) else 0
+    block = max(1, min(BLOCK, count // FEWEST_BLOCKS))
+    return np.asarray((order // block) % EVERY == EVERY - 1)
+
+
+def digest_of(table: PushTable) -> str:
+    """The sha256 of a table's inputs and outcomes."""
+    digest = hashlib.sha256()
+    for column in (table.inputs, table.duration, table.outcomes):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()

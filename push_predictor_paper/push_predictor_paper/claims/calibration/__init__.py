@@ -1,0 +1,4 @@
+"""Claim: predicted intervals and distributions are calibrated (goes beyond the paper).
+
+Import `calibration.section`.
+"""

@@ -1,0 +1,176 @@
+"""The data: what there is to learn from, and the repeated pushes that tell the truth about single ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import binomtest
+
+from push_predictor.recordings.table import PushTable
+from push_predictor.reporting.canvas import Picture, draw
+from push_predictor.types import Array, IntArray
+from push_predictor_paper.data.corpus import Corpus, learning_spec
+from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.figures.data import SpeedCount, paint_data
+from push_predictor_paper.plan import Plan
+from push_predictor_paper.section import Finding, Section, Table, Verdict
+from push_predictor_paper.study import Study
+
+ENOUGH_WINDOWS = 10  # at every speed, of every pair
+ENOUGH_SEEN = 0.9  # of the repetitions of a push
+WELL_KNOWN = 0.25  # of a deviation: half the interval of one that counts as given
+HALF = 0.5  # of the pushes
+PAPER_SETS = 16
+
+
+def section(study: Study) -> Section:
+    """Learning data by pair and speed; the grid of repetitions and how well it knows mean and deviation."""
+    counts = speed_counts(study.plan, study.simulated)
+    picture = draw(
+        study.out / "data.png",
+        (10.0, 3.4),
+        lambda figure: paint_data(
+            figure, counts, study.simulated.sets[study.simulated.reference], study.reference_grid
+        ),
+    )
+    return Section(
+        key="data",
+        title="The data",
+        findings=(_learning_finding(study, counts), _grid_finding(study.reference_grid)),
+        tables=(*(_corpus_table(corpus) for corpus in study.corpora), _grid_table(study)),
+        pictures=(
+            Picture(
+                picture,
+                "Windows per speed, inputs of the reference set, repetitions seen over the grid",
+                "Left: share of the pushes at each speed that gave at least one window of 0.2 s, all simulated sets "
+                "together, 95 % Wilson intervals. Middle: contact and angle of every window of the reference set. "
+                "Right: share of the repetitions of each push of the grid that gave a first window.",
+            ),
+        ),
+        notes=(*NOTES, *(note for corpus in study.corpora for note in corpus.notes)),
+        data={
+            "sets": {
+                corpus.title: {"/".join(pair): _counts(corpus, pair) for pair in corpus.sets}
+                for corpus in study.corpora
+            },
+            "speeds": [
+                {"speed": c.speed, "pushes": c.pushes, "with_window": c.with_window, "windows": c.windows}
+                for c in counts
+            ],
+        },
+    )
+
+
+NOTES = (
+    "The paper learns from the MIT push data set, measured. The simulated sets have its shapes, masses, pusher and "
+    "speeds, but friction, pressure and their scatter are our guesses (docs/architecture.md): what follows from them "
+    "says nothing about the world.",
+    "A window needs 0.2 s of unbroken contact: 10 cm at 500 mm/s. At high speed the slider flies ahead of the tip, so "
+    "the windows there are those of pushes that kept in touch, a selection.",
+    "The outermost contacts of the grid lie half a millimetre inside the corners.",
+)
+
+
+def speed_counts(plan: Plan, corpus: Corpus) -> list[SpeedCount]:
+    """For each speed of the plan: pushes commanded, pushes with a window, windows; over all pairs.
+
+    A push belongs to the commanded speed that is nearest, as a ratio, to that of its first window.
+    """
+    commanded = np.concatenate([learning_spec(plan, *pair).pushes.speed for pair in corpus.sets])
+    pushes, windows = zip(*(_by_speed(plan, pushes.table) for pushes in corpus.sets.values()), strict=True)
+    return [
+        SpeedCount(
+            speed,
+            int(np.sum(commanded == speed)),
+            int(np.sum(pushes, axis=0)[k]),
+            int(np.sum(windows, axis=0)[k]),
+            int(np.min(windows, axis=0)[k]),
+        )
+        for k, speed in enumerate(plan.speeds)
+    ]
+
+
+def _by_speed(plan: Plan, table: PushTable) -> tuple[IntArray, IntArray]:
+    """Pushes and windows (speeds,) of a set at each speed of the plan."""
+    _, first, windows = np.unique(table.push_id, return_index=True, return_counts=True)
+    away = np.abs(np.log(table.inputs[first, 0])[:, None] - np.log(plan.speeds))
+    nearest, count = away.argmin(axis=1), len(plan.speeds)
+    return np.bincount(nearest, minlength=count), np.bincount(nearest, windows, minlength=count).astype(np.int64)
+
+
+def _learning_finding(study: Study, counts: list[SpeedCount]) -> Finding:
+    pairs, speeds = len(study.simulated.sets), study.plan.speeds
+    poor = [c for c in counts if c.fewest < ENOUGH_WINDOWS]
+    share = binomtest(counts[-1].with_window, counts[-1].pushes).proportion_ci(method="wilson")
+    told = Estimate(counts[-1].with_window / counts[-1].pushes, share.low, share.high).text(".0%")
+    lacking = f"at {', '.join(f'{c.speed * 1e3:.0f}' for c in poor)} mm/s some set has fewer" if poor else "all have"
+    shapes, surfaces = (len({pair[k] for pair in study.simulated.sets}) for k in (0, 1))
+    return Finding(
+        "Pushes at 10 to 500 mm/s of four shapes on four surfaces to learn from",
+        _learning_verdict(pairs, len(poor), len(counts)),
+        f"{pairs} of the paper's {PAPER_SETS} sets, shapes: {shapes}, surfaces: {surfaces}, at {len(speeds)} speeds "
+        f"from {speeds[0] * 1e3:.0f} to {speeds[-1] * 1e3:.0f} mm/s, simulated. At every speed every set should have "
+        f"{ENOUGH_WINDOWS} windows: {lacking}. Of the pushes at {speeds[-1] * 1e3:.0f} mm/s {told} kept in touch for "
+        f"a window. Holds if all {PAPER_SETS} sets are there with windows enough at every speed, does not hold if at "
+        "half of the speeds or more a set has too few, else in part.",
+    )
+
+
+def _learning_verdict(sets: int, poor: int, speeds: int) -> Verdict:
+    if 2 * poor >= speeds:
+        return "does not hold"
+    return "holds" if sets >= PAPER_SETS and not poor else "holds in part"
+
+
+def _grid_finding(grid: RepeatedGrid) -> Finding:
+    widths = np.array([_half_width(cell) for cell in grid.seen]).reshape(-1, 3)
+    seen = np.array([len(cell.outcomes) >= ENOUGH_SEEN * cell.commanded for cell in grid.seen], dtype=bool)
+    given = int(np.sum(seen & (widths <= WELL_KNOWN).all(axis=1)))
+    interval = binomtest(given, len(grid.cells)).proportion_ci(method="wilson")
+    share = Estimate(given / len(grid.cells), interval.low, interval.high)
+    typical = f"±{np.median(widths):.0%}" if len(widths) else "unknown"
+    return Finding(
+        "Repeated pushes give the mean and the deviation of each push",
+        _grid_verdict(share),
+        f"{len(grid.cells)} pushes on {grid.surface}, {grid.cells[0].commanded} times each: of {share.text('.0%')} of "
+        f"them the 95 % interval of the deviation, by drawing repetitions anew, lies within ±{WELL_KNOWN:.0%} of it in "
+        f"all three outputs, and {ENOUGH_SEEN:.0%} of the repetitions gave a first window (such a push is given; "
+        f"windows alone: {np.sum(seen) / len(grid.cells):.0%}). Median over pushes and outputs: {typical}; of a "
+        f"Gaussian: ±{1.96 / np.sqrt(2.0 * grid.cells[0].commanded):.0%}. Holds if the whole interval of that share "
+        f"lies above {ENOUGH_SEEN:.0%}, does not hold if it ends below {HALF:.0%}, in part if it begins above that, "
+        "else not decided.",
+    )
+
+
+def _half_width(cell: Repetitions) -> Array:
+    """Half the interval (3,) of each deviation, as a share of it."""
+    return np.asarray((cell.intervals[1][1] - cell.intervals[1][0]) / 2.0 / cell.sd)
+
+
+def _grid_verdict(share: Estimate) -> Verdict:
+    if share.low > ENOUGH_SEEN:
+        return "holds"
+    if share.low > HALF:
+        return "holds in part"
+    return "does not hold" if share.high < HALF else "not decided"
+
+
+def _corpus_table(corpus: Corpus) -> Table:
+    rows = [
+        (f"{shape}, {surface}", *map(str, _counts(corpus, (shape, surface)).values())) for shape, surface in corpus.sets
+    ]
+    return Table(f"Learning data. {corpus.title}.", ("set", "pushes", "windows"), tuple(rows))
+
+
+def _counts(corpus: Corpus, pair: tuple[str, str]) -> dict[str, int]:
+    table = corpus.sets[pair].table
+    return {"pushes": len(table.pushes), "windows": len(table)}
+
+
+def _grid_table(study: Study) -> Table:
+    rows = []
+    for surface, grid in study.grids.items():
+        seen = np.array([len(cell.outcomes) for cell in grid.cells])
+        rows.append((surface, str(len(grid.cells)), str(grid.cells[0].commanded), f"{seen.sum()}", str(len(grid.seen))))
+    head = ("surface", "pushes of the grid", "repetitions asked", "first windows seen", "pushes seen 10 times or more")
+    return Table(f"Validation data: simulated repetitions, {grid.shape}, 1 cm at 20 mm/s.", head, tuple(rows))

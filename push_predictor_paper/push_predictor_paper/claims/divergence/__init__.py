@@ -1,0 +1,4 @@
+"""Claim: KL divergence of the models from repeated pushes.
+
+Import `divergence.section`.
+"""

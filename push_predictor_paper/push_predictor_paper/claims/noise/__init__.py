@@ -1,0 +1,4 @@
+"""Claims about the size and shape of the noise.
+
+Import `noise.section`.
+"""

@@ -1,0 +1,114 @@
+"""How large the noise is, how far it spans, and whether its shape is the same on different surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from push_predictor.reporting.canvas import SYMBOLS, Picture, draw
+from push_predictor_paper.claims.noise.noise_learnt import learnt_parts
+from push_predictor_paper.claims.noise.noise_shape import shape_finding, shape_json, shape_tables
+from push_predictor_paper.claims.noise.noise_size import (
+    NAMES,
+    WIDE,
+    ratio_json,
+    size_finding,
+    size_table,
+    span_finding,
+    span_json,
+    span_table,
+)
+from push_predictor_paper.figures.noise_maps import paint_noise_maps, paint_ratios, paint_scatter
+from push_predictor_paper.fits.map_models import surface_maps
+from push_predictor_paper.section import Finding, Section
+from push_predictor_paper.statistics.grid_maps import in_degrees
+from push_predictor_paper.statistics.noise_figures import Ratios, noise_ratios, radius_of_gyration, spans
+from push_predictor_paper.statistics.noise_shapes import FEWEST_PUSHES, ceiling, learnt_shapes, shapes
+from push_predictor_paper.study import Study
+
+TITLE = "Size, span and shape of the noise"
+
+
+def section(study: Study) -> Section:
+    """From repetitions on every surface, from the VHGPs, and from VHGPs of measured sets."""
+    grid = study.reference_grid
+    near = [cell for cell in grid.seen if abs(cell.angle) <= WIDE]
+    if len(near) < FEWEST_PUSHES:
+        few = f"{len(near)} pushes within {in_degrees(WIDE)} were seen often enough; {FEWEST_PUSHES} are asked for."
+        return Section("noise", TITLE, (Finding("The noise depends on the push", "not decided", few),))
+    arm = radius_of_gyration(grid)
+    ratios = {"all": noise_ratios(grid.seen, arm), "near": noise_ratios(near, arm)}
+    reach = {"all": spans(grid.seen), "near": spans(near)}
+    counts = {"all": len(grid.seen), "near": len(near)}
+    found, found_near, most = shapes(study.grids), shapes(study.grids, WIDE), ceiling(grid)
+    learnt = learnt_shapes(study.grids, surface_maps(study, "vhgp"))
+    tables, notes, data = learnt_parts(study)
+    return Section(
+        key="noise",
+        title=TITLE,
+        findings=(
+            size_finding(ratios["all"], grid),
+            span_finding(reach, counts),
+            shape_finding(found, found_near, most, learnt),
+        ),
+        tables=(
+            size_table(ratios, counts, grid, arm),
+            span_table(reach, counts, grid),
+            *shape_tables(study, found, found_near, most, learnt),
+            *tables,
+        ),
+        pictures=(_ratio_picture(study, ratios["all"]), *_map_pictures(study)),
+        notes=(*NOTES, *notes),
+        data={
+            "ratio": {which: ratio_json(parts) for which, parts in ratios.items()},
+            "span": {which: span_json(parts) for which, parts in reach.items()},
+            "shape": shape_json(found, most, learnt),
+            "learnt": data,
+        },
+    )
+
+
+NOTES = (
+    "All surfaces of the simulator share one mechanism of noise (contact and support change along a push and from "
+    "push to push, see push_predictor/simulation/scatter.py; trackers' noise) and one slider; they differ in its "
+    "parameters. That the shape of the noise is the same on all of them holds partly by construction and proves "
+    "nothing about the world.",
+    "Size and span follow from the strengths of that noise, which we chose; only where it is large and where small is "
+    "left to the mechanics.",
+    "Repetitions are at one speed, 20 mm/s: the paper's order of magnitude is over speeds too.",
+    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio says nothing; so quantiles, "
+    "root mean squares, and the whole motion (rotation as the way of a point at the radius of gyration).",
+)
+
+
+def _ratio_picture(study: Study, ratios: Sequence[Ratios]) -> Picture:
+    names = (*SYMBOLS, NAMES[-1])
+    parts = [(name, part.values) for name, part in zip(names, ratios, strict=True)]
+    path = draw(study.out / "noise_ratio.png", (7.5, 3.4), lambda figure: paint_ratios(figure, parts))
+    return Picture(
+        path,
+        "Cumulative share of the pushes against the sd as a percentage of the mean, for each output",
+        f"How many of the {len(ratios[0].values)} pushes on {study.reference_grid.surface} (simulated repetitions) "
+        "have a noise of at most so much of their mean. Shaded: the paper's 10 to 40 %.",
+    )
+
+
+def _map_pictures(study: Study) -> list[Picture]:
+    grids, reference = {s: g for s, g in study.grids.items() if g.seen}, study.reference_grid
+    height = 1.7 * len(grids) + 1.2
+    again = ", ".join(f"{surface} {g.cells[0].commanded}" for surface, g in grids.items())
+    maps = Picture(
+        draw(study.out / "noise_maps.png", (9.0, height), lambda figure: paint_noise_maps(figure, grids)),
+        "Maps of the standard deviation of dx, dy and rotation over contact and angle, a row for each surface",
+        "Sd of the first window over contact and angle, over its surface's median; simulated repetitions of each push: "
+        f"{again}. One scale per column.",
+    )
+    others = {surface: g for surface, g in grids.items() if g is not reference}
+    if not others:
+        return [maps]
+    scatter = Picture(
+        draw(study.out / "noise_scatter.png", (9.0, 3.7), lambda figure: paint_scatter(figure, reference, others)),
+        "The sd of every push on one surface against that on the others, for each output",
+        f"Each mark a push: its sd on {reference.surface} and on another surface, each over its surface's median; "
+        "simulated repetitions. On the line the shape is the same.",
+    )
+    return [maps, scatter]

@@ -1,0 +1,124 @@
+"""Is the shape of the noise the same on different surfaces?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from push_predictor_paper.claims.maps.map_peaks import agreed
+from push_predictor_paper.claims.noise.noise_size import WIDE
+from push_predictor_paper.section import Finding, Table, Verdict
+from push_predictor_paper.statistics.grid_maps import BLOCK, in_degrees
+from push_predictor_paper.statistics.noise_shapes import Shape, ceiling
+from push_predictor_paper.study import Study
+
+ALIKE, UNLIKE = 0.7, 0.3  # correlation of log sd
+OUTPUT_NAMES = ("dx", "dy", "rotation")
+CLAIM = "The shape of the noise is the same on different surfaces"
+
+
+def shape_finding(
+    found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
+) -> Finding:
+    """Over all pairs of surfaces, by repetitions and by VHGPs; near: over the pushes that are not steeply aslant."""
+    if not found or most is None:
+        return Finding(CLAIM, "not decided", "Fewer than two surfaces have repetitions of the same pushes.")
+    verdict = agreed(_verdict(found), _verdict(learnt))
+    halves = ", ".join(f"{name} {e.text()}" for name, e in zip(OUTPUT_NAMES, most.pearson, strict=True))
+    return Finding(
+        CLAIM,
+        verdict,
+        f"Correlation of log sd over the pushes, pairs of surfaces: {len(found)}. By repetitions: {_told(found)}; over "
+        f"the pushes within {in_degrees(WIDE)}: {_told(near)}. Two halves of one surface's repetitions reach {halves}. "
+        "Of "
+        "the VHGPs' process noise, of which the paper speaks, one draw of training windows a surface: "
+        f"{_told(learnt)}. "
+        f"Rule, for repetitions and for VHGPs, all pushes: holds if the intervals of all pairs and outputs lie above "
+        f"{ALIKE:g}, does not hold if all lie below {UNLIKE:g}, in part if some lie above that; together in part if "
+        "it holds, or holds in part, by one of them only. The simulator's surfaces share one "
+        "mechanism of noise, so this holds partly by construction.",
+    )
+
+
+def _verdict(found: Sequence[Shape]) -> Verdict:
+    if not found:
+        return "not decided"
+    low, high = (np.array([[getattr(e, end) for e in pair.pearson] for pair in found]) for end in ("low", "high"))
+    if np.all(low > ALIKE):
+        return "holds"
+    if np.all(high < UNLIKE):
+        return "does not hold"
+    return "holds in part" if np.any(low > UNLIKE) else "not decided"
+
+
+def shape_tables(
+    study: Study, found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
+) -> tuple[Table, ...]:
+    """By repetitions, over the pushes near the normal, and by the VHGPs."""
+    block = f"Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}) anew."
+    halved = "Halves of the repetitions of one surface: what too few repetitions leave of a correlation of one."
+    nearest = ceiling(study.reference_grid, WIDE)
+    size = f"{study.plan.size} training windows or all"
+    return tuple(
+        _table(f"{caption} {block}", rows)
+        for caption, rows in (
+            (
+                f"Correlation of log sd between surfaces, simulated repetitions, all pushes. {halved}",
+                _with(found, most),
+            ),
+            (
+                f"The same, pushes within {in_degrees(WIDE)}: what is left without the pushes that hardly move the "
+                "slider.",
+                _with(near, nearest),
+            ),
+            (
+                f"Correlation of the log sd of the VHGPs' process noise, {size} on each surface, the first of "
+                f"{study.plan.seeds} draws of these; simulated.",
+                list(learnt),
+            ),
+        )
+        if rows
+    )
+
+
+def shape_json(found: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]) -> dict[str, Any]:
+    """By pair."""
+    named = {"repetitions": list(found), "halves": [] if most is None else [most], "vhgp": list(learnt)}
+    return {
+        name: {
+            f"{one.first}/{one.second}": {
+                "pushes": one.pushes,
+                "pearson": [e.json() for e in one.pearson],
+                "spearman": [e.json() for e in one.spearman],
+            }
+            for one in parts
+        }
+        for name, parts in named.items()
+    }
+
+
+def _told(found: Sequence[Shape]) -> str:
+    """The range of each output's correlations over the pairs, and the lowest end of their intervals."""
+    if not found:
+        return "too few"
+    parts = []
+    for k, name in enumerate(OUTPUT_NAMES):
+        values = sorted(pair.pearson[k].value for pair in found)
+        span = " to ".join(dict.fromkeys(f"{v:.2f}" for v in (values[0], values[-1])))
+        parts.append(f"{name} {span} (lowest end {min(pair.pearson[k].low for pair in found):.2f})")
+    return ", ".join(parts).replace("-", "−")
+
+
+def _with(found: Sequence[Shape], most: Shape | None) -> list[Shape]:
+    return list(found) if most is None else [*found, most]
+
+
+def _table(caption: str, rows: Sequence[Shape]) -> Table:
+    head = ("surfaces", "pushes", *(f"{name}, {r}" for r in ("Pearson", "Spearman") for name in OUTPUT_NAMES))
+    return Table(
+        caption,
+        head,
+        tuple((f"{r.first}, {r.second}", str(r.pushes), *(e.cell() for e in (*r.pearson, *r.spearman))) for r in rows),
+    )

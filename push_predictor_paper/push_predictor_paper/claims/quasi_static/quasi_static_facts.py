@@ -1,0 +1,89 @@
+"""The quasi-static study's computations: pushes of equal travel at every speed, models of growing brackets of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from push_predictor.evaluation.push_scores import pooled
+from push_predictor.recordings.table import PushTable
+from push_predictor_paper.claims.quasi_static.quasi_static_rules import Judged
+from push_predictor_paper.data.time_scaled import (
+    Bracket,
+    EqualTravel,
+    equal_travel,
+    score_bracket,
+    speed_windows,
+    training_rows,
+)
+from push_predictor_paper.study import Study
+
+FEWEST, MOST = 10, 50  # training windows of a speed
+EQUAL = 200  # training windows of the control, in every bracket
+MAIN, GP, SAME_SIZE, TOLD = "VHGP, not told", "GP, not told", "VHGP, not told, equal n", "VHGP, told the speed"
+SERIES = (MAIN, GP, SAME_SIZE, TOLD)
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """All of the study: pushes at equal travel by speed, windows by speed, models; rows: windows a speed gives them."""
+
+    pushes: int
+    speeds: tuple[float, ...]
+    equal: tuple[EqualTravel, ...]
+    windows: tuple[PushTable, ...]
+    judged: Judged
+    rows: int
+    same_size: int
+
+    def size(self, series: str, bracket: int) -> int:
+        """Training windows of a bracket."""
+        return _rows(series, bracket + 1, self.rows, self.same_size) * (bracket + 1)
+
+    @property
+    def same_sizes(self) -> str:
+        """Training windows of the brackets of equal n, in words: they differ by rounding."""
+        sizes = sorted({self.size(SAME_SIZE, k) for k in range(len(self.judged.speeds))})
+        return f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+
+    @property
+    def judged_on(self) -> str:
+        """Which pushes, which split, which interval."""
+        return (
+            f"{len(self.judged.tallies[MAIN][-1].push_id)} held-out pushes, whole pushes left out; intervals draw "
+            "folds with their models anew, and pushes within."
+        )
+
+
+def facts_of(study: Study) -> Facts:
+    """Simulate, train, judge."""
+    plan, pair = study.plan, study.simulated.reference
+    calls = [(plan, *pair, number) for number in range(len(plan.speeds))]
+    windows = study.work.run("pushes of equal travel", speed_windows, calls)
+    equal = study.work.run("the same pushes at every speed", equal_travel, calls)
+    folds = range(plan.seeds)
+    least = [min(len(training_rows(w, Bracket(MAIN, 1, len(w), False, fold))) for fold in folds) for w in windows]
+    numbers = tuple(k for k, count in enumerate(least) if count >= FEWEST)
+    usable = [windows[k] for k in numbers]
+    rows = min([MOST, *(least[k] for k in numbers)])
+    same_size = min([EQUAL, *(least[k] * (place + 1) for place, k in enumerate(numbers))])
+    brackets = {
+        (series, k, fold): _bracket(series, k + 1, fold, rows, same_size)
+        for series in SERIES
+        for k in range(len(numbers))
+        for fold in folds
+    }
+    rig = study.simulated.sets[pair].rig
+    done = study.work.run("models of time-scaled pushes", score_bracket, [(usable, rig, b) for b in brackets.values()])
+    found = dict(zip(brackets, done, strict=True))
+    tallies = {s: [pooled([found[s, k, f] for f in folds]) for k in range(len(numbers))] for s in SERIES}
+    judged = Judged(tuple(plan.speeds[k] for k in numbers), numbers, tallies)
+    return Facts(plan.speed_pushes, plan.speeds, tuple(equal), tuple(windows), judged, rows, same_size)
+
+
+def _bracket(series: str, speeds: int, fold: int, rows: int, same_size: int) -> Bracket:
+    kind = "gp" if series == GP else "vhgp"
+    return Bracket(kind, speeds, _rows(series, speeds, rows, same_size), series == TOLD, fold)
+
+
+def _rows(series: str, speeds: int, rows: int, same_size: int) -> int:
+    return max(1, same_size // speeds) if series == SAME_SIZE else rows

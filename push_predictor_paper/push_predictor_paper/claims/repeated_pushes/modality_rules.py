@@ -1,0 +1,59 @@
+"""How many modes repeated pushes have and what a Gaussian makes of them: figures, and by which rule a claim holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from push_predictor.types import Array
+from push_predictor_paper.data.repetitions import Repetitions
+from push_predictor_paper.estimate import Estimate, of_draws
+from push_predictor_paper.section import Verdict
+from push_predictor_paper.statistics.densities import LogDensities, Shape
+
+LEVEL = 0.05
+FAR, POWER = 6.0, 0.8  # two equal modes so many of their sd apart should be found so often
+GOOD, POOR = 0.16, 0.32  # nats an outcome; 0.32: what an sd twice as wide as it should be costs
+
+
+def model_loss(cells: Sequence[Repetitions], at: Shape, of_model: Sequence[LogDensities]) -> Array:
+    """Mean log density (p, 3) that the model's Gaussian gives away to the better description by the push itself."""
+    model = [logs.gaussian[: len(c.outcomes)].mean(axis=0) for c, logs in zip(cells, of_model, strict=True)]
+    return np.asarray(at.own - np.array(model))
+
+
+def mean_over_pushes(values: Array, weights: Array) -> Estimate:
+    """Mean of those of values (p, k) that are not NaN, pushes drawn by weights (d, p); draws of none are passed "
+    "over."""
+    sums, counts = np.nansum(values, axis=1), np.sum(np.isfinite(values), axis=1)
+    total = weights @ counts
+    drawn = (weights @ sums)[total > 0.0] / total[total > 0.0]
+    return of_draws(float(sums.sum() / counts.sum()), drawn)
+
+
+def some_modes(in_window: int, at_end: int, power_far: float) -> Verdict:
+    """What the number of pushes with several modes says, and how surely the test would find them."""
+    if in_window > 0:
+        return "holds"
+    if at_end > 0:
+        return "holds in part"
+    return "does not hold" if power_far >= POWER else "not decided"
+
+
+def not_gaussian(certain: int, share: Estimate) -> Verdict:
+    """What the number of pushes that are surely not Gaussian says, and the share of single tests that reject."""
+    if certain > 0:
+        return "holds"
+    if share.low > LEVEL:
+        return "holds in part"
+    return "does not hold" if share.high < 2.0 * LEVEL else "not decided"
+
+
+def good_gaussian(given_away: Estimate) -> Verdict:
+    """What the loss against a push's own description says."""
+    if given_away.high < GOOD:
+        return "holds"
+    if given_away.high < POOR:
+        return "holds in part"
+    return "does not hold" if given_away.low > POOR else "not decided"

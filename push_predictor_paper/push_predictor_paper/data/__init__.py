@@ -1,0 +1,4 @@
+"""What the claims are computed from: simulated recordings, repeated pushes, measured pushes.
+
+Import anything.
+"""

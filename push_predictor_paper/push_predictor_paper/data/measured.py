@@ -1,0 +1,187 @@
+"""Pushes measured by others: what of a user's folder the paper's tables can use (docs/measured.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.importers.mit.listing import MitPush, straight_pushes
+from push_predictor.recordings.importers.mit.pushes import read_mit
+from push_predictor.recordings.importers.mit.source import MitPlace, paths_in, read_places
+from push_predictor.recordings.importers.mit.square_windows import read_mit_square, square_rig
+from push_predictor.recordings.importers.report import ImportReport, Notes
+from push_predictor.recordings.read import require_rig
+from push_predictor.recordings.rig import Rig, save_rig
+from push_predictor.recordings.table import PushTable, concatenate
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor_paper.data.corpus import Corpus, Pair, PushSet, bare
+from push_predictor_paper.plan import REFERENCE
+from push_predictor_paper.work import Work
+
+FEWEST_WINDOWS, FEWEST_PUSHES = 60, 10  # of a set that can show a learning curve
+SQUARE = "mit_square"
+SQUARE_SUFFIXES = (".npz", ".csv.gz", ".csv")  # of several forms of one table the first is read
+BATCH = 100  # files
+NAMED = 3  # sets left out that a title names
+ACCEPTED = (
+    f"{SQUARE}/pushes_*.npz (.csv.gz, .csv), or files of the MIT push data set in folders or zip archives "
+    "(motion_surface=..._shape=..._a=0_v=....h5, .hdf5, .json); of each shape on each surface at least "
+    f"{FEWEST_WINDOWS} windows of {FEWEST_PUSHES} pushes"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """The windows in some files of one pair. rig: None if none of the files could be read. notes: what was done."""
+
+    table: PushTable
+    rig: Rig | None
+    recordings: int
+    notes: Notes
+
+
+@dataclass(eq=False)
+class Found:
+    """What a folder holds: corpora, and in words what was left out of them."""
+
+    corpora: list[Corpus] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def measured_corpora(folder: Path, work: Work, scratch: Path) -> tuple[Corpus, ...]:
+    """`mit_square`, and the straight pushes at constant speed of a copy of the MIT push data set, if a folder has them.
+
+    Of the MIT set scratch receives every pair as a push table with its rig, and what the import repaired and dropped;
+    files that have not changed are not imported again (work). Sets with too few pushes for a learning curve are left
+    out: the last one's notes say which. Raises ImportSourceError if nothing remains.
+    """
+    found = Found()
+    _add_square(found, folder)
+    _add_mit(found, folder, work, scratch)
+    left_out = _left_out(found.left_out)
+    if not found.corpora:
+        raise ImportSourceError(f"{folder}: holds nothing that the paper's tables can use{left_out}; give {ACCEPTED}")
+    *others, last = found.corpora
+    return (*others, replace(last, notes=(f"{last.title}{left_out}.",))) if left_out else tuple(found.corpora)
+
+
+def square_tables(folder: Path) -> list[Path]:
+    """The tables of measured windows of a square in a folder, one file of each."""
+    inside = folder if folder.name == SQUARE else folder / SQUARE
+    every = [path for suffix in SQUARE_SUFFIXES for path in sorted(inside.glob(f"pushes_*{suffix}"))]
+    return list({path.name.split(".")[0]: path for path in reversed(every)}.values())
+
+
+def import_pushes(places: tuple[MitPlace, ...]) -> Imported:
+    """The windows in files of one shape on one surface. A file that cannot be read is told in the notes."""
+    notes = Notes()
+    rig: Rig | None = None
+    tables = [windows_to_table([])]
+    try:
+        for file in read_places(places):
+            try:
+                recording = read_mit(file, None, notes)
+            except ImportSourceError as error:
+                notes.dropped.append(f"{error}: file refused")
+                continue
+            rig = require_rig(recording)
+            tables.append(windows_to_table(find_windows(recording, rig)))
+    except (ImportSourceError, OSError) as error:
+        notes.dropped.append(f"{error}: the files after it in {places[0].path} are not read")
+    return Imported(bare(concatenate(tables)), rig, len(tables) - 1, notes)
+
+
+def _add_square(found: Found, folder: Path) -> None:
+    for path in square_tables(folder):
+        rig = square_rig()
+        pushes = PushSet(bare(read_mit_square(path, rig.outline)), rig)
+        name = path.name.split(".")[0]
+        if not _enough(pushes):
+            found.left_out.append(f"{SQUARE}/{name} {_too_few(pushes)}")
+            continue
+        title = (
+            f"measured: {SQUARE}/{name}, one side of a square, {len(pushes.table)} overlapping windows of "
+            f"{len(pushes.table.pushes)} pushes (which windows are of one push is an estimate) at 20 mm/s"
+        )
+        pair = (rig.shape, rig.surface)
+        found.corpora.append(Corpus("measured", title, {pair: pushes}, pair))
+
+
+def _add_mit(found: Found, folder: Path, work: Work, scratch: Path) -> None:
+    pushes = straight_pushes(paths_in(folder), found.left_out)
+    sets = _imported_sets(pushes, work, scratch)
+    good = {pair: s for pair, s in sets.items() if _enough(s)}
+    for pair in sorted({push.pair for push in pushes} - good.keys()):
+        found.left_out.append(f"{pair[0]} on {pair[1]} {_too_few(sets.get(pair))}")
+    if good:
+        reference = REFERENCE if REFERENCE in good else max(good, key=lambda pair: len(good[pair].table))
+        ordered = dict(sorted(good.items(), key=lambda item: item[0] != reference))
+        found.corpora.append(Corpus("measured", _mit_title(good, pushes), ordered, reference))
+
+
+def _imported_sets(pushes: Sequence[MitPush], work: Work, scratch: Path) -> dict[Pair, PushSet]:
+    """Import by batches of files, over all cores; keep each pair's table and the import's report in scratch."""
+    calls, pairs = [], []
+    for pair in sorted({push.pair for push in pushes}):
+        places = sorted((p.place for p in pushes if p.pair == pair), key=lambda place: place.name)
+        for k in range(0, len(places), BATCH):
+            calls.append((tuple(places[k : k + BATCH]),))
+            pairs.append(pair)
+    parts = work.run("measured pushes", import_pushes, calls)
+    sets: dict[Pair, PushSet] = {}
+    for pair in dict.fromkeys(pairs):
+        of_pair = [part for part, p in zip(parts, pairs, strict=True) if p == pair]
+        rig = next((part.rig for part in of_pair if part.rig is not None), None)
+        if rig is not None:
+            sets[pair] = PushSet(concatenate([part.table for part in of_pair]), rig)
+    if pushes:
+        _keep(scratch, sets, parts)
+    return sets
+
+
+def _keep(scratch: Path, sets: dict[Pair, PushSet], parts: Sequence[Imported]) -> None:
+    scratch.mkdir(parents=True, exist_ok=True)
+    for pair, pushes in sets.items():
+        write_table(scratch / f"{'_'.join(pair)}.csv", pushes.table)
+        save_rig(pushes.rig, scratch / f"{'_'.join(pair)}.rig.yaml")
+    notes = [part.notes for part in parts]
+    told = [tuple(dict.fromkeys(s for n in notes for s in getattr(n, f))) for f in ("dropped", "repaired", "assumed")]
+    written = tuple(scratch / f"{'_'.join(pair)}.csv" for pair in sets)
+    pushes_found = sum(len(pushes.table.pushes) for pushes in sets.values())
+    report = ImportReport("mit", written, sum(part.recordings for part in parts), pushes_found, *told)
+    (scratch / "import.txt").write_text(f"{report}\n", encoding="utf-8")
+
+
+def _enough(pushes: PushSet) -> bool:
+    return len(pushes.table) >= FEWEST_WINDOWS and len(pushes.table.pushes) >= FEWEST_PUSHES
+
+
+def _too_few(pushes: PushSet | None) -> str:
+    if pushes is None:
+        return "(no file could be read)"
+    return f"(too few; pushes: {len(pushes.table.pushes)}, windows: {len(pushes.table)})"
+
+
+def _mit_title(sets: Mapping[Pair, PushSet], pushes: Sequence[MitPush]) -> str:
+    counts = [len(s.table.pushes) for s in sets.values()]
+    speeds = [push.speed for push in pushes if push.pair in sets]
+    return (
+        f"measured: MIT push data set, your copy: {len(sets)} {'set' if len(sets) == 1 else 'sets'} of "
+        f"{_span(counts)} straight pushes at {_span(speeds)} mm/s"
+    )
+
+
+def _span(values: Sequence[float]) -> str:
+    low, high = min(values), max(values)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _left_out(what: Sequence[str]) -> str:
+    if not what:
+        return ""
+    more = f" and {len(what) - NAMED} more" if len(what) > NAMED else ""
+    return f"; left out: {', '.join(what[:NAMED])}{more}"

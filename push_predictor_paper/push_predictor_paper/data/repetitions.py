@@ -1,0 +1,180 @@
+"""The validation data: a grid of pushes of one side, every push many times over, and what they did.
+
+The paper: 1 cm at 20 mm/s, 11 contacts on a side, angles from -1.5 to 1.5 rad by 0.1, 100 repetitions of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.write import write_recording
+from push_predictor.simulation.pushes import grid_pushes
+from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
+from push_predictor.simulation.slider import slider_named
+from push_predictor.simulation.spec import simulated_rig
+from push_predictor.types import Array
+from push_predictor_paper.data.corpus import on_the_table, pair_number
+from push_predictor_paper.plan import GRID_SPEED, GRID_TRAVEL, Plan
+from push_predictor_paper.work import Work
+
+FEWEST = 10  # repetitions of a push for which a mean and a deviation are shown
+DRAWS = 400  # bootstrap
+STEP = 20_000_000  # ns between the points of a path
+PATH_POINTS = round(GRID_TRAVEL / GRID_SPEED * 1e9 / STEP) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Repetitions:
+    """What one push of the grid did, time after time, in the first window (0.2 s from the first touch).
+
+    fraction: contact along the side, angle in rad, as commanded, and how often. inputs, outcomes (r, 3): the windows;
+    r is below `commanded` where the tip slid off too early. paths (r, t, 3): the slider's pose (m, m, rad) every
+    20 ms from the first touch to the end of the push, relative to where it was, along the push.
+    """
+
+    fraction: float
+    angle: float
+    commanded: int
+    inputs: Array
+    outcomes: Array
+    paths: Array
+
+    @property
+    def enough(self) -> bool:
+        """Whether mean and deviation mean something."""
+        return len(self.outcomes) >= FEWEST
+
+    @property
+    def mean(self) -> Array:
+        """Mean outcome (3,), NaN where too few were seen."""
+        return self.outcomes.mean(axis=0) if self.enough else np.full(3, np.nan)
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation (3,) of the outcome, NaN where too few were seen."""
+        return self.outcomes.std(axis=0, ddof=1) if self.enough else np.full(3, np.nan)
+
+    @cached_property
+    def intervals(self) -> tuple[Array, Array]:
+        """95 % intervals (2, 3) of mean and sd, by drawing repetitions anew; every repetition is a push of its own."""
+        if not self.enough:
+            return np.full((2, 3), np.nan), np.full((2, 3), np.nan)
+        rows = np.random.default_rng(0).integers(0, len(self.outcomes), (DRAWS, len(self.outcomes)))
+        drawn, ends = self.outcomes[rows], [0.025, 0.975]
+        return np.quantile(drawn.mean(axis=1), ends, axis=0), np.quantile(drawn.std(axis=1, ddof=1), ends, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedGrid:
+    """All pushes of the grid on one surface: cells of (contact, angle) in the order of fractions x angles."""
+
+    shape: str
+    surface: str
+    rig: Rig
+    fractions: Array
+    angles: Array
+    cells: tuple[Repetitions, ...]
+
+    @property
+    def mean(self) -> Array:
+        """Mean outcomes (A, C, 3) over angle and contact, NaN where too few repetitions were seen."""
+        return self._map([cell.mean for cell in self.cells])
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations (A, C, 3) of the outcomes."""
+        return self._map([cell.sd for cell in self.cells])
+
+    @property
+    def seen(self) -> list[Repetitions]:
+        """The pushes of which enough repetitions were seen."""
+        return [cell for cell in self.cells if cell.enough]
+
+    @property
+    def typical_inputs(self) -> Array:
+        """Mean measured inputs (len(seen), 3) of these: where a model is asked."""
+        return np.array([cell.inputs.mean(axis=0) for cell in self.seen])
+
+    @property
+    def commanded_inputs(self) -> Array:
+        """Commanded inputs (A * C, 3), angle by angle: where a model's map is drawn."""
+        angle, fraction = (grid.ravel() for grid in np.meshgrid(self.angles, self.fractions, indexing="ij"))
+        contact = contact_on_first_side(self.rig.outline, fraction)
+        return np.column_stack([np.full(angle.size, GRID_SPEED), contact, angle])
+
+    def _map(self, values: list[Array]) -> Array:
+        shape = (len(self.fractions), len(self.angles), 3)
+        return np.asarray(np.transpose(np.reshape(values, shape), (1, 0, 2)))
+
+
+def repeated_grid(
+    plan: Plan, work: Work, surface: str, repetitions: int | None = None, keep: Path | None = None
+) -> RepeatedGrid:
+    """Record every push of the grid on the square, over and over: one recording a push of the grid.
+
+    repetitions: other than the plan's. keep: a folder that receives the recordings.
+    """
+    shape, again = plan.shapes[0], repetitions or plan.repetitions
+    places = [(f, a) for f in plan.grid_fractions.tolist() for a in plan.grid_angles.tolist()]
+    calls = [(plan, shape, surface, k, f, a, again, keep) for k, (f, a) in enumerate(places)]
+    cells = work.run(f"repeated pushes on {surface}", repeat_push, calls)
+    for call in calls:
+        if keep is not None and not (keep / grid_spec(*call[:-1]).name).exists():
+            repeat_push(*call)  # its windows were read from disk, but the recording has gone since
+    rig = simulated_rig(grid_spec(plan, shape, surface, 0, 0.5, 0.0, 1))
+    return RepeatedGrid(shape, surface, rig, plan.grid_fractions, plan.grid_angles, tuple(cells))
+
+
+def repeat_push(
+    plan: Plan, shape: str, surface: str, number: int, fraction: float, angle: float, again: int, keep: Path | None
+) -> Repetitions:
+    """Record one push of the grid `again` times and cut the windows."""
+    spec = grid_spec(plan, shape, surface, number, fraction, angle, again)
+    recording = simulate(spec)
+    if keep is not None:
+        write_recording(keep / spec.name, recording)
+    first = [window for window in find_windows(recording, simulated_rig(spec)) if window.index == 0]
+    paths = np.array([_path(recording.slider, window) for window in first])
+    return Repetitions(
+        fraction,
+        angle,
+        again,
+        np.array([[w.velocity, w.contact, w.angle] for w in first]).reshape(-1, 3),
+        np.array([w.displacement for w in first]).reshape(-1, 3),
+        paths if first else np.zeros((0, PATH_POINTS, 3)),
+    )
+
+
+def grid_spec(
+    plan: Plan, shape: str, surface: str, number: int, fraction: float, angle: float, again: int
+) -> SimulationSpec:
+    """The recording of one push of the grid on the first side of a slider."""
+    contact = float(contact_on_first_side(slider_named(shape).outline, np.array(fraction)))
+    pushes = grid_pushes([contact], [angle], again, GRID_SPEED, GRID_TRAVEL)
+    name = f"grid_{shape}_{surface}_c{1e3 * fraction:04.0f}_a{1e3 * angle:+05.0f}"
+    draw = 100_000 + 1000 * pair_number(shape, surface) + number
+    return on_the_table(SimulationSpec(shape, surface, pushes, name=name), plan.seed, draw)
+
+
+def contact_on_first_side(outline: Outline, fraction: Array) -> Array:
+    """Contacts (n,) of fractions (n,) of a polygon's first edge, or of the first quarter of a smooth outline."""
+    return fraction * (0.25 if outline.semi_axes is not None else float(outline.edge_starts[1]))
+
+
+def _path(slider: PoseStream, window: PushWindow) -> Array:
+    """Poses (t, 3) relative to the window's start in its push frame, over the time the whole push takes."""
+    times = window.start + STEP * np.arange(PATH_POINTS)
+    columns = (slider.x, slider.y, np.unwrap(slider.heading))
+    poses = np.stack([np.interp(times, slider.stamp, column) for column in columns], axis=-1)
+    moved = rotate(poses[:, :2] - poses[0, :2], np.array(-window.push_heading))
+    return np.column_stack([moved, poses[:, 2] - poses[0, 2]])

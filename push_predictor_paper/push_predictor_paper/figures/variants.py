@@ -1,0 +1,45 @@
+"""What other kernels gain over the plain squared exponential, by size and split."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from push_predictor.reporting.canvas import COLOURS, grid
+from push_predictor_paper.estimate import Estimate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKS = ("o", "s", "^")
+Curves = Mapping[str, Sequence[Estimate]]  # by variant, one a size
+
+
+def paint_variants(figure: Figure, sizes: Sequence[int], panels: Mapping[tuple[str, str], Curves]) -> None:
+    """A panel per (quantity, split), two rows of two, given row by row; below zero is better than the plain kernel."""
+    axes = figure.subplots(2, 2, sharex=True, sharey="row")
+    for number, (ax, ((quantity, split), curves)) in enumerate(zip(axes.flat, panels.items(), strict=True)):
+        grid(ax)
+        ax.axhline(0.0, color="0.2", linewidth=1.0, linestyle="--", label="as the plain kernel")
+        for k, (variant, estimates) in enumerate(curves.items()):
+            _paint_curve(ax, k, variant, estimates)
+        if number % 2 == 0:
+            ax.set_ylabel(f"{quantity},\nless the plain kernel's")
+        if number < 2:
+            ax.set_title(split)
+        else:
+            ax.set_xlabel("training windows")
+        ax.set_xticks(np.arange(len(sizes)), [str(n) for n in sizes])
+        ax.set_xlim(-0.5, len(sizes) - 0.5)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+
+
+def _paint_curve(ax: Axes, k: int, variant: str, estimates: Sequence[Estimate]) -> None:
+    value = np.array([e.value for e in estimates])
+    ends = np.maximum([value - [e.low for e in estimates], [e.high for e in estimates] - value], 0.0)
+    place = np.arange(float(len(estimates))) + 0.16 * (k - 1)
+    ax.errorbar(place, value, ends, fmt=MARKS[k], color=COLOURS[k], capsize=3.0, markersize=5.0, label=variant)

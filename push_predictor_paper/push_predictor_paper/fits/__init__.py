@@ -1,0 +1,4 @@
+"""Models trained on draws of rows and scored on held-out rows.
+
+Import anything.
+"""

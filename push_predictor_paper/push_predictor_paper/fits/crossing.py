@@ -1,0 +1,92 @@
+"""The training size from which on a learning curve stays below another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.splits import BOOTSTRAP_DRAWS, push_bootstrap
+from push_predictor.types import Array
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Training size with 95 % interval: `first` says "there or before", inf says "not up to the last size"."""
+
+    value: float
+    low: float
+    high: float
+    first: int
+    last: int
+
+    def text(self) -> str:
+        """For a sentence: 95 (70 to 130)."""
+        return f"{self._told(self.value)} ({self._told(self.low)} to {self._told(self.high)})"
+
+    def cell(self) -> str:
+        """For a table: the interval beneath."""
+        return f"{self._told(self.value)}\n{self._told(self.low)} to {self._told(self.high)}"
+
+    def json(self) -> dict[str, float | None]:
+        """null: not up to the last size tried."""
+        ends = {"value": self.value, "low": self.low, "high": self.high}
+        told: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
+        return {**told, "first_tried": self.first, "last_tried": self.last}
+
+    def _told(self, size: float) -> str:
+        if not np.isfinite(size):
+            return f"beyond {self.last}"
+        return f"at most {self.first}" if size <= self.first else f"{size:.3g}"
+
+
+def crossing(sizes: Sequence[int], learnt: Sequence[Sequence[Tally]], baseline: Sequence[Sequence[Tally]]) -> Crossing:
+    """From where on the learnt model's total NMSE stays below the baseline's, up to the last size.
+
+    By size, by seed (fold) the tallies of both on the same windows. The interval draws pushes anew, the same for both
+    and for all sizes and seeds, and the seeds as well.
+    """
+    gaps = [_gap(first, second) for first, second in zip(learnt, baseline, strict=True)]
+    value = below_zero_from(sizes, np.array([[gap[0] for gap in gaps]]))[0]
+    draws = below_zero_from(sizes, np.column_stack([gap[1:] for gap in gaps]))
+    low, high = np.quantile(draws, [0.025, 0.975], method="inverted_cdf")  # no mean of a size and infinity
+    return Crossing(float(value), float(low), float(high), sizes[0], sizes[-1])
+
+
+def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
+    """Sizes (d,) from which on gaps (d, sizes) stay below 0, by straight lines in log n.
+
+    The first size where all gaps lie below 0, inf where the last does not.
+    """
+    place = np.log(np.asarray(sizes, dtype=np.float64))
+    after = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1).sum(axis=1)  # how many sizes, from the last back
+    k = np.minimum(len(sizes) - after, len(sizes) - 1)
+    rows, before = np.arange(len(gaps)), np.maximum(k - 1, 0)
+    ahead, at = gaps[rows, before], gaps[rows, k]
+    share = np.divide(ahead, ahead - at, out=np.ones(len(gaps)), where=(k > 0) & (after > 0))
+    size = np.exp(place[before] + share * (place[k] - place[before]))
+    return np.where(after > 0, np.where(k == 0, float(sizes[0]), size), np.inf)
+
+
+def _gap(learnt: Sequence[Tally], baseline: Sequence[Tally]) -> Array:
+    """Total NMSE of the first less that of the second, (1 + draws,): of all, then of each draw."""
+    weights = _weights(learnt)
+    return _total(learnt, weights) - _total(baseline, weights)
+
+
+def _weights(tallies: Sequence[Tally]) -> list[Array]:
+    """By seed how often each of its pushes counts, (1 + draws, p)."""
+    names = np.unique(np.concatenate([tally.push_id for tally in tallies]))
+    pushes = push_bootstrap(names)
+    count = len(tallies)
+    seeds = np.random.default_rng(1).multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS)
+    drawn = [pushes[:, np.searchsorted(names, t.push_id)] * seeds[:, k, None] for k, t in enumerate(tallies)]
+    return [np.vstack([np.ones((1, weights.shape[1])), weights]) for weights in drawn]
+
+
+def _total(tallies: Sequence[Tally], weights: Sequence[Array]) -> Array:
+    error = sum((w @ tally.error for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
+    spread = sum((w @ tally.spread for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
+    return np.asarray((error / spread).sum(axis=1))

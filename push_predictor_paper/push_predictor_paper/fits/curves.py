@@ -1,0 +1,86 @@
+"""Scores over the training size, cell by cell: which fits a set can hold, and their figures over seeds and pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.evaluation.push_scores import Tally, pooled
+from push_predictor_paper.data.corpus import Corpus, Pair
+from push_predictor_paper.estimate import Estimate, over_seeds
+from push_predictor_paper.fits.fits import SPLITS, Fit, Score, SplitName, scores
+from push_predictor_paper.plan import Plan
+from push_predictor_paper.study import Study
+
+Cell = tuple[Pair, str, SplitName, int]  # pair, kind of model, split, training windows
+Measure = Callable[[Score], float]
+OTHER_SEEDS = 3  # draws of the random split on pairs other than the reference
+
+
+def nmse_of(score: Score) -> float:
+    """NMSE summed over the outputs."""
+    return float(score.nmse.sum())
+
+
+def nlpd_of(score: Score) -> float:
+    """NLPD summed over the outputs, moment-matched Gaussian, SI units."""
+    return float(score.nlpd.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """By cell the scores of all its seeds (folds, by push); a cell that a set is too small for is not there."""
+
+    cells: Mapping[Cell, tuple[Score, ...]]
+
+    def sizes(self, pairs: Sequence[Pair], kind: str, split: SplitName) -> tuple[int, ...]:
+        """The training sizes that all these pairs have."""
+        held = [{n for p, k, s, n in self.cells if (p, k, s) == (pair, kind, split)} for pair in pairs]
+        return tuple(sorted(set.intersection(*held))) if held else ()
+
+    def values(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Measure) -> list[float]:
+        """Seed by seed the mean over pairs of a measure."""
+        rows = [[measure(score) for score in self.cells[pair, kind, split, n]] for pair in pairs]
+        return [float(np.mean(seed)) for seed in zip(*rows, strict=False)]  # the reference pair has more seeds
+
+    def over_seeds(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Measure) -> Estimate:
+        """The mean of a measure over pairs and seeds, with its interval over seeds."""
+        return over_seeds(self.values(pairs, kind, split, n, measure))
+
+    def tally(self, pair: Pair, kind: str, split: SplitName, n: int) -> Tally:
+        """All seeds' pushes as one."""
+        return pooled([score.tally for score in self.cells[pair, kind, split, n]])
+
+
+def curves(study: Study, corpus: Corpus, pairs: Sequence[Pair], kinds: Sequence[str]) -> Curves:
+    """Train and judge these kinds on these pairs at all sizes, on both splits."""
+    fits = [
+        (pair, Fit(kind, n, split, seed))
+        for pair in pairs
+        for kind in kinds
+        for split in SPLITS
+        for n in sizes_tried(study.plan, pair == corpus.reference)
+        for seed in range(seeds_tried(study.plan, split, pair == corpus.reference))
+    ]
+    return gathered(fits, scores(study.work, corpus, fits))
+
+
+def sizes_tried(plan: Plan, reference: bool) -> tuple[int, ...]:
+    """Training sizes; the largest on the reference pair only."""
+    return plan.sizes + ((plan.largest,) if reference and plan.largest is not None else ())
+
+
+def seeds_tried(plan: Plan, split: SplitName, reference: bool) -> int:
+    """Folds by push as many as the plan's seeds; draws of the random split fewer off the reference pair."""
+    return plan.seeds if reference or split == "push" else min(plan.seeds, OTHER_SEEDS)
+
+
+def gathered(fits: Sequence[tuple[Pair, Fit]], found: Mapping[tuple[Pair, Fit], Score]) -> Curves:
+    """The scores by cell; a cell of which a seed is missing is left out, lest small folds drop out of a curve's end."""
+    cells: dict[Cell, list[Score | None]] = {}
+    for pair, fit in fits:
+        cells.setdefault((pair, fit.kind, fit.split, fit.n), []).append(found.get((pair, fit)))
+    whole = {cell: [score for score in seeds if score is not None] for cell, seeds in cells.items()}
+    return Curves({cell: tuple(seeds) for cell, seeds in whole.items() if len(seeds) == len(cells[cell])})

@@ -1,0 +1,128 @@
+"""One model trained on a draw of rows and judged on rows of the same set that it has not seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from push_predictor.evaluation.push_scores import Tally, tally
+from push_predictor.evaluation.splits import Split, random_split, split_by_push
+from push_predictor.evaluation.validation import Comparison, compare
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.types import Array, BoolArray
+from push_predictor_paper.data.corpus import Corpus, Pair, PushSet
+from push_predictor_paper.plan import WINDOW
+from push_predictor_paper.work import Work
+
+SplitName = Literal["push", "random", "none"]
+SPLITS: tuple[SplitName, ...] = ("push", "random")
+SPLIT_WORDS = {
+    "push": "whole pushes left out (folds of 5)",
+    "random": "random split of windows",
+    "none": "trained on this set, judged on another",
+}
+KINDS = ("analytical", "gp", "vhgp")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Which model: kind, training windows, split, and the seed of the draw (the fold that is left out, by push).
+
+    Split `none` holds nothing back: for models that are judged on other pushes, those of the grid.
+    """
+
+    kind: str
+    n: int
+    split: SplitName
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """How a fit did on the windows that its split holds back; cpu: s to train it."""
+
+    fit: Fit
+    tally: Tally
+    cpu: float
+
+    @property
+    def nmse(self) -> Array:
+        """By output (3,)."""
+        return np.asarray(self.tally.totals().nmse[0])
+
+    @property
+    def nlpd(self) -> Array:
+        """By output (3,), moment-matched Gaussian, SI units."""
+        return np.asarray(self.tally.totals().nlpd[0])
+
+    @property
+    def exact_nlpd(self) -> Array:
+        """By output (3,), exact predictive density, SI units."""
+        return np.asarray(self.tally.totals().exact_nlpd[0])
+
+
+def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
+    """Train and judge all of these; a size beyond what a set holds for training is left out of the answer."""
+    possible = [(pair, fit) for pair, fit in fits if fit.n <= trainable(corpus.sets[pair], fit)]
+    calls = [(corpus.sets[pair], fit) for pair, fit in possible]
+    return dict(zip(possible, work.run("models", score, calls), strict=True))
+
+
+def score(pushes: PushSet, fit: Fit) -> Score:
+    """Train and judge one."""
+    comparison, cpu = compared(pushes, fit)
+    return Score(fit, tally(comparison), cpu)
+
+
+def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:
+    """The predictions for all windows that the split holds back, and the CPU time of the training, s."""
+    start = time.process_time()
+    model = trained(pushes, fit)
+    cpu = time.process_time() - start
+    return compare(model, pushes.table.take(split_of(pushes, fit).test)), cpu
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a model says of m pushes: mean, sd of an outcome, sd of the process noise alone (m, 3); in_domain (m,)."""
+
+    mean: Array
+    sd: Array
+    process_sd: Array
+    in_domain: BoolArray
+
+
+def ask(pushes: PushSet, fit: Fit, inputs: Array) -> Answer:
+    """Train a model and ask it for the pushes inputs (m, 3), each a window long."""
+    prediction = trained(pushes, fit).predict(inputs, np.full(len(inputs), WINDOW))
+    sd, process_sd = (
+        np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        for covariance in (prediction.covariance, prediction.process_covariance)
+    )
+    return Answer(prediction.mean, sd, process_sd, prediction.in_domain)
+
+
+def trained(pushes: PushSet, fit: Fit) -> PushModel:
+    """The model itself."""
+    rows = np.sort(split_of(pushes, fit).first(fit.n))
+    table = pushes.table.take(rows)
+    return train_model(table, pushes.rig, fit.kind, name=fit.kind, n_train=len(rows), seed=fit.seed)
+
+
+def split_of(pushes: PushSet, fit: Fit) -> Split:
+    """Which rows the fit learns from and which it is judged on."""
+    if fit.split == "none":
+        rows = np.random.default_rng(fit.seed).permutation(len(pushes.table))
+        return Split(rows, np.zeros(0, dtype=np.int64))
+    split = split_by_push if fit.split == "push" else random_split
+    return split(pushes.table, fit.seed)
+
+
+def trainable(pushes: PushSet, fit: Fit) -> int:
+    """How many rows its split leaves for training."""
+    return len(split_of(pushes, fit).training)

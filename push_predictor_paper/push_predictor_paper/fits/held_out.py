@@ -1,0 +1,182 @@
+"""Windows that a split by push holds back, with what every kind of model says of them, and how fast they were."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.types import Array, IntArray
+from push_predictor_paper.data.corpus import Corpus
+from push_predictor_paper.estimate import Estimate, of_draws
+from push_predictor_paper.fits.fits import KINDS, Fit, compared, split_of, trainable
+from push_predictor_paper.study import Study
+
+SAME_SPEED = 1.12  # pushes whose speeds lie closer than this ratio belong together
+WIDEST, EQUAL_GROUPS = 1.6, 6  # ratio of speeds within a group; groups of speeds without gaps
+FEWEST_PUSHES = 8  # at a speed, for an interval
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """n windows of the folds that were left out, of models with `size` training windows.
+
+    push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
+    pusher; observed (n, 3); predicted by kind (n, 3); away (n, 3): observed less the training mean.
+    """
+
+    size: int
+    push_id: np.ndarray
+    speed: Array
+    group: IntArray
+    speeds: Array
+    travel: Array
+    observed: Array
+    predicted: Mapping[str, Array]
+    away: Array
+
+    def at(self, group: int) -> HeldOut:
+        """The windows of one speed."""
+        return self.take(self.group == group)
+
+    def take(self, rows: np.ndarray) -> HeldOut:
+        """Some of the windows."""
+        return HeldOut(
+            self.size,
+            self.push_id[rows],
+            self.speed[rows],
+            self.group[rows],
+            self.speeds,
+            self.travel[rows],
+            self.observed[rows],
+            {kind: mean[rows] for kind, mean in self.predicted.items()},
+            self.away[rows],
+        )
+
+    @property
+    def pushes(self) -> int:
+        """How many pushes the windows are of."""
+        return len(np.unique(self.push_id))
+
+    def levelled(self) -> HeldOut:
+        """Outcomes and predictions about the mean outcome of their speed, in units of its sd: every speed counts."""
+        held = np.unique(self.group)
+        rows = [self.observed[self.group == k] for k in held]
+        at = np.searchsorted(held, self.group)
+        mean = np.array([r.mean(axis=0) for r in rows])[at]
+        sd = np.array([r.std(axis=0).clip(1e-30) for r in rows])[at]
+        predicted = {kind: (values - mean) / sd for kind, values in self.predicted.items()}
+        return replace(self, observed=(self.observed - mean) / sd, predicted=predicted)
+
+    @property
+    def speed_range(self) -> str:
+        """How fast these pushes were, for a reader."""
+        low, high = 1e3 * self.speed.min(), 1e3 * self.speed.max()
+        return f"{1e3 * np.median(self.speed):.0f} mm/s" if high < SAME_SPEED * low else f"{low:.0f} to {high:.0f} mm/s"
+
+    def error(self, kind: str) -> Array:
+        """Squared errors (n, 3)."""
+        return np.asarray((self.observed - self.predicted[kind]) ** 2)
+
+
+def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
+    """Train all kinds on the reference pair, fold by fold; None if no planned size is small enough for the set.
+
+    The size is the plan's, or the largest smaller one that every fold holds.
+    """
+    pushes = corpus.sets[corpus.reference]
+    folds = range(study.plan.seeds)
+    fewest = min(trainable(pushes, Fit("gp", 1, "push", fold)) for fold in folds)
+    sizes = [n for n in study.plan.sizes if n <= fewest]
+    if not sizes:
+        return None
+    fits = [Fit(kind, sizes[-1], "push", fold) for kind in KINDS for fold in folds]
+    answers = study.work.run("held-out windows", compared, [(pushes, fit) for fit in fits])
+    comparisons = [comparison for comparison, _ in answers]
+    count = len(folds)
+    rows = np.concatenate([split_of(pushes, fit).test for fit in fits[:count]])
+    table = pushes.table.take(rows)
+    speed = push_speeds(table.push_id, table.inputs[:, 0])
+    group = speed_groups(table.push_id, speed)
+    speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
+    predicted = {
+        kind: np.concatenate([c.mean for c in comparisons[k * count : (k + 1) * count]]) for k, kind in enumerate(KINDS)
+    }
+    away = np.concatenate([c.observed - c.training_mean for c in comparisons[:count]])
+    travel = table.inputs[:, 0] * table.duration
+    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted, away)
+
+
+def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
+    """The median speed (n,) of each row's push."""
+    _, push = np.unique(push_id, return_inverse=True)
+    medians = np.array([np.median(speed[push == k]) for k in range(int(push.max()) + 1)])
+    return np.asarray(medians[push])
+
+
+def speed_groups(push_id: np.ndarray, speed: Array) -> IntArray:
+    """Numbers (n,) of groups: speeds (n,) that lie closer together than SAME_SPEED share one.
+
+    Speeds without gaps between them are cut into groups of equal size.
+    """
+    order = np.argsort(speed, kind="stable")
+    steps = speed[order][1:] > SAME_SPEED * speed[order][:-1]
+    number = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
+    if any(np.ptp(np.log(speed[order][number == k])) > np.log(WIDEST) for k in range(number[-1] + 1)):
+        number = np.arange(len(speed), dtype=np.int64) * EQUAL_GROUPS // len(speed)
+    group = np.empty(len(speed), dtype=np.int64)
+    group[order] = number
+    return joined(group, push_id)
+
+
+def joined(group: IntArray, push_id: np.ndarray) -> IntArray:
+    """Groups (n,) renumbered from 0, FEWEST_PUSHES in each: small ones join the next, the last its neighbour."""
+    counts = [len(np.unique(push_id[group == k])) for k in range(int(group.max()) + 1)]
+    numbers, number, held = [], 0, 0
+    for count in counts:
+        numbers.append(number)
+        held += count
+        if held >= FEWEST_PUSHES:
+            number, held = number + 1, 0
+    return np.minimum(np.array(numbers, dtype=np.int64), max(number - 1, 0))[group]
+
+
+def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
+    """NMSE of a kind, or of the second kind less the first, over the spread of these very windows; interval by push."""
+
+    def figure(sums: list[Array]) -> Array:
+        first, second, total, squares, count = sums
+        return np.asarray(((second - first) / (squares - total**2 / count)).sum(axis=1))
+
+    errors = [windows.error(kind) for kind in kinds]
+    first, second = errors if len(errors) == 2 else (np.zeros_like(errors[0]), errors[0])
+    centred = windows.observed - windows.observed.mean(axis=0)
+    columns = [first, second, centred, centred**2, np.ones((len(centred), 1))]
+    return by_drawn_pushes(windows.push_id, columns, figure)
+
+
+def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
+    """Mean of observed less predicted as a share of the pusher's travel; interval by push.
+
+    Across (output 1) it counts towards the side to which the analytical model says the slider goes, lest left and
+    right cancel.
+    """
+    side = np.sign(windows.predicted["analytical"][:, 1]) if output == 1 else 1.0
+    residual = side * (windows.observed[:, output] - windows.predicted[kind][:, output])
+    columns = [residual[:, None], windows.travel[:, None]]
+    return by_drawn_pushes(windows.push_id, columns, lambda sums: (sums[0] / sums[1])[:, 0])
+
+
+def by_drawn_pushes(push_id: np.ndarray, columns: Sequence[Array], figure: Callable[[list[Array]], Array]) -> Estimate:
+    """A figure of sums over windows of columns (n, k), by drawing pushes anew; no interval for too few pushes."""
+    pushes, push = np.unique(push_id, return_inverse=True)
+    sums = [np.zeros((len(pushes), column.shape[1])) for column in columns]
+    for total, column in zip(sums, columns, strict=True):
+        np.add.at(total, push, column)
+    value = float(figure([total.sum(axis=0, keepdims=True) for total in sums])[0])
+    if len(pushes) < FEWEST_PUSHES:
+        return Estimate(value, np.nan, np.nan)
+    weights = push_bootstrap(pushes)
+    return of_draws(value, figure([weights @ total for total in sums]))

@@ -1,0 +1,123 @@
+"""What repetitions of a push look like: how many modes, to one Gaussian and to two, to a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import shapiro
+
+from push_predictor.evaluation.metrics import gaussian_nlpd
+from push_predictor.evaluation.unimodality import dip, holm, p_values, power, uniform_dips
+from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
+from push_predictor.models.push_model import LearnedBody
+from push_predictor.types import Array, IntArray
+from push_predictor_paper.data.corpus import PushSet
+from push_predictor_paper.fits.fits import Fit, trained
+
+RESOLUTION = 50  # draws of the uniform for each test: 2 % is the least family-wise p value
+FOLDS = 5
+ITERATIONS = 100
+NARROWEST = 0.1  # of the sample's sd: what a mode's may shrink to
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """The outcomes of p pushes at one time, by output (p, 3).
+
+    dip: p values against one mode; several: family-wise, over all pushes and outputs (Holm); normal: p values against
+    a Gaussian (Shapiro and Wilk). one, two: mean log density of held-out outcomes, nats, of one Gaussian and of two.
+    """
+
+    dip: Array
+    several: Array
+    normal: Array
+    one: Array
+    two: Array
+
+    @property
+    def own(self) -> Array:
+        """Mean log density (p, 3) of the better of the two descriptions that a push gives of itself."""
+        return np.maximum(self.one, self.two)
+
+
+def shape(outcomes: Array, sizes: IntArray) -> Shape:
+    """Test the outcomes (n, 3) of p pushes, of the first of which are the first sizes[0] >= 10, and so on."""
+    samples = np.split(outcomes, np.cumsum(sizes)[:-1])
+    draws = RESOLUTION * 3 * len(samples)
+    p = np.array([p_values(dip(s.T), len(s), draws) for s in samples])
+    normal = np.array([[shapiro(column).pvalue for column in s.T] for s in samples])
+    one, two = zip(*(held_out(s.T) for s in samples), strict=True)
+    return Shape(p, holm(p.ravel()).reshape(p.shape), normal, np.array(one), np.array(two))
+
+
+def found_at(separation: float, n: int, tests: int, level: float) -> tuple[float, float]:
+    """How often two equal modes, separation in their sd, are found in n outcomes: as one of `tests`, and by itself."""
+    null = uniform_dips(n, RESOLUTION * tests)
+    corrected, single = (float(np.quantile(null, 1.0 - p, method="higher")) for p in (level / tests, level))
+    return power(n, separation, corrected), power(n, separation, single)
+
+
+@dataclass(frozen=True, eq=False)
+class LogDensities:
+    """Log densities (v, 3) of outcomes by output, SI units: moment-matched Gaussian and exact."""
+
+    gaussian: Array
+    exact: Array
+
+
+def log_densities(pushes: PushSet, fit: Fit, inputs: Array, outcomes: Array) -> LogDensities:
+    """Train a learnt model and ask it for the densities of outcomes (v, 3) of pushes inputs (v, 3)."""
+    body = trained(pushes, fit).body
+    if not isinstance(body, LearnedBody):
+        raise TypeError(f"{fit.kind}: only learnt models have latent predictions")
+    scaled, latent = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd, body.latent(inputs)
+    gaussian, exact = (
+        np.column_stack([density(p, scaled[:, k]) for k, p in enumerate(latent)]) - np.log(body.scaling.outcome_sd)
+        for density in (gaussian_log_density, exact_log_density)
+    )
+    return LogDensities(gaussian, exact)
+
+
+def held_out(samples: Array) -> tuple[Array, Array]:
+    """Mean log density (k,) of held-out values of samples (k, r), r >= 10: of one Gaussian, of a mixture of two.
+
+    Every fifth value is held out in turn; both are fitted by maximum likelihood to the others.
+    """
+    k, r = samples.shape
+    seen = np.arange(r) % FOLDS != np.arange(FOLDS)[:, None]
+    values, weight = np.repeat(samples, FOLDS, axis=0), np.tile(seen.astype(np.float64), (k, 1))
+    mean, variance = _moments(values, weight)
+    one = -gaussian_nlpd(mean, variance, values)
+    two = _of_two(values, weight, mean, variance)
+    return _mean_held_out(one, weight, k), _mean_held_out(two, weight, k)
+
+
+def _of_two(values: Array, weight: Array, mean: Array, variance: Array) -> Array:
+    """Log density (b, r) of values under two Gaussians, fitted to the weighted ones by expectation maximisation."""
+    shares = [(values <= mean).astype(np.float64), (values > mean).astype(np.float64)]
+    logs = shares
+    for _ in range(ITERATIONS):
+        logs = [_log_component(values, weight, share, variance) for share in shares]
+        total = np.logaddexp(*logs)
+        shares = [np.exp(log - total) for log in logs]
+    return np.logaddexp(*logs)
+
+
+def _log_component(values: Array, weight: Array, share: Array, variance: Array) -> Array:
+    mean, own = _moments(values, weight * share + 1e-12 * weight)
+    part = np.sum(weight * share, axis=1, keepdims=True) / np.sum(weight, axis=1, keepdims=True)
+    density = -gaussian_nlpd(mean, np.maximum(own, NARROWEST**2 * variance), values)
+    return np.asarray(density + np.log(part + 1e-12))
+
+
+def _moments(values: Array, weight: Array) -> tuple[Array, Array]:
+    """Mean and variance (b, 1) of the rows of values (b, r)."""
+    total = np.sum(weight, axis=1, keepdims=True)
+    mean = np.sum(weight * values, axis=1, keepdims=True) / total
+    return mean, np.sum(weight * (values - mean) ** 2, axis=1, keepdims=True) / total
+
+
+def _mean_held_out(logs: Array, weight: Array, k: int) -> Array:
+    out = 1.0 - weight
+    return np.asarray((np.sum(logs * out, axis=1).reshape(k, FOLDS).sum(axis=1)) / out[:FOLDS].sum())

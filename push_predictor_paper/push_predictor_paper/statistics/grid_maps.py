@@ -1,0 +1,108 @@
+"""Arithmetic of maps over (contact, angle): maps drawn anew, and how alike two maps are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.types import Array
+from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
+from push_predictor_paper.estimate import Estimate, of_draws
+
+BLOCK = (0.2, 0.4)  # of the side, rad: pushes of one block are drawn together, neighbours being alike
+DRAWS = 400
+ROUNDING = 1e-9
+Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
+Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m): (d,)
+
+
+def told(place: Place) -> str:
+    """A push, for the reader: contact as a fraction of the side, angle in degrees."""
+    return f"c = {place[0]:.2f}, {in_degrees(place[1])}"
+
+
+def in_degrees(angle: float) -> str:
+    """An angle (rad), for the reader."""
+    return f"{np.round(np.degrees(angle)) + 0.0:.0f}°".replace("-", "−")
+
+
+def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:
+    """Means and sds (DRAWS, len(cells), 3) of pushes whose repetitions are drawn anew."""
+    rng, drawn = np.random.default_rng(seed), []
+    for cell in cells:
+        again = cell.outcomes[rng.integers(0, len(cell.outcomes), (DRAWS, len(cell.outcomes)))]
+        drawn.append((again.mean(axis=1), again.std(axis=1, ddof=1)))
+    means, sds = zip(*drawn, strict=True)
+    return np.stack(means, axis=1), np.stack(sds, axis=1)
+
+
+def on_grid(grid: RepeatedGrid, values: Array) -> Array:
+    """Values (..., len(grid.seen), 3) of the pushes seen as maps (..., A, C, 3), NaN elsewhere."""
+    enough = np.reshape([cell.enough for cell in grid.cells], (len(grid.fractions), len(grid.angles)))
+    maps = np.full((*values.shape[:-2], *enough.shape, 3), np.nan)
+    maps[..., enough, :] = values
+    return np.asarray(np.swapaxes(maps, -3, -2))
+
+
+def at_places(fractions: Array, angles: Array, maps: Array, places: Sequence[Place]) -> Array:
+    """Maps (d, A, C) between their points: (d, len(places)), NaN beside a push that was not seen."""
+    between = RegularGridInterpolator((angles, fractions), np.moveaxis(maps, 0, -1))
+    return np.asarray(between([(angle, fraction) for fraction, angle in places])).T
+
+
+def block_weights(cells: Sequence[Repetitions]) -> Array:
+    """Weights (draws, len(cells)): blocks of neighbouring pushes drawn with replacement, the whole block each time."""
+    contact = [np.floor(cell.fraction / BLOCK[0] + ROUNDING) for cell in cells]
+    angle = [np.floor(cell.angle / BLOCK[1] + ROUNDING) for cell in cells]
+    return push_bootstrap(np.array([f"{c:.0f}/{a:.0f}" for c, a in zip(contact, angle, strict=True)]))
+
+
+def by_blocks(figure: Callable[[Array], Array], weights: Array) -> Estimate:
+    """A figure of pushes, a function of weights (d, m) that answers (d,), with the interval of those weights."""
+    every = figure(np.ones((1, weights.shape[1])))
+    return of_draws(float(every[0]), figure(weights))
+
+
+def mean_of(values: Array, weights: Array) -> Array:
+    """Means (d,) of values (m,), each as often as a row of weights (d, m) says."""
+    return np.asarray(weights @ values / weights.sum(axis=1))
+
+
+def median_of(values: Array, weights: Array) -> Array:
+    """Medians (d,) of values (m,), each as often as a row of whole weights (d, m) says."""
+    order = np.argsort(values)
+    held = np.cumsum(weights[:, order], axis=1)
+    half = 0.5 * held[:, -1:]
+    return np.asarray(
+        0.5 * (values[order][(held >= half).argmax(axis=1)] + values[order][(held > half).argmax(axis=1)])
+    )
+
+
+def unbiased(value: float, draws: Array) -> Estimate:
+    """A figure of noisy maps that noise pushes one way (a maximum, a span): what draws (d,) add to it is taken off."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return Estimate(2.0 * value - float(draws.mean()), 2.0 * value - float(high), 2.0 * value - float(low))
+
+
+def correlation(one: Array, other: Array, weights: Array) -> Array:
+    """Pearson's coefficient (d,) of two maps (m,) for every row of weights (d, m), NaN where one of them is flat."""
+    total = weights.sum(axis=1)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(weights @ values / total)
+
+    a, b = one - one.mean(), other - other.mean()
+    covariance = mean(a * b) - mean(a) * mean(b)
+    spread = np.sqrt(np.maximum((mean(a**2) - mean(a) ** 2) * (mean(b**2) - mean(b) ** 2), 0.0))
+    flat = spread <= ROUNDING * np.abs(one).max() * np.abs(other).max()
+    return np.asarray(np.where(flat, np.nan, covariance / np.where(flat, 1.0, spread)))
+
+
+def relative_error(model: Array, truth: Array, weights: Array) -> Array:
+    """Squared distance of two maps (m,) over the squared deviation of the true one from its mean, (d,)."""
+    total, away = weights.sum(axis=1), truth - truth.mean()
+    spread = weights @ away**2 - (weights @ away) ** 2 / total
+    return np.asarray(weights @ (model - truth) ** 2 / spread)

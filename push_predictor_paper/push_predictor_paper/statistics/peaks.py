@@ -1,0 +1,62 @@
+"""Where a map over contact and angle is largest, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.types import Array
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.statistics.grid_maps import ROUNDING, Place, at_places
+
+SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest value of a map and its place; places: where it falls in 95 % of the draws.
+
+    reach: the value at the named places (mean over them, between the map's points) over the largest.
+    """
+
+    value: Estimate
+    place: Place
+    places: tuple[Place, ...]
+    reach: Estimate
+
+    def near(self, named: Sequence[Place], step: Place) -> list[bool]:
+        """Of each place of those draws whether it lies within one step (of the side, rad) of a named one."""
+        return [
+            any(
+                abs(c - contact) <= step[0] + ROUNDING and abs(a - angle) <= step[1] + ROUNDING
+                for contact, angle in named
+            )
+            for c, a in self.places
+        ]
+
+
+def peak(
+    fractions: Array,
+    angles: Array,
+    shown: Array,
+    drawn: Array,
+    named: Sequence[Place],
+    interval: Callable[[float, Array], Estimate],
+) -> Peak:
+    """Of the map shown (A, C) and its draws (d, A, C), NaN where nothing is known; named: places of interest."""
+    maps = np.concatenate([shown[None], drawn])
+    flat = np.where(np.isfinite(maps), maps, -np.inf).reshape(len(maps), -1)
+    top, where = flat.max(axis=1), flat.argmax(axis=1)
+    reach = at_places(fractions, angles, maps, named).mean(axis=1) / top
+    cells = [(float(fractions[i % len(fractions)]), float(angles[i // len(fractions)])) for i in where]
+    return Peak(interval(float(top[0]), top[1:]), cells[0], _commonest(cells[1:]), interval(float(reach[0]), reach[1:]))
+
+
+def _commonest(places: Sequence[Place]) -> tuple[Place, ...]:
+    """As few places as hold 95 % of all, the commonest first."""
+    counts = {place: places.count(place) for place in dict.fromkeys(places)}
+    ordered = sorted(counts, key=lambda place: -counts[place])
+    held = np.cumsum([counts[place] for place in ordered])
+    return tuple(ordered[: int(np.searchsorted(held, SURE * len(places) - ROUNDING)) + 1])

@@ -1,0 +1,429 @@
+"""The command line: every sub-command on a small simulated recording, its JSON, its errors, its exit status."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ros_harness import REPOSITORY
+
+from push_predictor import __version__
+from push_predictor.cli import COMMANDS, main
+from push_predictor.evaluation.offline import validate_recording
+from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.models.store.model_file import load_model
+from push_predictor.recordings.load import load_data
+from push_predictor.recordings.rig import load_rig
+from push_predictor.recordings.table_file import read_table, write_table
+
+OUTPUTS = ["dx", "dy", "dtheta"]
+METRICS = ["model", "n_train", "n_test", "n_pushes", "nmse", "nlpd", "exact_nlpd", "joint_nlpd", "coverage"]
+PUSH = ["--velocity", "0.02", "--contact", "0.1", "--angle", "0.3"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder with two recordings, models of the first, a table, and what the commands printed."""
+
+    folder: Path
+    printed: dict[str, str]
+
+    def path(self, name: str) -> str:
+        return str(self.folder / name)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.out)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    """simulate -> train, as a user would."""
+    folder = tmp_path_factory.mktemp("cli")
+    simulate = ["simulate", "--shape", "rect1", "--surface", "abs", "--speed", "0.02", "0.05"]
+    calls = {
+        "train recording": [*simulate, "--pushes", "6", "--seed", "1", "--out", str(folder / "train")],
+        "test recording": [
+            *simulate,
+            "--pushes",
+            "4",
+            "--seed",
+            "2",
+            "--out",
+            str(folder / "test.mcap"),
+            "--json",
+            "-",
+        ],
+        "other slider": [*simulate[:2], "ellip1", *simulate[3:], "--pushes", "2", "--out", str(folder / "round")],
+        "gp": ["train", str(folder / "train"), "--model", "gp", "--out", str(folder / "gp.pushmodel")],
+        "vhgp": ["train", str(folder / "train"), "--model", "vhgp", "--n-train", "15", "--name", "hetero"]
+        + ["--out", str(folder / "vhgp.pushmodel"), "--json", "-"],
+        "analytical": ["train", str(folder / "train"), "--model", "analytical", "--fit"]
+        + ["--out", str(folder / "analytical.pushmodel"), "--json", str(folder / "train.json")],
+    }
+    printed = {}
+    for name, call in calls.items():
+        done = subprocess.run([sys.executable, "-m", "push_predictor.cli", *call], cwd=REPOSITORY, capture_output=True)
+        assert done.returncode == 0, done.stderr.decode()
+        printed[name] = done.stdout.decode()
+    write_table(folder / "test.csv", load_data([folder / "test.mcap"]))
+    rig = yaml.safe_dump(load_model(folder / "gp.pushmodel").rig.to_record())
+    (folder / "test.rig.yaml").write_text(rig)
+    return Place(folder, printed)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Any:
+    def call(*arguments: str) -> Outcome:
+        capsys.readouterr()
+        try:
+            status = main(arguments)
+        except SystemExit as end:  # argparse
+            status = int(end.code or 0)
+        printed = capsys.readouterr()
+        return Outcome(status, printed.out, printed.err)
+
+    return call
+
+
+def assert_one_line(outcome: Outcome, command: str, words: Sequence[str]) -> None:
+    """Exit status 1, and one line on stderr that names what is wrong."""
+    assert outcome.status == 1 and outcome.out == ""
+    lines = without_progress(outcome.err)
+    assert len(lines) == 1 and lines[0].startswith(f"push_predictor {command}: "), outcome.err
+    for word in words:
+        assert word in lines[0], f"{word!r} is not in {lines[0]!r}"
+
+
+# --- help and wrong calls --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example_and_json(command: str, run):
+    shown = run(command, "--help")
+    assert shown.status == 0 and shown.err == ""
+    assert f"example:\n  push_predictor {command} " in shown.out
+    assert "--json FILE|-" in shown.out
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        [],
+        ["bogus"],
+        ["train"],
+        ["train", "data", "--model", "forest", "--out", "m"],
+        ["predict", "m", "--velocity", "fast", "--contact", "0", "--angle", "0"],
+        ["import", "martian", "x", "--out", "y"],
+        ["evaluate", "m"],
+        ["report", "poem", "--out", "y"],
+        ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "many", "--speed", "0.02", "--out", "x"],
+        ["info", "x", "--wrong"],
+    ],
+)
+def test_a_wrong_call_exits_with_2_and_shows_how_it_is_called(call: list[str], run):
+    outcome = run(*call)
+    assert outcome.status == 2 and outcome.out == ""
+    assert outcome.err.startswith("usage: push_predictor")
+
+
+def test_version_and_the_list_of_commands(run):
+    assert run("--version").out == f"push_predictor {__version__}\n"
+    shown = run("--help").out
+    assert all(f"    {command} " in shown for command in COMMANDS)
+
+
+def test_help_needs_neither_ros_nor_scipy():
+    """So it is there at once."""
+    code = (
+        "import sys; from push_predictor.cli import build_parser; build_parser().format_help(); "
+        "sys.exit(' '.join(name for name in ('rclpy', 'scipy', 'matplotlib') if name in sys.modules) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+
+
+# --- simulate, train -------------------------------------------------------------------------------------------------
+
+
+def test_simulate_says_what_it_made(place: Place, run):
+    assert place.printed["train recording"].startswith(f"{place.path('train')}: 6 pushes, ")
+    made = json.loads(place.printed["test recording"])
+    assert made["recording"] == place.path("test.mcap") and made["pushes"] == 4 and made["seconds"] > 1.0
+
+
+def test_the_same_seed_makes_the_same_recording(place: Place, run):
+    call = ["simulate", "--shape", "rect1", "--surface", "abs", "--speed", "0.02", "0.05", "--pushes", "4"]
+    for seed, same in (("2", True), ("3", False)):
+        again = place.path(f"again{seed}/test.mcap")
+        assert run(*call, "--seed", seed, "--out", again).status == 0
+        assert (Path(again).read_bytes() == Path(place.path("test.mcap")).read_bytes()) is same
+
+
+def test_train_says_what_it_learned_from(place: Place):
+    assert "gp, " in place.printed["gp"] and " 6 pushes" in place.printed["gp"]
+    learned = json.loads(place.printed["vhgp"])
+    assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
+    assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
+    assert json.loads(Path(place.path("train.json")).read_text())["kind"] == "analytical"
+    assert load_model(Path(place.path("gp.pushmodel"))).name == "gp"
+
+
+def test_a_shorter_stride_gives_more_windows_to_train_on(place: Place, run):
+    out = place.path("dense.pushmodel")
+    call = ["train", place.path("train"), "--model", "analytical", "--out", out, "--json", "-"]
+    assert run(*call, "--stride", "0.05").json["n_rows"] > 2 * run(*call).json["n_rows"]
+
+
+# --- predict ---------------------------------------------------------------------------------------------------------
+
+
+def test_predict_is_the_model(place: Place, run):
+    model = load_model(Path(place.path("gp.pushmodel")))
+    expected = model.predict(np.array([[0.02, 0.1, 0.3]]), np.array([0.2]))
+    found = run("predict", place.path("gp.pushmodel"), *PUSH, "--json", "-").json
+    assert found["model"] == "gp" and found["in_domain"] is bool(expected.in_domain[0])
+    sd = np.sqrt(np.diag(expected.covariance[0]))
+    assert np.all(np.abs(np.array(found["mean"]) - expected.mean[0]) < 1e-3 * sd)
+    assert np.reshape(found["covariance"], (3, 3)) == pytest.approx(expected.covariance[0], rel=1e-2, abs=1e-12)
+    assert len(found["process_covariance"]) == 9
+
+
+def test_predict_in_words_has_a_line_for_each_output(place: Place, run):
+    lines = run("predict", place.path("gp.pushmodel"), *PUSH, "--covariate", "dwell_time=3").out.splitlines()
+    assert [line.split()[0] for line in lines[:3]] == OUTPUTS
+    assert "training data" in lines[3]
+
+
+# --- evaluate, validate ----------------------------------------------------------------------------------------------
+
+
+def assert_contract(metrics: dict[str, Any]) -> None:
+    """The keys of the contract, and numbers in them."""
+    assert set(METRICS) <= metrics.keys()
+    for key in ("nmse", "nlpd"):
+        assert list(metrics[key]) == [*OUTPUTS, "total"]
+        assert metrics[key]["total"] == pytest.approx(sum(metrics[key][name] for name in OUTPUTS))
+    assert list(metrics["coverage"]) == ["0.5", "0.9", "0.95"]
+    for shares in metrics["coverage"].values():
+        assert list(shares) == OUTPUTS and all(0.0 <= share <= 1.0 for share in shares.values())
+    assert isinstance(metrics["joint_nlpd"], float)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp", "analytical"])
+def test_evaluate_and_validate_give_the_metrics_of_the_library(kind: str, place: Place, run):
+    model, recording = place.path(f"{kind}.pushmodel"), place.path("test.mcap")
+    evaluated, validated = (
+        run("evaluate", model, recording, "--json", "-"),
+        run("validate", model, recording, "--json", "-"),
+    )
+    assert evaluated.status == validated.status == 0 and without_progress(evaluated.err, validated.err) == []
+    loaded = load_model(Path(model))
+    assert evaluated.json == json.loads(json.dumps(metrics_json(compare(loaded, load_data([Path(recording)])))))
+    _, comparison = validate_recording(loaded, Path(recording))
+    told = validated.json
+    assert told.pop("alarm")["fired"] is False
+    assert told == json.loads(json.dumps(metrics_json(comparison)))
+    for metrics in (evaluated.json, told):
+        assert_contract(metrics)
+        assert (metrics["n_pushes"], metrics["n_train"]) == (4, len(loaded.training))
+    assert (validated.json["exact_nlpd"] is None) is (kind != "vhgp")
+
+
+def test_a_table_is_as_good_as_the_recording_it_was_made_from(place: Place, run):
+    model = place.path("gp.pushmodel")
+    first, second = (run("evaluate", model, place.path(data), "--json", "-").json for data in ("test.mcap", "test.csv"))
+    assert first == second
+
+
+def test_evaluate_warns_about_pushes_that_were_trained_on(place: Place, run):
+    model = place.path("gp.pushmodel")
+    outcome = run("evaluate", model, place.path("train"), place.path("test.csv"), "--json", "-")
+    assert outcome.status == 0 and outcome.json["n_pushes"] == 10
+    assert without_progress(outcome.err)[0].startswith("warning: 6 of 10 pushes were trained on (push-")
+    told = without_progress(run("validate", model, place.path("train")).err)
+    assert told[0].startswith("warning: 6 of 6 pushes were trained on")
+
+
+def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
+    outcome = run("validate", place.path("analytical.pushmodel"), place.path("round"), "--json", "-")
+    assert_contract(outcome.json)
+    told = without_progress(outcome.err)[0]
+    assert told.startswith("warning: ") and "'rect1'" in told and "'ellip1'" in told
+
+
+def test_metrics_in_words_hold_the_numbers_of_the_json(place: Place, run):
+    call = ["validate", place.path("vhgp.pushmodel"), place.path("test.mcap")]
+    metrics, words = run(*call, "--json", "-").json, run(*call).out
+    assert words.startswith(f"hetero: {metrics['n_test']} windows of 4 pushes, trained on 15 windows")
+    (total,) = (line.split() for line in words.splitlines() if line.startswith("total"))
+    assert total[1:4] == [f"{metrics[key]['total']:.3f}" for key in ("nmse", "nlpd", "exact_nlpd")]
+
+
+def test_json_may_go_to_a_file_and_the_words_to_the_screen(place: Place, run, tmp_path: Path):
+    file, log = tmp_path / "new" / "metrics.json", tmp_path / "windows.json"
+    call = ["validate", place.path("gp.pushmodel"), place.path("test.mcap")]
+    outcome = run(*call, "--json", str(file), "--windows", str(log))
+    assert outcome.out.startswith("gp: ")
+    assert json.loads(file.read_text()) == run(*call, "--json", "-").json
+    windows = json.loads(log.read_text())["windows"]
+    assert len(windows) == json.loads(file.read_text())["n_test"]
+    assert {"push_id", "window", "predicted", "observed"} <= windows[0].keys()
+
+
+# --- info, import, report --------------------------------------------------------------------------------------------
+
+
+def test_info_tells_recording_table_and_model(place: Place, run):
+    recording = run("info", place.path("test.mcap"), "--json", "-").json
+    assert recording["pushes"] == 4 and recording["windows"] == len(load_data([Path(place.path("test.mcap"))]))
+    assert set(recording["streams"]) >= {"slider", "pusher", "wrench"}
+    assert run("info", place.path("test.csv"), "--json", "-").json["rows"] == recording["windows"]
+    model = run("info", place.path("vhgp.pushmodel"), "--json", "-").json
+    assert (model["model"], model["kind"], model["windows"], model["shape"]) == ("hetero", "vhgp", 15, "rect1")
+    for name in ("test.mcap", "test.csv", "vhgp.pushmodel"):
+        assert run("info", place.path(name)).out.count("\n") > 5
+
+
+def test_info_tells_that_a_recording_is_damaged(place: Place, run, tmp_path: Path):
+    whole = Path(place.path("test.mcap")).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    found = run("info", str(tmp_path / "cut.mcap"), "--json", "-")
+    if found.status == 0:  # what lies before the cut can be read
+        assert found.json["notes"]
+    else:
+        assert_one_line(found, "info", ["cut.mcap"])
+
+
+def test_import_writes_a_table_and_its_rig_which_train_reads(run, tmp_path: Path):
+    rng = np.random.default_rng(0)
+    names = ["c", "beta", "dx", "dy", "dtheta"]
+    source = tmp_path / "pushes_40.npz"
+    columns = {name: rng.uniform(0.1, 0.9, 40) * (0.004 if name in ("dx", "dy") else 1.0) for name in names}
+    np.savez(source, **columns, push_group_est=np.repeat(np.arange(8), 5), row_id=np.arange(40))
+    out = tmp_path / "imported"
+    report = run("import", "mit-square", str(source), "--out", str(out), "--json", "-")
+    assert report.status == 0 and report.json, report.err
+    table = read_table(out / "pushes_40.csv")
+    assert np.allclose(table.inputs[:, 1], columns["c"] / 4) and np.allclose(table.outcomes[:, 1], -columns["dy"])
+    assert load_rig(out / "pushes_40.rig.yaml").shape == "rect1"
+    model = str(tmp_path / "m.pushmodel")
+    assert run("train", str(out / "pushes_40.csv"), "--model", "gp", "--out", model).status == 0
+    assert_one_line(run("import", "mit-square", str(source), "--out", str(out)), "import", ["pushes_40.csv exists"])
+    assert "assumed" in run("import", "mit-square", str(source), "--out", str(tmp_path / "other")).out
+
+
+def test_report_writes_a_page_with_pictures_and_the_metrics(place: Place, run, tmp_path: Path):
+    models = [place.path("vhgp.pushmodel"), place.path("analytical.pushmodel")]
+    call = ["report", "validation", "--model", *models, "--recording", place.path("test.mcap"), "--out", str(tmp_path)]
+    found = run(*call, "--json", "-").json
+    assert Path(found["report"]).read_text().startswith("<!")
+    assert [metrics["model"] for metrics in found["models"]] == ["hetero", "analytical"]
+    assert json.loads((tmp_path / "validation.json").read_text()) == found["models"]
+    for metrics in found["models"]:
+        assert_contract(metrics)
+
+
+# --- what goes wrong -------------------------------------------------------------------------------------------------
+
+SIMULATE = ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.02", "--out", "{tmp}/x"]
+TRAIN = ["train", "{train}", "--model", "gp", "--out", "{tmp}/m"]
+
+
+def changed(call: list[str], option: str, value: str) -> list[str]:
+    return [*call[: call.index(option) + 1], value, *call[call.index(option) + 2 :]]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (changed(SIMULATE, "--shape", "blob"), ["shape", "'blob'", "rect1"]),
+        (changed(SIMULATE, "--surface", "ice"), ["surface", "'ice'", "plywood"]),
+        (changed(SIMULATE, "--pushes", "0"), ["--pushes", "0"]),
+        (changed(SIMULATE, "--speed", "-1"), ["speed", "-1"]),
+        ([*SIMULATE, "--travel", "nan"], ["travel", "nan"]),
+        ([*SIMULATE, "--seed", "-1"], ["--seed", "-1"]),
+        (changed(SIMULATE, "--out", "{file}/x"), ["{file}"]),
+        (changed(TRAIN, "train", "{tmp}/absent"), ["{tmp}/absent", "no such file"]),
+        (changed(TRAIN, "train", "{gp}"), ["{gp}", "push table"]),
+        (changed(TRAIN, "train", "{junk}.csv"), ["junk.csv"]),
+        ([*TRAIN, "--n-train", "100000"], ["n_train", "100000"]),
+        ([*TRAIN, "--n-train", "3"], ["3", "at least 10"]),
+        ([*TRAIN, "--seed", "-1"], ["--seed", "-1"]),
+        ([*TRAIN, "--stride", "-0.1"], ["--stride", "-0.1"]),
+        ([*TRAIN, "--stride", "nan"], ["--stride", "nan"]),
+        ([*TRAIN, "--rig", "{tmp}/absent.yaml"], ["absent.yaml"]),
+        (changed(TRAIN, "--out", "{tmp}"), ["{tmp}"]),
+        (["predict", "{tmp}/absent", *PUSH], ["{tmp}/absent", "cannot be read"]),
+        (["predict", "{junk}.csv", *PUSH], ["junk.csv", "not a model file"]),
+        (["predict", "{gp}", *changed(PUSH, "--velocity", "nan")], ["velocity", "nan"]),
+        (["predict", "{gp}", *changed(PUSH, "--contact", "1.5")], ["contact", "1.5", "[0, 1)"]),
+        (["predict", "{gp}", *changed(PUSH, "--angle", "1.6")], ["angle", "1.6"]),
+        (["predict", "{gp}", *PUSH, "--duration", "3"], ["duration", "3"]),
+        (["predict", "{gp}", *PUSH, "--covariate", "humid"], ["--covariate", "'humid'", "NAME=VALUE"]),
+        (["predict", "{gp}", *PUSH, "--covariate", "=3"], ["--covariate", "'=3'", "NAME=VALUE"]),
+        (["predict", "{gp}", *PUSH, "--json", "{tmp}"], ["{tmp}"]),
+        (["evaluate", "{gp}", "{tmp}/absent.csv"], ["absent.csv", "no such file"]),
+        (["evaluate", "{gp}", "{junk}.csv"], ["junk.csv"]),
+        (["evaluate", "{train}", "{train}"], ["{train}"]),
+        (["validate", "{gp}", "{junk}.mcap"], ["junk.mcap", "not an MCAP file"]),
+        (["validate", "{gp}", "{gp}"], ["{gp}"]),
+        (["validate", "{gp}", "{test}", "--windows", "{tmp}"], ["{tmp}"]),
+        (["report", "validation", "--model", "{gp}", "--out", "{tmp}/r"], ["--recording", "both"]),
+        (["report", "validation", "--recording", "{test}", "--out", "{tmp}/r"], ["--model", "both"]),
+        (["info", "{tmp}/absent"], ["{tmp}/absent"]),
+        (["info", "{tmp}"], ["{tmp}", ".mcap"]),
+        (["info", "{junk}.csv"], ["junk.csv"]),
+        (["import", "mit-square", "{tmp}/absent.npz", "--out", "{tmp}/o"], ["absent.npz"]),
+        (["import", "mit", "{junk}.mcap", "--out", "{tmp}/o"], ["junk.mcap"]),
+        (["import", "mlab", "{tmp}/absent.txt", "--out", "{tmp}/o"], ["absent.txt"]),
+        (["import", "mcube", "{tmp}/absent", "--out", "{tmp}/o"], ["absent"]),
+        (["import", "rosbag1", "{junk}.mcap", "--out", "{tmp}/o"], ["junk.mcap"]),
+    ],
+)
+def test_what_fails_is_said_in_one_line_that_names_the_file_or_field(
+    call: list[str], words: list[str], place: Place, run, tmp_path: Path
+):
+    for ending in ("csv", "mcap"):
+        (tmp_path / f"junk.{ending}").write_bytes(b"\x00\x01 neither this nor that \xff\n" * 5)
+    (tmp_path / "file").write_text("")
+    names = {
+        "tmp": str(tmp_path / "tmp"),
+        "file": str(tmp_path / "file"),
+        "junk": str(tmp_path / "junk"),
+        "train": place.path("train"),
+        "test": place.path("test.mcap"),
+        "gp": place.path("gp.pushmodel"),
+    }
+    (tmp_path / "tmp").mkdir()
+    filled = [word.format(**names) for word in call]
+    assert_one_line(run(*filled), call[0], [word.format(**names) for word in words])
+    left = [path.name for path in (tmp_path / "tmp").rglob("*") if path.name.startswith(".")]
+    assert not left, "nothing half done stays behind"
+
+
+def without_progress(*texts: str) -> list[str]:
+    """The lines on stderr but those that say that work goes on, which come on a slow machine."""
+    return [line for text in texts for line in text.splitlines() if not re.fullmatch(r"[\w -]+: \d+ s", line)]
+
+
+def test_a_reader_that_goes_away_is_no_error(place: Place):
+    command = f"'{sys.executable}' -m push_predictor.cli info '{place.path('train')}' | head -c 1"
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=REPOSITORY, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")

@@ -1,0 +1,212 @@
+"""The alarm that may be read after every push: how often it is false, how soon it is true."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from synthetic import square_rig
+
+from push_predictor.errors import RequestError
+from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_json, with_alarm
+from push_predictor.evaluation.alarm.scores import PushJudge, calibrate, held_out, judged
+from push_predictor.evaluation.metrics import standardised
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+SIZE, SHIFT = ScoreKind("size", 0.5, False), ScoreKind("shift", 0.5, True)
+KINDS = (SIZE, SHIFT)
+
+
+def scores(n: int, seed: int, shift: float = 0.0) -> Array:
+    """Two scores of n pushes that depend on each other; heavy tails."""
+    z = np.random.default_rng(seed).standard_t(4.0, n) + shift
+    return np.column_stack([z**2, z])
+
+
+def fired_after(alarm: Alarm, pushes: Array) -> int | None:
+    for k, row in enumerate(pushes):
+        if alarm.add(f"push-{k}", row):
+            return k + 1
+    return None
+
+
+# --- the bets --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("rate", "calibration"), [(0.1, 5), (0.1, 60)])
+def test_without_a_change_the_share_that_ever_fires_is_at_most_the_rate(rate: float, calibration: int):
+    """With few calibration pushes just as with many; the union over two scores that depend leaves room."""
+    runs, pushes = 1000, 60
+    fired = sum(
+        fired_after(Alarm(KINDS, all_scores[:calibration], rate, seed), all_scores[calibration:]) is not None
+        for seed in range(runs)
+        for all_scores in [scores(calibration + pushes, seed)]
+    )
+    assert 0 < fired <= binom.ppf(0.999, runs, rate)
+
+
+def test_the_larger_the_change_the_sooner_it_is_told():
+    delays = []
+    for shift in (1.0, 2.0, 4.0):
+        found = []
+        for seed in range(10):
+            pushes = np.concatenate([scores(30, 1000 + seed), scores(150, 2000 + seed, shift)])
+            found.append(fired_after(Alarm(KINDS, scores(150, seed), 0.01), pushes))
+        assert all(after is not None and after > 30 for after in found), (shift, found)
+        delays.append(np.median([after - 30 for after in found if after is not None]))
+    assert delays[0] > delays[1] > delays[2] and delays[0] < 80 and delays[2] <= 10, delays
+
+
+def test_a_shift_is_felt_to_either_side():
+    for shift in (-2.0, 2.0):
+        alarm = Alarm((ScoreKind("shift", 1.0, True),), scores(150, 0)[:, 1:], 0.01)
+        assert fired_after(alarm, scores(100, 1, shift)[:, 1:]) is not None
+
+
+def test_residuals_that_are_smaller_than_before_are_no_reason_for_an_alarm():
+    alarm = Alarm((ScoreKind("size", 1.0, False),), scores(150, 0)[:, :1], 0.01)
+    assert fired_after(alarm, scores(200, 1)[:, :1] * 0.05) is None
+
+
+def test_the_order_of_the_calibration_does_not_matter():
+    calibration, pushes = scores(80, 0), scores(120, 1, 1.5)
+    alarms = [Alarm(KINDS, calibration[order], 0.01) for order in (np.arange(80), np.arange(80)[::-1])]
+    states = [(fired_after(alarm, pushes), alarm.state) for alarm in alarms]
+    assert states[0] == states[1]
+
+
+def test_equal_scores_are_ranked_by_lot_and_give_no_evidence():
+    fired = [fired_after(Alarm(KINDS, np.zeros((30, 2)), 0.05, seed), np.zeros((100, 2))) for seed in range(100)]
+    assert sum(after is not None for after in fired) <= binom.ppf(0.999, 100, 0.05)
+    assert len({Alarm(KINDS, np.zeros((30, 2)), 0.05, 7).add("a", np.zeros(2)) for _ in range(3)}) == 1
+
+
+def test_it_fires_once_and_again_only_after_a_reset():
+    alarm, pushes = Alarm(KINDS, scores(100, 0), 0.01), scores(60, 1, 4.0)
+    first = fired_after(alarm, pushes)
+    state = alarm.state
+    assert first is not None and (state.fired_at, state.fired_after) == (f"push-{first - 1}", first)
+    assert state.fired_evidence is not None and state.fired_evidence >= state.threshold == 2.0
+    assert fired_after(alarm, pushes) is None and alarm.state.fired_at == state.fired_at
+    alarm.reset()
+    assert not alarm.state.fired and alarm.state.pushes == 0
+    assert fired_after(alarm, pushes) == first
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_score_that_is_no_number_is_refused_by_name(wrong: float):
+    with pytest.raises(RequestError, match=r"score shift: .* finite"):
+        Alarm(KINDS, scores(10, 0), 0.01).add("push", np.array([1.0, wrong]))
+    with pytest.raises(RequestError, match="score size"):
+        Alarm(KINDS, np.array([[wrong, 0.0]]), 0.01)
+
+
+@pytest.mark.parametrize("rate", [0.0, 1.0, -0.1, np.nan])
+def test_a_rate_that_is_no_probability_is_refused(rate: float):
+    with pytest.raises(RequestError, match="false_alarm_rate"):
+        Alarm(KINDS, scores(10, 0), rate)
+
+
+def test_the_json_keeps_what_was_there_and_tells_of_the_alarm():
+    alarm = Alarm(KINDS, scores(100, 0), 0.01)
+    quiet = json.loads(with_alarm('{"model": "m"}', alarm_json(alarm.state)))
+    assert quiet["model"] == "m" and quiet["alarm"]["fired"] is False and quiet["alarm"]["push_id"] is None
+    after = fired_after(alarm, scores(60, 1, 4.0))
+    told = alarm_json(alarm.state)
+    assert (told["fired"], told["pushes"], told["push_id"]) == (True, after, f"push-{(after or 0) - 1}")
+    assert alarm_json(None, "too few pushes") == {"fired": False, "off": "too few pushes"}
+
+
+# --- pushes and models -----------------------------------------------------------------------------------------------
+
+NOISE = np.array([2e-4, 2e-4, 4e-3])
+
+
+def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> PushTable:
+    """Pushes of a slider that is what the analytical model says, with noise that windows of one push share in part."""
+    rng, rig, n = np.random.default_rng(seed), square_rig(), pushes * windows
+    inputs = np.column_stack([np.full(n, 0.05), rng.random(n), rng.uniform(-1.1, 1.1, n)])
+    duration = np.full(n, 0.2)
+    push_id = np.array([f"{seed}-{k // windows:04d}" for k in range(n)])
+    noise = 0.8 * rng.standard_normal((n, 3)) + np.repeat(0.6 * rng.standard_normal((pushes, 3)), windows, axis=0)
+    physics = AnalyticalPush(rig.outline, rig.pusher_radius, contact_friction=friction)
+    outcomes = physics.displacement(inputs, duration) + NOISE * noise
+    return PushTable(inputs, duration, outcomes, push_id, {"slider_heading": rng.uniform(-3.0, 3.0, n)})
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, PushModel]:
+    table = made_up(80, 0)
+    return {kind: train_model(table, square_rig(), kind, name=kind) for kind in ("analytical", "gp")}
+
+
+def alarm_of(model: PushModel, table: PushTable):
+    prediction = model.predict(table.inputs, table.duration, table.covariates)
+    return judged(calibrate(model), table, prediction.mean, prediction.covariance)
+
+
+@pytest.mark.parametrize("kind", ["analytical", "gp"])
+def test_pushes_like_those_trained_on_give_no_alarm_and_a_change_does(kind: str, models: dict[str, PushModel]):
+    assert not alarm_of(models[kind], made_up(120, 1)).fired
+    state = alarm_of(models[kind], made_up(120, 2, friction=0.6))
+    assert state.fired and state.fired_after is not None and state.fired_after < 60
+    assert state.fired_by in ("contact_friction: change of the contact friction", "size of the residual")
+
+
+def test_pushes_of_more_or_fewer_windows_than_those_trained_on_are_judged_alike(models: dict[str, PushModel]):
+    for windows in (1, 6):
+        assert not alarm_of(models["analytical"], made_up(100, 3, windows=windows)).fired
+
+
+def test_training_pushes_are_judged_as_if_they_had_not_been_seen(models: dict[str, PushModel]):
+    training, new = models["gp"].training, made_up(200, 4)
+    prediction = models["gp"].predict(new.inputs, new.duration)
+    fresh = standardised(prediction.mean, prediction.covariance, new.outcomes).std(axis=0)
+    assert standardised(*held_out(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(fresh, rel=0.15)
+
+
+def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushModel]):
+    """Fast pushes among them, whose integration takes its steps from the longest."""
+    model, table = models["analytical"], made_up(6, 5, friction=0.45)
+    velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
+    table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
+    prediction, calibration = model.predict(table.inputs, table.duration), calibrate(model)
+    judge = PushJudge(calibration)
+    for push in table.pushes:
+        rows = table.push_id == push
+        judge.add(table.take(rows), prediction.mean[rows], prediction.covariance[rows])
+    whole = judged(calibration, table, prediction.mean, prediction.covariance)
+    assert judge.state.log10_evidence == pytest.approx(whole.log10_evidence, abs=1e-9)
+    assert judge.state.fired_at == whole.fired_at
+
+
+def test_a_push_that_is_played_again_is_no_news(models: dict[str, PushModel]):
+    model, table = models["analytical"], made_up(10, 6)
+    judge, prediction = PushJudge(calibrate(model)), model.predict(table.inputs, table.duration)
+    for _ in range(3):
+        judge.add(table, prediction.mean, prediction.covariance)
+    assert judge.state.pushes == 10
+
+
+def test_a_push_without_a_covariate_is_left_out_and_named(models: dict[str, PushModel]):
+    model, table = models["analytical"], made_up(10, 7)
+    heading = table.covariates["slider_heading"].copy()
+    heading[4] = np.nan
+    judge, prediction = PushJudge(calibrate(model)), model.predict(table.inputs, table.duration)
+    judge.add(replace(table, covariates={"slider_heading": heading}), prediction.mean, prediction.covariance)
+    assert judge.state.pushes == 9
+    (reason,) = judge.left_out
+    assert "push 7-0001" in reason and "finite" in reason
+
+
+def test_a_model_of_too_few_pushes_has_no_alarm():
+    model = train_model(made_up(9, 0), square_rig(), "analytical", name="few")
+    with pytest.raises(RequestError, match=r"training pushes of the model: 9 .* at least 10"):
+        calibrate(model)

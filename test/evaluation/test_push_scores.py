@@ -1,0 +1,96 @@
+"""Sums by push: they pool over folds, resample by whole pushes, and come to the figures that the rows come to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_predictor.evaluation.metrics import COVERAGE_LEVELS
+from push_predictor.evaluation.push_scores import pooled, tally
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.validation import Comparison, metrics_json
+from push_predictor.recordings.table import OUTPUTS
+
+SIZES = (1, 4, 2, 7, 3, 5)
+SCALE = np.array([1e-3, 1e-3, 0.05])
+
+
+def comparison(sizes: tuple[int, ...] = SIZES, exact: bool = True, seed: int = 0) -> Comparison:
+    """Predictions of n windows that are wrong by about their sd; pushes in no order of their names."""
+    rng = np.random.default_rng(seed)
+    push_id = np.repeat([f"push-{9 - k}" for k in range(len(sizes))], sizes)
+    n = len(push_id)
+    mean, observed = SCALE * rng.standard_normal((n, 3)), SCALE * rng.standard_normal((n, 3))
+    covariance = np.array([np.diag(SCALE * rng.uniform(0.5, 2.0, 3)) ** 2 for _ in range(n)])
+    density = rng.standard_normal((n, 3)) if exact else None
+    return Comparison("made up", 10, push_id, mean, covariance, observed, density, np.zeros(3))
+
+
+def rows_of(c: Comparison, rows: np.ndarray) -> Comparison:
+    fields = {name: getattr(c, name)[rows] for name in ("push_id", "mean", "covariance", "observed")}
+    return replace(c, **fields, exact_log_density=None if c.exact_log_density is None else c.exact_log_density[rows])
+
+
+def test_the_totals_of_a_tally_are_those_of_the_json() -> None:
+    c = comparison()
+    totals, told = tally(c).totals(), metrics_json(c)
+    for name in ("nmse", "nlpd", "exact_nlpd"):
+        assert getattr(totals, name)[0] == pytest.approx([told[name][output] for output in OUTPUTS], rel=1e-12)
+    for k, level in enumerate(COVERAGE_LEVELS):
+        told_shares = [told["coverage"][str(level)][output] for output in OUTPUTS]
+        assert totals.coverage[0, :, k] == pytest.approx(told_shares, rel=1e-12)
+
+
+def test_the_resampled_totals_span_the_interval_of_the_json() -> None:
+    c = comparison()
+    draws, told = tally(c).resampled(), metrics_json(c)["interval"]
+    for name in ("nmse", "nlpd"):
+        low, high = np.quantile(getattr(draws, name).sum(axis=1), [0.025, 0.975])
+        assert [low, high] == pytest.approx([told[name]["low"], told[name]["high"]], rel=1e-12)
+
+
+def test_without_an_exact_density_the_gaussian_one_is_exact() -> None:
+    t = tally(comparison(exact=False))
+    np.testing.assert_array_equal(t.exact_nlpd, t.nlpd)
+
+
+def test_folds_pooled_are_all_rows_at_once() -> None:
+    c = comparison()
+    fold = np.unique(c.push_id, return_inverse=True)[1] % 2
+    parts, whole = pooled([tally(rows_of(c, fold == k)) for k in (1, 0)]), tally(c)
+    for name in vars(whole):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_each_fold_keeps_its_own_training_mean() -> None:
+    c = comparison(sizes=(3, 4))
+    first, second = (rows_of(c, c.push_id == push) for push in ("push-9", "push-8"))
+    moved = replace(second, training_mean=np.array([1e-3, 0.0, 0.1]))
+    spread = np.sum(first.observed**2, axis=0) + np.sum((second.observed - moved.training_mean) ** 2, axis=0)
+    expected = np.sum((c.observed - c.mean) ** 2, axis=0) / spread
+    np.testing.assert_allclose(pooled([tally(first), tally(moved)]).totals().nmse[0], expected)
+
+
+def test_a_push_seen_with_several_seeds_stays_one_push() -> None:
+    one, other = comparison(seed=1), comparison(seed=2)
+    both = pooled([tally(one), tally(other)])
+    assert both.push_id.tolist() == sorted(set(one.push_id.tolist()))
+    assert both.windows.sum() == 2 * sum(SIZES)
+
+
+def test_a_push_drawn_twice_counts_as_if_it_had_been_made_twice() -> None:
+    c = comparison()
+    t = tally(c)
+    weights = np.array([2.0, 0.0, 1.0, 3.0, 0.0, 0.0])
+    rows = np.repeat(np.arange(len(c.push_id)), weights[np.unique(c.push_id, return_inverse=True)[1]].astype(int))
+    expected, drawn = tally(rows_of(c, rows)).totals(), t.totals(weights[None])
+    for name in ("nmse", "nlpd", "exact_nlpd", "coverage"):
+        np.testing.assert_allclose(getattr(drawn, name), getattr(expected, name), rtol=1e-12)
+
+
+def test_two_models_of_the_same_pushes_are_resampled_alike() -> None:
+    t = tally(comparison())
+    np.testing.assert_array_equal(t.resampled().nmse, t.totals(push_bootstrap(t.push_id)).nmse)
+    np.testing.assert_array_equal(t.resampled(seed=5).nlpd, t.totals(push_bootstrap(t.push_id, 5)).nlpd)

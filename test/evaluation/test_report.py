@@ -1,0 +1,484 @@
+"""The report of a validation: maps show what was predicted and recorded, the page holds every number of the metrics."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import kstest
+
+from push_predictor.errors import PushPredictorError, TableError
+from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve
+from push_predictor.evaluation.report.figures.ellipses import ellipse, inside
+from push_predictor.evaluation.report.figures.nearby import examples, spread_rows
+from push_predictor.evaluation.report.figures.push_maps import colour_scale
+from push_predictor.evaluation.report.figures.readme import readme_picture
+from push_predictor.evaluation.report.figures.residuals import trend
+from push_predictor.evaluation.report.figures.slider import magnification, start_pose
+from push_predictor.evaluation.report.maps import (
+    FEWEST,
+    coarse_cells,
+    commonest_condition,
+    fine_cells,
+    predicted_at_windows,
+    push_map,
+    recorded_map,
+    sector_length,
+    way_along,
+)
+from push_predictor.evaluation.report.page import write_validation_report
+from push_predictor.evaluation.report.tables import paired_difference
+from push_predictor.evaluation.validation import Comparison, compare, metrics_json, pit
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.shapes import SHAPES, shape_outline
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable, concatenate
+from push_predictor.recordings.windows.push_window import PushWindow
+
+PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
+
+
+def rig_of(shape: str) -> Rig:
+    return Rig(shape, shape_outline(shape), 0.00475, "plywood", 0.837)
+
+
+def made_up_table(pushes: int, seed: int, velocity: float = 0.02, name: str = "push") -> PushTable:
+    """Pushes of eight windows; dy scatters more where the contact lies off the middle of a square's edge."""
+    rng = np.random.default_rng(seed)
+    contact = np.repeat(rng.uniform(0.0, 1.0, pushes), 8) + rng.normal(0.0, 0.003, 8 * pushes)
+    angle = np.repeat(rng.uniform(-0.9, 0.9, pushes), 8) + rng.normal(0.0, 0.02, 8 * pushes)
+    contact = contact % 1.0
+    lever, way = contact * 4.0 % 1.0 - 0.5, 0.2 * velocity
+    noise = rng.normal(size=(8 * pushes, 3)) * np.column_stack(
+        [0.03 + 0 * lever, 0.03 + 0.2 * np.abs(lever), 1.0 + 0 * lever]
+    )
+    mean = np.column_stack([np.cos(angle), 0.4 * np.sin(angle), 15.0 * lever])
+    speed = velocity * (1.0 + 0.01 * rng.normal(size=8 * pushes))
+    ids = np.repeat([f"{name}-{k}" for k in range(pushes)], 8)
+    inputs = np.column_stack([speed, contact, angle])
+    return PushTable(inputs, np.full(8 * pushes, 0.2), way * (mean + noise), ids)
+
+
+def windows_of(table: PushTable, rig: Rig) -> list[PushWindow]:
+    """Windows with these inputs and outcomes, one behind the other, each push heading along x."""
+    windows, poses = [], {}
+    for row, push in enumerate(table.push_id.tolist()):
+        start = poses.get(push, np.zeros(3))
+        end = poses[push] = start + table.outcomes[row]
+        velocity, contact, angle = table.inputs[row]
+        begin = 200_000_000 * row
+        windows.append(
+            PushWindow(
+                push,
+                row % 8,
+                begin,
+                begin + 200_000_000,
+                velocity,
+                contact,
+                angle,
+                0.2,
+                table.outcomes[row],
+                start,
+                end,
+                0.0,
+                {},
+            )
+        )
+    return windows
+
+
+@pytest.fixture(scope="module")
+def square() -> Rig:
+    return rig_of("rect1")
+
+
+@pytest.fixture(scope="module")
+def table() -> PushTable:
+    return concatenate([made_up_table(30, 1), made_up_table(6, 2, velocity=0.05, name="fast")])
+
+
+@pytest.fixture(scope="module")
+def models(square: Rig) -> list[PushModel]:
+    training = concatenate([made_up_table(25, 3, name="a"), made_up_table(8, 4, velocity=0.05, name="b")])
+    kinds = {"vhgp": 90, "gp": 90, "analytical": None}
+    return [train_model(training, square, kind, name=f"my {kind}", n_train=n) for kind, n in kinds.items()]
+
+
+@pytest.fixture(scope="module")
+def comparisons(models: list[PushModel], table: PushTable) -> list[Comparison]:
+    return [compare(model, table) for model in models]
+
+
+@pytest.fixture(scope="module")
+def page(
+    tmp_path_factory: pytest.TempPathFactory,
+    square: Rig,
+    table: PushTable,
+    models: list[PushModel],
+    comparisons: list[Comparison],
+) -> Path:
+    out = tmp_path_factory.mktemp("report") / "deep" / "er"
+    facts = {"online equals offline": "288 of 288 windows, <1e-9 apart"}
+    title, notes = "Held-out <b>square</b> & co", ['a "note" with <script>alert(1)</script>']
+    return write_validation_report(out, title, table, windows_of(table, square), models, comparisons, facts, notes)
+
+
+def gaussian_comparison(sd_factor: float, pushes: int = 400, seed: int = 0) -> Comparison:
+    """Outcomes drawn from the predicted Gaussians, whose sd is then multiplied by sd_factor."""
+    rng = np.random.default_rng(seed)
+    root = np.array([[1.0, 0.0, 0.0], [0.5, 0.8, 0.0], [0.2, -0.3, 0.6]]) * 1e-3
+    mean = rng.normal(size=(5 * pushes, 3))
+    observed = mean + rng.normal(size=(5 * pushes, 3)) @ root.T
+    covariance = np.broadcast_to(sd_factor**2 * root @ root.T, (5 * pushes, 3, 3))
+    push_id = np.repeat([f"p{k}" for k in range(pushes)], 5)
+    return Comparison("made up", 100, push_id, mean, covariance, observed, None, np.zeros(3))
+
+
+class Shown(HTMLParser):
+    """The text of a page, its tags, and the addresses that it refers to."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.text, self.tags, self.addresses, self.alternatives = [], [], [], []
+        self.feed(page.read_text())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.addresses += [value or "" for name, value in attrs if name in ("src", "href")]
+        self.alternatives += [value for name, value in attrs if name == "alt"]
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+# --- folding --------------------------------------------------------------------------------------------------------
+
+
+@given(contact=st.floats(0.0, 0.2499), quarter=st.integers(0, 3))
+def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, quarter: int) -> None:
+    outline = shape_outline("rect1")
+    along = way_along(outline, np.array([contact, contact + 0.25 * quarter]))
+    assert along[0] == pytest.approx(contact * 0.36, abs=1e-12)
+    assert along[1] == pytest.approx(along[0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("shape", "edges", "length"), [("rect1", 4, 0.09), ("hex", 6, 0.0605)])
+def test_the_end_of_an_edge_stays_its_end(shape: str, edges: int, length: float) -> None:
+    outline = shape_outline(shape)
+    ends = outline.contact_on_edge(np.arange(edges), np.ones(edges))
+    assert way_along(outline, ends) == pytest.approx(np.full(edges, length))
+    starts = outline.contact_on_edge(np.arange(edges), np.zeros(edges))
+    assert way_along(outline, starts) == pytest.approx(np.zeros(edges), abs=1e-12)
+
+
+def test_an_ellipse_folds_in_two_and_a_circle_not_at_all() -> None:
+    ellipse_outline, circle = shape_outline("ellip2"), shape_outline("ellip1")
+    contact = np.array([0.1, 0.6])
+    assert np.ptp(way_along(ellipse_outline, contact)) == pytest.approx(0.0, abs=1e-12)
+    assert sector_length(ellipse_outline) == pytest.approx(ellipse_outline.perimeter / 2.0)
+    assert way_along(circle, contact) == pytest.approx(contact * circle.perimeter)
+
+
+# --- maps -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_commonest_speed_is_the_one_of_most_windows(table: PushTable) -> None:
+    condition = commonest_condition(table)
+    assert condition.velocity == pytest.approx(0.02, rel=0.01)
+    assert condition.duration == 0.2
+    assert condition.rows.sum() == 240
+    np.testing.assert_array_equal(condition.rows, table.inputs[:, 0] < 0.03)
+
+
+def test_no_windows_have_no_commonest_speed(table: PushTable) -> None:
+    with pytest.raises(TableError, match="0 windows"):
+        commonest_condition(table.take(np.zeros(len(table), bool)))
+
+
+def test_a_predicted_map_is_what_the_model_predicts_at_the_centres_of_its_cells(
+    models: list[PushModel], table: PushTable, square: Rig
+) -> None:
+    cells = fine_cells(square.outline, table)
+    for model in models:
+        shown = push_map(model, 0.02, 0.2, cells)
+        row, column = 20, 7
+        contact = cells.contact[column : column + 2].mean() / square.outline.perimeter
+        inputs = np.array([[0.02, contact, cells.angle[row : row + 2].mean()]])
+        expected = model.predict(inputs, np.array([0.2]))
+        assert expected.in_domain[0]
+        np.testing.assert_allclose(shown.mean[row, column], expected.mean[0], rtol=1e-9)
+        np.testing.assert_allclose(shown.sd[row, column] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)
+
+
+def test_a_predicted_map_shows_nothing_outside_the_domain(
+    models: list[PushModel], table: PushTable, square: Rig
+) -> None:
+    far = PushTable(table.inputs * [1.0, 1.0, 1.5], table.duration, table.outcomes, table.push_id)
+    cells = fine_cells(square.outline, far)
+    shown = push_map(models[0], 0.02, 0.2, cells)
+    steepest = np.abs(models[0].training.inputs[:, 2]).max()
+    beyond = np.minimum(np.abs(cells.angle[1:]), np.abs(cells.angle[:-1])) > steepest
+    assert beyond.any() and np.isnan(shown.mean[beyond]).all() and np.isnan(shown.sd[beyond]).all()
+    assert np.isfinite(shown.mean[len(beyond) // 2]).any()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10_000), pushes=st.integers(1, 40))
+def test_every_window_lies_in_one_cell_of_the_recorded_map(shape: str, seed: int, pushes: int) -> None:
+    outline, table = shape_outline(shape), made_up_table(pushes, seed)
+    shown = recorded_map(outline, table, np.zeros_like(table.outcomes), coarse_cells(outline, table))
+    assert shown.windows is not None and shown.windows.sum() == len(table)
+    np.testing.assert_array_equal(np.isfinite(shown.mean).all(axis=2), shown.windows >= FEWEST)
+
+
+def test_a_recorded_cell_holds_mean_and_distance_from_the_prediction(square: Rig, table: PushTable) -> None:
+    cells = coarse_cells(square.outline, table)
+    predicted = table.outcomes + [1e-3, -2e-3, 0.03]
+    shown = recorded_map(square.outline, table, predicted, cells)
+    row, column = np.argwhere(shown.windows >= FEWEST)[0]
+    along, angle = way_along(square.outline, table.inputs[:, 1]), table.inputs[:, 2]
+    inside_cell = (along >= cells.contact[column]) & (along < cells.contact[column + 1])
+    inside_cell &= (angle >= cells.angle[row]) & (angle < cells.angle[row + 1])
+    np.testing.assert_allclose(shown.mean[row, column], table.outcomes[inside_cell].mean(axis=0))
+    np.testing.assert_allclose(shown.sd[row, column], [1e-3, 2e-3, 0.03])
+    assert shown.pushes is not None and shown.pushes[row, column] == len(set(table.push_id[inside_cell].tolist()))
+
+
+def test_the_recorded_scatter_agrees_with_a_prediction_that_is_right(square: Rig) -> None:
+    """Whatever the inputs do within a cell: here the mean varies by far more than the noise."""
+    table, rng = made_up_table(150, 5), np.random.default_rng(6)
+    mean = np.column_stack([table.inputs[:, 2], table.inputs[:, 1], table.inputs[:, 2] * 10.0])
+    sd = np.array([2e-4, 1e-4, 5e-3])
+    observed = PushTable(table.inputs, table.duration, mean + sd * rng.normal(size=mean.shape), table.push_id)
+    cells = coarse_cells(square.outline, table)
+    recorded = recorded_map(square.outline, observed, mean, cells)
+    predicted = predicted_at_windows(square.outline, observed, mean, np.broadcast_to(sd**2, mean.shape), cells)
+    assert recorded.windows is not None
+    full = recorded.windows >= FEWEST
+    ratio = (recorded.sd / predicted.sd)[full] ** 2
+    error = np.sqrt(2.0 / recorded.windows[full])[:, None]
+    assert np.abs((ratio - 1.0) / error).max() < 5.0
+    assert np.average(ratio[:, 0], weights=recorded.windows[full]) == pytest.approx(
+        1.0, abs=5.0 * np.sqrt(2.0 / len(table))
+    )
+
+
+def test_colours_are_symmetric_about_zero_for_signed_values_and_start_at_zero_for_others() -> None:
+    signed = colour_scale([np.linspace(-1.0, 3.0, 101)])
+    assert signed.name == "PuOr" and signed.low == -signed.high
+    positive = colour_scale([np.linspace(1.0, 3.0, 101), np.array([np.nan])])
+    assert positive.low == 0.0 and positive.high == pytest.approx(2.94) and positive.extend == "max"
+    nothing = colour_scale([np.full(4, np.nan)])
+    assert nothing.low < nothing.high
+
+
+# --- ellipses and examples ------------------------------------------------------------------------------------------
+
+
+def test_an_ellipse_holds_its_share_of_outcomes() -> None:
+    c = gaussian_comparison(1.0)
+    hits = [inside(c.mean[k], c.covariance[k], c.observed[[k]])[0] for k in range(len(c.mean))]
+    assert np.mean(hits) == pytest.approx(0.95, abs=0.02)
+    border = ellipse(c.covariance[0, :2, :2])
+    squared = np.sum(border * np.linalg.solve(c.covariance[0, :2, :2], border.T).T, axis=1)
+    np.testing.assert_allclose(squared, -2.0 * np.log(0.05), rtol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 9))
+@settings(max_examples=30, deadline=None)
+def test_examples_come_from_different_pushes(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    push_id = rng.integers(0, 6, 40).astype(np.str_)
+    rows = spread_rows(rng.normal(size=(40, 2)), push_id, count)
+    assert len(rows) == min(count, len(set(push_id.tolist())))
+    assert len(set(push_id[rows].tolist())) == len(rows)
+
+
+def test_outcomes_of_nearby_windows_are_told_for_the_inputs_of_the_example(
+    square: Rig, table: PushTable, comparisons: list[Comparison]
+) -> None:
+    c = comparisons[0]
+    exact = Comparison(c.model, c.n_train, c.push_id, c.mean, c.covariance, c.mean, None, c.training_mean)
+    shown = examples(square.outline, table, exact, 4)
+    assert len(shown) == 4
+    for example in shown:
+        assert len(example.nearby)
+        np.testing.assert_allclose(example.nearby, np.tile(c.mean[example.row], (len(example.nearby), 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(contact=st.floats(0.0, 0.999), angle=st.floats(-1.5, 1.5))
+@settings(max_examples=25, deadline=None)
+def test_the_slider_is_drawn_touching_the_origin_and_pushed_to_the_right(
+    shape: str, contact: float, angle: float
+) -> None:
+    outline = shape_outline(shape)
+    pose = start_pose(outline, np.array([0.02, contact, angle]))
+    touch = rotate(outline.point(np.array([contact]))[0], pose[2]) + pose[:2]
+    np.testing.assert_allclose(touch, 0.0, atol=1e-12)
+    normal = rotate(outline.inward_normal(np.array([contact]))[0], pose[2])
+    assert -np.arctan2(normal[1], normal[0]) == pytest.approx(angle, abs=1e-9)
+
+
+def test_small_motions_are_enlarged_and_large_ones_are_not() -> None:
+    outline = shape_outline("rect1")
+    assert magnification(outline, np.array([[0.0004, 0.0, 0.0]])) == 20.0
+    assert magnification(outline, np.array([[0.05, 0.0, 0.0]])) == 1.0
+
+
+# --- calibration and drift ------------------------------------------------------------------------------------------
+
+
+def test_a_calibrated_prediction_lies_on_the_diagonal_and_an_overconfident_one_below() -> None:
+    share, low, high = coverage_curve(gaussian_comparison(1.0))
+    assert np.abs(share - LEVELS[:, None]).max() < 0.04
+    assert np.all(low <= share) and np.all(share <= high)
+    overconfident = coverage_curve(gaussian_comparison(0.5))[0]
+    assert np.all(overconfident[5:-5] < LEVELS[5:-5, None] - 0.03)
+    for column in pit(gaussian_comparison(1.0)).T:
+        assert kstest(column, "uniform").pvalue > 1e-3
+    assert kstest(pit(gaussian_comparison(0.5))[:, 0], "uniform").pvalue < 1e-6
+
+
+def test_a_drift_is_seen_and_none_is_not_invented() -> None:
+    rng = np.random.default_rng(8)
+    place, push_id = np.repeat(np.arange(60.0), 5), np.repeat(np.arange(60).astype(np.str_), 5)
+    still = np.repeat(rng.normal(size=60), 5) + 0.3 * rng.normal(size=300)
+    found = trend(place, still, push_id)
+    assert found is not None and found.low < 0.0 < found.high
+    drifting = trend(place, still + 3.0 * place / 59.0, push_id)
+    assert drifting is not None and drifting.low > 0.0
+    assert drifting.change == pytest.approx(found.change + 3.0, abs=1e-9)
+    assert trend(place[:5], still[:5], push_id[:5]) is None
+
+
+# --- the page -------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_holds_every_number_of_the_metrics(page: Path, comparisons: list[Comparison]) -> None:
+    text = " ".join(Shown(page).text).replace("−", "-")
+    shown = {float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text)}
+    for comparison in comparisons:
+        metrics = metrics_json(comparison)
+        assert metrics["model"] in text
+        coverage = metrics.pop("coverage")
+        interval = metrics.pop("interval")
+        for value in _numbers(metrics):
+            assert float(f"{value:.4g}") in shown
+        for value in [*_numbers(coverage), *_numbers([interval["nmse"], interval["nlpd"]])]:
+            assert float(f"{value:.3g}") in shown
+
+
+def test_the_page_names_split_pushes_and_units(page: Path) -> None:
+    text = " ".join(Shown(page).text)
+    assert "288 windows of 36 pushes" in text
+    assert "whole pushes are held out" in text
+    assert "13.8155" in text
+    assert "288 of 288 windows, <1e-9 apart" in text
+    assert "20" in text and "240 of 288 windows" in text
+
+
+def test_the_page_stands_alone_and_escapes_what_it_is_given(page: Path) -> None:
+    shown = Shown(page)
+    assert shown.addresses and all(address.startswith("data:image/png;base64,") for address in shown.addresses)
+    assert "script" not in shown.tags and "b" not in shown.tags and "link" not in shown.tags
+    assert "Held-out <b>square</b> & co" in shown.text
+    assert len(shown.alternatives) == len(shown.addresses) and all(shown.alternatives)
+    assert "url(" not in page.read_text() and "@import" not in page.read_text()
+
+
+def test_pictures_and_numbers_lie_beside_the_page(page: Path, comparisons: list[Comparison]) -> None:
+    files = {path.name for path in page.parent.iterdir()}
+    assert files == PICTURES | {"tracks.png", "report.html", "report.json"}  # and no temporary file
+    for name in files & PICTURES:
+        assert (page.parent / name).read_bytes().startswith(b"\x89PNG")
+    content = json.loads((page.parent / "report.json").read_text())
+    assert content["metrics"] == json.loads(json.dumps([metrics_json(c) for c in comparisons]))
+
+
+@pytest.mark.parametrize("shape", ["ellip1", "ellip2", "hex"])
+def test_one_push_and_the_analytical_model_alone_make_a_report(shape: str, tmp_path: Path) -> None:
+    rig, training, one = rig_of(shape), made_up_table(4, 1, name="train"), made_up_table(1, 2)
+    model = train_model(training, rig, "analytical", name="analytical")
+    page = write_validation_report(tmp_path, "one", one, None, [model], [compare(model, one)], {}, [])
+    text = " ".join(Shown(page).text)
+    assert "8 windows of 1 push " in text
+    assert "exact" not in text
+    assert {path.name for path in tmp_path.iterdir()} == PICTURES | {"report.html", "report.json"}
+
+
+def test_a_recording_without_windows_makes_a_page_that_says_so(
+    models: list[PushModel], table: PushTable, tmp_path: Path
+) -> None:
+    none = table.take(np.zeros(len(table), bool))
+    page = write_validation_report(tmp_path, "none", none, [], models, [compare(m, none) for m in models], {}, [])
+    assert "No window was found" in page.read_text()
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_pushes_that_were_trained_on_are_warned_of(square: Rig, tmp_path: Path) -> None:
+    training = made_up_table(4, 1)
+    model = train_model(training, square, "analytical", name="analytical")
+    seen = training.take(np.arange(8))
+    page = write_validation_report(tmp_path, "seen", seen, None, [model], [compare(model, seen)], {}, [])
+    assert "Not held out" in page.read_text() and "held out, none" not in page.read_text()
+
+
+def test_things_that_do_not_belong_together_are_refused(
+    models: list[PushModel], comparisons: list[Comparison], table: PushTable, square: Rig, tmp_path: Path
+) -> None:
+    few = table.take(np.arange(5))
+    with pytest.raises(PushPredictorError, match="3 models and 2 comparisons"):
+        write_validation_report(tmp_path, "", table, None, models, comparisons[:2], {}, [])
+    with pytest.raises(PushPredictorError, match="comparison of my vhgp: 288 rows, give the table's 5"):
+        write_validation_report(tmp_path, "", few, None, models, comparisons, {}, [])
+    with pytest.raises(PushPredictorError, match="5 windows, give the 288"):
+        write_validation_report(tmp_path, "", table, windows_of(few, square), models, comparisons, {}, [])
+
+
+def test_without_matplotlib_the_error_names_the_extra(
+    models: list[PushModel],
+    comparisons: list[Comparison],
+    table: PushTable,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    with pytest.raises(PushPredictorError, match=r"pip install 'push_predictor\[report\]'"):
+        write_validation_report(tmp_path, "", table, None, models, comparisons, {}, [])
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_model_differs_from_itself_by_nothing_and_from_a_worse_one_by_more(comparisons: list[Comparison]) -> None:
+    main = comparisons[0]
+    nmse, nlpd = paired_difference(main, main)
+    assert not nmse.any() and not nlpd.any()
+    shifted = main.mean + 0.2 * main.observed.std(axis=0)
+    worse = Comparison("worse", 1, main.push_id, shifted, main.covariance, main.observed, None, main.training_mean)
+    for value, low, high in paired_difference(main, worse):
+        assert 0.0 < low < value < high
+    totals = [metrics_json(c)["nmse"]["total"] for c in (main, worse)]
+    assert paired_difference(main, worse)[0][0] == pytest.approx(totals[1] - totals[0])
+
+
+def test_the_readme_picture_is_wide(models: list[PushModel], table: PushTable, tmp_path: Path) -> None:
+    picture = readme_picture(tmp_path / "picture.png", models[0], table)
+    width, height = np.frombuffer(picture.read_bytes()[16:24], dtype=">u4")
+    assert width > 2.5 * height
+
+
+def _numbers(content: object) -> list[float]:
+    if isinstance(content, dict):
+        return [number for value in content.values() for number in _numbers(value)]
+    if isinstance(content, list):
+        return [number for value in content for number in _numbers(value)]
+    return [float(content)] if isinstance(content, int | float) else []

@@ -1,0 +1,80 @@
+"""The example planner end to end over DDS, and the cell in which it pushes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ros_harness as harness
+
+from benchmarks.planner_table import Regime, Runs, table
+from examples import plan_pushes, processes
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.simulation.interactive_rig import push_once
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.spec import SimulationSpec
+
+SLIDERS = np.array([[0.02, -0.03, 0.4], [-0.05, 0.06, -2.0]])
+
+
+def pushes(contact, angle, travel, seed=3) -> SimulationSpec:
+    count = len(contact)
+    plan = PushPlan(np.array(contact), np.array(angle), np.full(count, 0.02), np.array(travel))
+    return SimulationSpec("rect1", "abs", plan, seed=seed)
+
+
+def test_a_push_moves_the_slider_that_it_meets():
+    """Onto the middle of a side, along its normal: the slider goes as far as the tip and turns little."""
+    after = push_once(pushes([0.125, 0.375], [0.0, 0.0], [0.008, 0.008]), SLIDERS)
+    ahead = SLIDERS[:, 2] + [0.0, np.pi / 2.0]
+    moved = after[:, :2] - SLIDERS[:, :2]
+    np.testing.assert_allclose(
+        np.sum(moved * np.column_stack([np.cos(ahead), np.sin(ahead)]), axis=1), 0.008, atol=3e-4
+    )
+    assert np.abs(wrap_angle(after[:, 2] - SLIDERS[:, 2])).max() < 0.2
+
+
+def test_the_same_seed_scatters_a_row_alike_whatever_the_others_do():
+    first = push_once(pushes([0.1, 0.4], [0.3, 0.1], [0.008, 0.004]), SLIDERS)
+    second = push_once(pushes([0.1, 0.9], [0.3, -0.5], [0.008, 0.030]), SLIDERS)
+    np.testing.assert_allclose(second[0], first[0], atol=1e-5)
+    other = push_once(pushes([0.1, 0.4], [0.3, 0.1], [0.008, 0.004], seed=4), SLIDERS)
+    assert np.abs(other[0] - first[0]).max() > 1e-4
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("planner") / "gp.pushmodel"
+    recording = [plan_pushes.TRAINING]
+    save_model(train_model(load_data(recording), load_rig_for(recording), "gp", name="gp", n_train=200), path)
+    return path
+
+
+def test_the_example_reaches_its_goal(model, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(harness.free_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(plan_pushes, "OUT", tmp_path)
+    monkeypatch.setattr(plan_pushes, "LOGS", tmp_path)
+    monkeypatch.setattr(processes, "LOGS", tmp_path)
+    assert plan_pushes.main(["--model", str(model)]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"reached with \d+ pushes", told) and "NOT" not in told
+    sure = re.findall(r"with probability (\d\.\d\d); rollout_pushes says (\d\.\d\d)", told)
+    assert sure and all(abs(float(ours) - float(theirs)) < 0.2 for ours, theirs in sure)
+    assert (tmp_path / "pushes.png").stat().st_size > 10_000
+
+
+def test_the_benchmarks_table_counts_goals_and_promises():
+    """95 of 100 goals within the limit: Wilson's interval is 88.8 to 97.8 %; the other variant needs one push more."""
+    needed = np.repeat([1, 2, 7], [45, 50, 5])
+    first = Runs(needed, np.full(100, 0.0012), np.array([0.95, 0.97]), np.array([True, False]))
+    other = Runs(needed + 1, np.full(100, 0.002), np.zeros(0), np.zeros(0, dtype=bool))
+    lines = table(Regime("made up", 0.02, 0.3, 0.001, 0.03), {"own": first, "other": other}).splitlines()
+    cells = [line.strip("| ").split(" | ") for line in lines if line.startswith(("| own", "| other"))]
+    assert cells[0][4] == "95 % (89 to 98)" and cells[0][7:] == ["1.20", "2", "0.96", "50 % (9 to 91)"]
+    assert cells[1][1] == "0 % (0 to 4)" and cells[1][6] == "+1.00 (+1.00 to +1.00)" and cells[1][8] == "0"

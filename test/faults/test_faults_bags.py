@@ -1,0 +1,306 @@
+"""Damaged bags: what stands before the damage is used, the damage is named, nothing hangs, dies or fills the memory."""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import subprocess
+import sys
+import tracemalloc
+import zlib
+from pathlib import Path
+from random import Random
+
+import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
+from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
+from ros_harness import REPOSITORY, free_domain, node_process
+
+from push_predictor.cli import main
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.read import read_recording
+
+COPIES = 180
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """Four seconds of poses and forces in some ten chunks of 64 kB, with a rig and a summary."""
+    return write_bag(tmp_path / "bag.mcap", push_messages(4.0))
+
+
+def chunks_of(data: bytes) -> list[int]:
+    """Where chunks start."""
+    found, at = [], 8
+    while at + 9 < len(data) and data[at] != 15:
+        found += [at] if data[at] == 6 else []
+        at += 9 + struct.unpack_from("<Q", data, at + 1)[0]
+    return found
+
+
+def told(bag: Path) -> tuple[list[bytes], list[str]]:
+    """The messages and the notes."""
+    opened = open_bag(bag)
+    return [m.data for m in opened.messages()], opened.notes
+
+
+def test_damaged_copies_of_every_kind_and_form_are_read_as_far_as_they_are_whole() -> None:
+    """The same by hand, of 2000: python -m benchmarks.fuzz_bags. It judges by bags that the mcap package wrote."""
+    command = [sys.executable, "-m", "benchmarks.fuzz_bags", "--copies", str(COPIES), "--seed", "6"]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
+    done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=400)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(rf"^{COPIES} copies of 9 bags in .*, 0 failed$", done.stdout, re.MULTILINE)
+
+
+@pytest.mark.parametrize("length", [1 << 31, 1 << 40, (1 << 64) - 1, 300_000], ids=["2 GB", "1 TB", "2^64", "300 kB"])
+@pytest.mark.parametrize("summary", [True, False], ids=["summary", "no summary"])
+def test_a_chunk_that_claims_too_much_is_named_and_costs_no_memory(bag: Path, length: int, summary: bool) -> None:
+    """Were the length believed, the rest of the file would be one chunk; with a summary reading goes on at the next."""
+    data = bytearray(bag.read_bytes())
+    whole, _ = told(bag)
+    chunks = chunks_of(data)
+    struct.pack_into("<Q", data, chunks[2] + 1, length)
+    bag.write_bytes(data if summary else data[:-200])
+    tracemalloc.start()
+    opened = open_bag(bag)
+    count = sum(1 for _ in opened.messages())
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    messages = told(bag)[0]
+    assert messages[:900] == whole[:900]
+    assert len(whole) * 0.75 < count < len(whole) if summary else 900 < count < len(whole) / 2
+    assert any(f"bag.mcap at byte {chunks[2]}: " in note for note in opened.notes)
+    assert held < 2 * 64_000 + 130_000
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused_before_it_does(bag: Path, compression: str) -> None:
+    import lz4.frame
+
+    data = bytearray(bag.read_bytes())
+    chunk, end = chunks_of(data)[1:3]
+    pack = zstandard.compress if compression == "zstd" else lz4.frame.compress
+    bomb = pack(bytes(1 << 23))
+    name = compression.encode()
+    content = data[chunk + 9 : chunk + 37] + struct.pack("<I", len(name)) + name + struct.pack("<Q", len(bomb)) + bomb
+    bag.write_bytes(data[:chunk] + struct.pack("<BQ", 6, len(content)) + content + data[end:])
+    tracemalloc.start()
+    messages, notes = told(bag)
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(messages) > 1000
+    assert any(f"at byte {chunk}: a chunk was skipped: a chunk does not hold the " in note for note in notes)
+    assert held < 1 << 21  # with the messages that this test keeps
+
+
+HELD = """
+import sys
+from pathlib import Path
+from push_predictor.recordings.bag.reader import open_bag
+def most():
+    return 1024 * int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
+sum(1 for _ in open_bag(Path(sys.argv[1])).messages())  # which takes memory once
+before = most()
+sum(1 for _ in open_bag(Path(sys.argv[2])).messages())
+print(most() - before)
+"""
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+@pytest.mark.parametrize("noise", [4000, 500], ids=["that_do_not_compress", "that_do"])
+def test_reading_holds_no_more_than_two_chunks(
+    bag: Path, tmp_path: Path, compression: CompressionType, noise: int
+) -> None:
+    path, chunk, rng = tmp_path / "noise.mcap", 1 << 24, Random(0)
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=chunk, compression=compression)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/noise", "cdr", writer.register_schema(POSE, "ros2msg", b""))
+        for step in range(10_000):
+            writer.add_message(channel, START + step, rng.randbytes(noise) + bytes(4000 - noise), 0)
+        writer.finish()
+    told = subprocess.run([sys.executable, "-c", HELD, bag, path], check=True, cwd=REPOSITORY, capture_output=True)
+    print(int(told.stdout) / chunk)
+    assert int(told.stdout) < 2.1 * chunk  # what the whole process grew by at most; noise of a megabyte
+
+
+def test_the_messages_of_the_chunk_that_a_cut_goes_through_are_used(bag: Path) -> None:
+    """zstd unpacks in blocks of 128 kB: of a chunk that holds several, those before the cut are there."""
+    messages = [("/camera", "std_msgs/msg/String", START + i, os.urandom(500)) for i in range(2000)]
+    with bag.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=2_000_000)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/camera", "cdr", schema)
+        for _, _, time, content in messages:
+            writer.add_message(channel, time, content, time)
+        writer.finish()
+    bag.write_bytes(bag.read_bytes()[:700_000])
+    found, notes = told(bag)
+    assert 1000 < len(found) < 1400
+    assert found == [m[3] for m in messages[: len(found)]]
+    assert any("damaged or cut off" in note for note in notes)
+
+
+def test_a_chunk_that_lost_bytes_does_not_pass_for_one_that_is_cut_off(bag: Path) -> None:
+    """So many that it seems to reach beyond the file's end: what follows the gap is no message, whatever it says."""
+    with bag.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
+        for step in range(400):
+            writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
+        writer.finish()
+    whole, _ = told(bag)
+    data = bag.read_bytes()
+    bag.write_bytes(data[:10_000] + data[30_011:])
+    found, notes = told(bag)
+    assert set(found) <= set(whole)
+    assert any("damaged or cut off" in note for note in notes)
+
+
+def hundred_poses(path: Path, enable_data_crcs: bool = False) -> int:
+    """Write a bag without chunks; answers the byte where its data end."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, use_chunking=False, enable_data_crcs=enable_data_crcs)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/slider/pose", "cdr", writer.register_schema(POSE, "ros2msg", b""))
+        for step in range(100):
+            writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
+        end = stream.tell()
+        writer.finish()
+    return end
+
+
+def test_zeros_at_the_end_as_after_a_power_cut_cost_no_message_before_them(bag: Path) -> None:
+    """Without chunks, too: the last message is whole, though no record follows it."""
+    end = hundred_poses(bag)
+    data = bag.read_bytes()
+    bag.write_bytes(data[:end] + bytes(5000))
+    found, notes = told(bag)
+    assert len(found) == 100
+    assert any(f"at byte {end}, is damaged" in note for note in notes)
+
+
+@pytest.mark.parametrize("what", ["type", "encoding"])
+def test_messages_before_a_foreign_schema_or_encoding_are_used(bag: Path, what: str) -> None:
+    with bag.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2000)
+        writer.start(profile="ros2")
+        good = writer.register_schema(POSE, "ros2msg", b"")
+        foreign = good if what == "encoding" else writer.register_schema("my_msgs/msg/Pose", "ros2msg", b"float32 x")
+        slider = [
+            writer.register_channel("/slider/pose", "cdr", good),
+            writer.register_channel("/slider/pose", "json" if what == "encoding" else "cdr", foreign),
+        ]
+        pusher = writer.register_channel("/pusher/pose", "cdr", good)
+        for step in range(100):
+            data = stamped(START + step, [step, 0, 0, 0, 0, 0, 1])
+            writer.add_message(slider[step >= 50], START + step, data, 0)
+            writer.add_message(pusher, START + step, data, 0)
+        writer.finish()
+    read = read_recording(bag)
+    assert (len(read.slider), len(read.pusher)) == (50, 100)
+    said = "50 messages are of type 'my_msgs/msg/Pose'" if what == "type" else "/slider/pose is encoded as 'json'"
+    assert any("/slider/pose" in note and said in note for note in read.notes)
+
+
+def test_a_summary_that_is_damaged_is_named_and_not_used(bag: Path) -> None:
+    """It is believed where its checksum is right and it stands right behind the data."""
+    data = bytearray(bag.read_bytes())
+    whole, _ = told(bag)
+    start, _, _ = struct.unpack_from("<QQI", data, len(data) - 28)
+    at = data.index(b"/slider/pose", start)
+    data[at : at + 12] = b"/slider/posf"
+    bag.write_bytes(data)
+    messages, notes = told(bag)
+    assert messages == whole
+    assert any(f"at byte {start}: the summary's checksum is wrong" in note for note in notes)
+    assert set(open_bag(bag).topics) == {"/slider/pose", "/pusher/pose", "/pusher/wrench"}
+
+
+@pytest.mark.parametrize("lie", [100, 70_000, 1 << 40, (1 << 64) - 1])
+def test_a_metadata_index_that_points_elsewhere_is_named_and_the_record_found(bag: Path, lie: int) -> None:
+    """Its checksum is right: a program that wrote nonsense, or somebody who means ill."""
+    data = bytearray(bag.read_bytes())
+    start, _, _ = struct.unpack_from("<QQI", data, len(data) - 28)
+    place = data.rindex(b"push_rig") - 29  # opcode, length, offset, length, length of the name
+    struct.pack_into("<Q", data, place + 9, lie)
+    struct.pack_into("<I", data, len(data) - 12, zlib.crc32(data[start:-12]))
+    bag.write_bytes(data)
+    opened = open_bag(bag)
+    assert dict(opened.metadata["push_rig"]) == RIG
+    assert any(f"at byte {lie}: " in note and "metadata" in note for note in opened.notes)
+
+
+def test_the_checksum_of_the_whole_data_is_checked_where_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "sum.mcap"
+    end = hundred_poses(path, enable_data_crcs=True)
+    assert told(path)[1] == []
+    data = bytearray(path.read_bytes())
+    data[end - 20] ^= 1
+    path.write_bytes(data)
+    messages, notes = told(path)
+    assert len(messages) == 100
+    assert notes == [f"{path} at byte {end}: the checksum of all that stands before is wrong, it is damaged somewhere"]
+
+
+def test_one_damaged_file_of_several_leaves_the_others_in_use(tmp_path: Path) -> None:
+    folder = tmp_path / "split"
+    folder.mkdir()
+    for part in range(4):
+        write_bag(folder / f"split_{part}.mcap", push_messages(0.4))
+    whole = len(told(folder)[0]) // 4
+    (folder / "split_0.mcap").write_bytes(b"")
+    (folder / "split_1.mcap").write_bytes(b"no MCAP at all")
+    (folder / "split_2.mcap").write_bytes((folder / "split_2.mcap").read_bytes()[:60])
+    messages, notes = told(folder)
+    assert len(messages) == whole
+    assert any("split_0.mcap: the file is empty" in note and "the other files are used" in note for note in notes)
+    assert any("split_1.mcap: not an MCAP file" in note for note in notes)
+    assert any(re.search(r"split_2\.mcap at byte \d+", note) for note in notes)
+    (folder / "split_2.mcap").unlink()
+    (folder / "split_3.mcap").unlink()
+    with pytest.raises(RecordingError, match=r"split_0\.mcap: the file is empty"):
+        open_bag(folder)
+
+
+def test_a_file_that_is_damaged_everywhere_is_read_in_time_and_does_not_fill_the_notes(tmp_path: Path) -> None:
+    """Every message is on a channel that nobody described: as many notes as messages would take for ever."""
+    record = struct.pack("<BQHIQQ", 5, 22 + 4, 7, 0, 0, 0) + b"\0\1\0\0"
+    path = tmp_path / "wild.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + 50_000 * record)
+    messages, notes = told(path)
+    assert messages == []
+    assert len(notes) < 100
+    assert notes[-1] == f"{path}: more is damaged than is told here"
+
+
+def test_commands_end_with_0_or_1_and_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = bag.read_bytes()
+    model = str(REPOSITORY / "resource" / "simulated_square_abs.pushmodel")
+    for content in (data[:40_000], data[:100], b"", b"x", data[:30_000] + bytes(9000) + data[39_000:]):
+        bag.write_bytes(content)
+        for command in (["info", str(bag)], ["validate", model, str(bag)]):
+            status = main(command)
+            out, err = capsys.readouterr()
+            lines = [line for line in err.splitlines() if not line.startswith("warning:")]
+            assert (status, len(lines)) in ((0, 0), (1, 1)), err
+            if command[0] == "info" and len(content) > 1000:
+                assert status == 0 and "bag.mcap at byte" in out
+
+
+def test_a_replay_plays_what_is_whole_and_says_so_and_refuses_what_is_nothing(bag: Path) -> None:
+    bag.write_bytes(bag.read_bytes()[:20_000])
+    params = {"recording": bag, "exit_when_finished": True, "play.rate": 20.0, "wait_for_subscribers": 0.0}
+    with node_process("push_replay", domain=free_domain(), params=params) as process:
+        assert process.wait(30.0) == 0, process.text()
+        assert "Traceback" not in process.text() and "damaged" in process.text()
+    bag.write_bytes(b"")
+    with node_process("push_replay", domain=free_domain(), params=params) as process:
+        assert process.wait(30.0) == 1
+        assert process.text().strip() == f"push_replay: {bag}: the file is empty, give an MCAP recording"

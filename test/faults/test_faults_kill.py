@@ -1,0 +1,228 @@
+"""A server, a validator, a planner, a replay that is killed: who notices, what is left on disk, what goes on."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.executors import SingleThreadedExecutor
+from ros_harness import NodeProcess, call, free_domain, node_process, ros_context, wait_until
+from validator_bench import HEXAGON, WRITTEN, Status, assert_same_as_offline, finish, replaying
+
+from examples.planner_client import PlannerClient
+from push_predictor.cli import main as push_predictor
+from push_predictor.evaluation.offline import validate_recording
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.window_table import put_aside
+from push_predictor.recordings import atomic_append as whole_lines
+from push_predictor.recordings.atomic_append import append_lines
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.table_file import read_table
+from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
+
+TIMEOUT = 0.5  # s
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path, data = tmp_path_factory.mktemp("model") / "gp.pushmodel", [HEXAGON]
+    save_model(train_model(load_data(data), load_rig_for(data), "gp", name="gp", n_train=30), path)
+    return path
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    found = free_domain()
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(found))
+    yield found
+
+
+def server(domain: int, model: Path) -> Any:
+    return node_process("predict_server", domain=domain, params={"models": [str(model)]})
+
+
+def validator(domain: int, model: Path, output: Path) -> Any:
+    params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "request_timeout": TIMEOUT}
+    return node_process("push_validator", domain=domain, params={**params, "last_answers": 120.0})
+
+
+def kill(process: NodeProcess) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+def residuals_heard(node: Any) -> list[PushResidual]:
+    heard: list[PushResidual] = []
+    node.create_subscription(PushResidual, "push_residual", heard.append, 1000)
+    return heard
+
+
+# --- predict_server --------------------------------------------------------------------------------------------------
+
+
+class Planning(threading.Thread):
+    """A planner that asks again and again; what came of it, and how long each answer took."""
+
+    def __init__(self, inputs: np.ndarray) -> None:
+        super().__init__(daemon=True)
+        self._inputs, self._ending = inputs, threading.Event()
+        self.answers: list[tuple[float, np.ndarray]] = []
+        self.start()
+
+    def run(self) -> None:
+        with PlannerClient(0.2, timeout=TIMEOUT, patience=60.0) as client:
+            while not self._ending.is_set():
+                begun = time.monotonic()
+                mean = client.predict(self._inputs).mean
+                self.answers.append((time.monotonic() - begun, mean))
+
+    def stop(self) -> None:
+        self._ending.set()
+        self.join(30.0)
+
+
+def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_missed(
+    domain: int, model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    inputs = load_model(model).training.inputs[:20]
+    with ros_context(domain) as node, validator(domain, model, tmp_path) as process:
+        status, heard = Status(node), residuals_heard(node)
+        status.wait_for_first()
+        planner = Planning(inputs)
+        with server(domain, model) as first:
+            assert wait_until(lambda: len(planner.answers) >= 10, 60.0)
+            status.wait_for_server()
+            with replaying(domain, rate=2.0):
+                assert wait_until(lambda: len(heard) >= 10, 60.0)
+                kill(first)
+                status.wait_for_message(f"predict_push: no answer within {TIMEOUT:g} s", 30.0)
+                with server(domain, model):
+                    process.wait_for_text("predict_push answers again after", 60.0)
+                    before = len(planner.answers)
+                    assert wait_until(lambda: len(planner.answers) > before + 10)
+                    planner.stop()
+                    logged = process.wait_for_text(WRITTEN, 120.0)
+    assert "requests were sent again" in logged and "none was given up" in logged
+    assert_same_as_offline(tmp_path, model)
+    said = capfd.readouterr().err
+    assert "predict_push_batch: no answer within 0.5 s, asking again" in said
+    assert "predict_push_batch: answers again after" in said and "requests went unanswered" in said
+    assert any(taken > TIMEOUT for taken, _ in planner.answers[5:])  # a request bridged the gap
+    assert all(np.array_equal(mean, planner.answers[0][1]) for _, mean in planner.answers)
+
+
+def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
+    with ros_context(domain) as node, PlannerClient(0.2, timeout=0.2, patience=0.5) as client:
+        with pytest.raises(
+            SystemExit, match=r"predict_push_batch is not offered within 0.5 s: does predict_server run"
+        ):
+            client.predict(np.array([[0.02, 0.1, 0.0]]))
+        node.create_service(
+            PredictPushBatch, "predict_push_batch", lambda request, response: time.sleep(1.5) or response
+        )
+        assert wait_until(client._batch.service_is_ready)
+        client._patience = 1.0
+        with pytest.raises(SystemExit, match=r"did not answer \d requests within 1 s"):
+            client.predict(np.array([[0.02, 0.1, 0.0]]))
+
+
+def test_answers_to_others_do_not_crowd_out_ones_own(domain: int):
+    """The middleware hands a client the answers to all of them: here 300, while it has no time to look."""
+    with ros_context(domain) as node:
+        node.create_service(PredictPush, "predict_push", lambda request, response: response)
+        other = node.create_client(PredictPush, "predict_push")
+        with ros_context(domain) as busy:
+            ours = PredictionClient(busy, timeout=60.0)
+            # Two clients known to the server, `other` and ours: to one that it does not know it would not answer.
+            assert wait_until(lambda: ours.server_is_there and node.count_clients("predict_push") == 2)
+            busy.executor.shutdown()  # nobody looks
+            answers: list[PredictPush.Response] = []
+            ours.ask(PredictPush.Request(), answers.append)
+            ours.work()
+            time.sleep(0.2)
+            for _ in range(300):
+                call(other, PredictPush.Request())
+            executor = SingleThreadedExecutor(context=busy.context)
+            executor.add_node(busy)
+            assert wait_until(lambda: executor.spin_once(0.0) or bool(answers), 50.0)
+            assert ours.timeouts == 0
+            executor.shutdown()
+
+
+# --- push_validator and push_replay ----------------------------------------------------------------------------------
+
+
+def test_a_killed_validator_leaves_what_it_measured_the_next_one_keeps_it_and_outlives_its_replay(
+    domain: int, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    windows, comparison = validate_recording(load_model(model), HEXAGON)
+    expected = {(w.push_id, w.index): (w, mean) for w, mean in zip(windows, comparison.mean, strict=True)}
+    with ros_context(domain) as node, server(domain, model):
+        heard = residuals_heard(node)
+        with validator(domain, model, tmp_path) as process:
+            Status(node).wait_for_server()
+            with replaying(domain, rate=2.0) as replay:
+                assert wait_until(lambda: len(heard) >= 20, 60.0)
+                kill(process)
+                published = len(heard)
+                replay.stop()
+        left = read_table(tmp_path / "residuals.csv")
+        assert not (tmp_path / "validation.json").exists()
+        assert published <= len(left) <= len(read_table(tmp_path / "pushes.csv")) < len(windows)
+        for row in range(len(left)):
+            window, mean = expected[left.push_id[row], int(left.covariates["window"][row])]
+            assert np.allclose(left.outcomes[row], window.displacement, rtol=0.0, atol=1e-12)
+            predicted = [left.covariates[f"predicted_{name}"][row] for name in ("dx", "dy", "dtheta")]
+            assert np.max(np.abs(np.array(predicted) - mean)) < 1e-9
+        for name in ("residuals.csv", "pushes.csv"):
+            assert push_predictor(["info", str(tmp_path / name)]) == 0
+        assert f"rows        {len(left)}" in capsys.readouterr().out
+
+        # The next one finds what is left; its replay is killed, which has nothing to write.
+        with validator(domain, model, tmp_path) as process:
+            status, before = Status(node), len(heard)
+            status.wait_for_server()
+            with replaying(domain, rate=2.0) as replay:
+                assert wait_until(lambda: len(heard) >= before + 20, 60.0)
+                kill(replay)
+            said = status.wait_for_message("no sample for over 5 s", 60.0)
+            assert "~/finish has it written" in said and status.values["state"] == "validating"
+            assert finish(node).success
+            (kept,) = tmp_path.glob("cut_off_*")
+            assert f"are in {kept}; it has no validation.json" in process.text()
+    assert {path.name for path in kept.iterdir()} == {"pushes.csv", "pushes.rig.yaml", "residuals.csv"}
+    assert len(read_table(kept / "residuals.csv")) == len(left)
+    assert not (tmp_path / "residuals.csv").exists()  # now there is the bag
+    assert 20 <= json.loads((tmp_path / "validation.json").read_text())["n_test"] < len(windows)
+
+
+def test_a_score_that_came_to_its_end_is_not_put_aside(tmp_path: Path):
+    (tmp_path / "pushes.csv").write_text("complete")
+    assert put_aside(tmp_path) is None and (tmp_path / "pushes.csv").exists()
+
+
+def test_lines_are_there_in_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A disk that takes the half of the third line."""
+    path, written = tmp_path / "lines", []
+
+    def write(descriptor: int, data: bytes) -> int:
+        written.append(data)
+        return real(descriptor, data if len(written) < 3 else data[:4])
+
+    real = whole_lines.os.write
+    monkeypatch.setattr(whole_lines.os, "write", write)
+    with pytest.raises(OSError, match=r"No space left.*lines"):
+        append_lines(path, ["first line", "second line", "third line", "fourth line"])
+    assert path.read_text() == "first line\nsecond line\n"
+    assert len(written) == 3

@@ -1,0 +1,149 @@
+"""Many clients, many hours: the benchmarks in their short form, and the parts that keep memory flat."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from ros_harness import REPOSITORY, free_domain, node_environment, ros_context, wait_until
+from synthetic import square_rig
+from test_live_validation import made_up_windows, predict
+
+from push_predictor.models.train import train_model
+from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.online import row_file
+from push_predictor.online.live_validation import LiveValidation
+from push_predictor.online.row_file import RowFile
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor_interfaces.srv import PredictPush
+
+
+def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run benchmarks/NAME.py in a domain of its own."""
+    domain = free_domain()
+    command = [sys.executable, f"benchmarks/{name}.py", "--domain", str(domain), *arguments]
+    return subprocess.run(
+        command, cwd=REPOSITORY, env=node_environment(domain), capture_output=True, text=True, timeout=400, check=False
+    )
+
+
+# --- many clients ----------------------------------------------------------------------------------------------------
+
+
+def test_many_clients_beside_a_deaf_and_a_stopped_one_are_all_answered():
+    """The long form: 50 clients, 10 minutes."""
+    done = benchmark("load", "--clients", "6", "--minutes", "0.05", "--every", "1")
+    told = done.stdout + done.stderr
+    assert done.returncode == 0, told
+    for service in ("predict_push", "predict_push_batch"):
+        line = next(line for line in told.splitlines() if line.startswith(f"{service} "))
+        asked, answered = map(int, re.findall(r"asked (\d+), answered (\d+)", line)[0])
+        assert asked == answered > 0 and "p99" in line and "lost without an error 0" in line
+    served = int(re.findall(r"it answered (\d+)", told)[0])
+    answered = sum(map(int, re.findall(r"answered (\d+): p50", told)))
+    assert served > answered  # also what the deaf and the stopped one asked, as far as it had left them
+    (grown,) = re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", told)
+    assert max(map(int, grown)) <= 0, told
+
+
+def test_answers_are_taken_though_the_executor_is_busy_with_samples():
+    """A turn of the executor hands over one answer; here it has no turn at all."""
+    domain = free_domain()
+    with ros_context(domain) as node:
+        node.create_service(PredictPush, "predict_push", lambda request, response: response)
+        context = Context()
+        context.init(args=[], domain_id=domain)
+        busy = Node("busy", context=context)
+        client = PredictionClient(busy, timeout=120.0)
+        assert wait_until(lambda: client.server_is_there and node.count_clients("predict_push") > 0)
+        answers: list[PredictPush.Response] = []
+        for _ in range(30):
+            client.ask(PredictPush.Request(), answers.append)
+
+        def all_answered() -> bool:
+            client.work()
+            return len(answers) == 30
+
+        assert wait_until(all_answered, 60.0), f"{len(answers)} answers"
+        assert (client.open, client.timeouts, client.problems) == (0, 0, [])
+        busy.destroy_node()
+        context.try_shutdown()
+
+
+# --- many hours ------------------------------------------------------------------------------------------------------
+
+
+def test_no_node_opens_files_or_starts_threads_while_recorded_hours_pass():
+    """The long form: 24 recorded hours. Seconds are too few to judge memory by."""
+    done = benchmark(
+        "endurance", "--minutes", "0.2", "--every", "0.1", "--warm-up", "0.12", "--most-growth", "60",
+        "--recording", "bags/hexagon_delrin",
+    )  # fmt: skip
+    told = done.stdout + done.stderr
+    assert done.returncode == 0, told
+    hours, rate = map(float, re.findall(r"([\d.]+) recorded hours in \d+ s: rate (\d+)", told)[0])
+    assert hours > 0.0 and rate > 1.0 and "behind by" in told
+    for node in ("predict_server", "push_validator", "push_replay", "push_validator, child 1"):
+        (line,) = [line for line in told.splitlines() if line.startswith(f"{node} ") and "after warm-up" in line]
+        assert max(map(int, re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", line)[0])) <= 0
+    assert max(map(int, re.findall(r"(\d+) descriptors\n", told))) < 60  # one a window soon meets the limit, and stays
+
+
+def test_a_window_and_its_answer_take_forty_bytes_of_memory():
+    """So a day of pushing without a break, 432 000 windows, takes less than 18 MB."""
+    windows = made_up_windows(3000)
+    model = train_model(windows_to_table(windows[:40]), square_rig(), "analytical", name="analytical")
+    prediction = predict(model, windows[0])
+    live = LiveValidation({"analytical": model})
+    live.record(0, live.add(windows[0]), prediction)
+    tracemalloc.start()
+    for window in windows[1:]:
+        live.record(0, live.add(window), prediction)
+    taken = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert taken / len(windows) < 40.0
+    assert len(live.windows) == 3000 and live.windows[2999].push_id == windows[2999].push_id
+    assert np.array_equal(live.windows[1234].displacement, windows[1234].displacement)
+
+
+def test_rows_come_back_from_the_file_as_they_went_in():
+    rows, expected = RowFile(), [bytes([k % 256]) * (k % 7) for k in range(500)]
+    for row in expected:
+        rows.append(row)
+    assert list(rows) == expected and rows[-1] == expected[-1] and rows[3:9] == expected[3:9]
+    with pytest.raises(IndexError):
+        rows[500]
+
+
+def test_rows_that_the_disk_does_not_take_stay_in_memory(monkeypatch: pytest.MonkeyPatch):
+    real: Any = os.pwrite
+
+    def full(descriptor: int, data: bytes, place: int) -> int:
+        if 10 <= place < 20:
+            raise OSError(28, "No space left on device")
+        return real(descriptor, data[:1] if place >= 30 else data, place)
+
+    monkeypatch.setattr(row_file.os, "pwrite", full)
+    rows, expected = RowFile(), [f"{k:05d}".encode() for k in range(10)]
+    for row in expected:
+        rows.append(row)
+    assert list(rows) == expected
+
+
+def test_a_file_of_rows_has_no_name_and_is_closed_with_its_owner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(row_file.tempfile, "tempdir", str(tmp_path))
+    before = len(os.listdir("/proc/self/fd"))
+    rows = RowFile()
+    rows.append(b"row")
+    assert not list(tmp_path.iterdir()) and len(os.listdir("/proc/self/fd")) == before + 1
+    del rows
+    assert len(os.listdir("/proc/self/fd")) == before

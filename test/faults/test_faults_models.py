@@ -1,0 +1,350 @@
+"""Model files that are damaged, forged, of another version, or replaced under a running server."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pickle
+import struct
+import threading
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import square_rig
+from test_extended_model import pushes, slippery
+from test_node_predict_server import GOOD, server_of
+
+from push_predictor.errors import ModelFileError
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import ExtendedBody, Prediction, PushModel
+from push_predictor.models.store.model_file import FORMAT_VERSION, load_model, save_model
+from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.train import train_model
+
+KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
+COPIES = 60  # of each kind; benchmarks/damaged_models.py makes as many as it is told
+MEMORY = 30 << 20  # bytes that reading a forged file may take
+ONES = np.ones(3)
+
+
+def trained() -> dict[str, PushModel]:
+    """A model of every kind of body."""
+    rows, rig = pushes(25), square_rig()
+    models = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
+    models["sparse"] = train_model(rows, rig, "vhgp", name="sparse", inducing=15)
+    body = ExtendedBody(models["gp"].body, AnalyticalPush(rig.outline, rig.pusher_radius), (slippery(0.1, 0.05),), ONES)
+    models["extended"] = replace(models["gp"], name="extended", body=body)
+    return models
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("models")
+    for name, model in trained().items():
+        save_model(model, folder / f"{name}.model")
+    return {name: folder / f"{name}.model" for name in KINDS}
+
+
+def told(model: PushModel) -> Prediction:
+    rows = pushes(4, seed=9)
+    return model.predict(rows.inputs, rows.duration, rows.covariates)
+
+
+def same(one: Prediction, other: Prediction) -> bool:
+    return np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
+
+
+def damaged(data: bytes, other: bytes, rng: np.random.Generator) -> bytes:
+    """A copy with flipped bits, cut, with a hole of zeros, or of which another file has overwritten the beginning."""
+    copy, at = bytearray(data), int(rng.integers(0, len(data)))
+    match int(rng.integers(0, 6)):
+        case 0:
+            del copy[at:]
+        case 1:
+            copy[at : at + 64] = bytes(len(copy[at : at + 64]))
+        case 2:
+            copy[:at] = other[:at]
+        case _:
+            for place in {at, *rng.integers(0, len(data), int(rng.integers(0, 3))).tolist()}:
+                copy[place] ^= 1 << int(rng.integers(0, 8))
+    return bytes(copy)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_copy_is_refused_or_answers_as_the_whole_one(
+    files: dict[str, Path], kind: str, tmp_path: Path
+) -> None:
+    whole, other = files[kind].read_bytes(), files["vhgp" if kind == "gp" else "gp"].read_bytes()
+    expected, rng, refused = told(load_model(files[kind])), np.random.default_rng(len(whole)), 0
+    path = tmp_path / "d.model"
+    for _ in range(COPIES):
+        path.write_bytes(data := damaged(whole, other, rng))
+        try:
+            model = load_model(path)
+        except ModelFileError as error:
+            refused += 1
+            assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
+        else:
+            assert data == whole or same(told(model), expected)  # the bits were in a part that says nothing
+    assert refused > 0.6 * COPIES
+
+
+def test_an_array_that_claims_to_be_smaller_is_refused(tmp_path: Path) -> None:
+    """One flipped bit makes doubles singles, half of the bytes are read, and no checksum has been looked at."""
+    path = tmp_path / "m.model"
+    model = train_model(pushes(300), square_rig(), "analytical", name="large")  # zipfile reads some kB ahead
+    save_model(model, path)
+    members = arrays_of(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in members.items():
+            archive.writestr(f"{name}.npy", npy(array))
+    assert same(told(load_model(path)), told(model))
+    data = path.read_bytes()
+    assert data.count(b"'<f8'") >= 3
+    at = data.index(b"'<f8'", data.index(b"outcomes.npy")) + 3
+    path.write_bytes(data[:at] + b"4" + data[at + 1 :])
+    with pytest.raises(ModelFileError, match=r"m\.model: .*Bad CRC-32 for file 'outcomes.npy'"):
+        load_model(path)
+
+
+def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_path: Path) -> None:
+    whole = files["gp"].read_bytes()
+    (tmp_path / "good.model").write_bytes(whole)
+    (tmp_path / "half.model").write_bytes(whole[: len(whole) // 2])
+    shelf = ModelShelf()
+    (problem,) = shelf.load_all([str(tmp_path)])
+    assert str(tmp_path / "half.model") in problem and shelf.names == ["gp"]
+
+
+# --- code ---------------------------------------------------------------------------------------------------------
+
+
+class _Payload:
+    """Unpickled, it makes a file."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self.mark,)
+
+
+def pickled(mark: Path) -> bytes:
+    return pickle.dumps(_Payload(mark))
+
+
+def objects(mark: Path) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.array([_Payload(mark)], dtype=object), allow_pickle=True)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("member", ["", "inputs.npy", "header.npy", "archive/data.pkl", "extra.npy"])
+@pytest.mark.parametrize("payload", [pickled, objects])
+def test_no_code_of_a_file_is_run(
+    files: dict[str, Path], member: str, payload: Callable[[Path], bytes], tmp_path: Path
+) -> None:
+    mark, path = tmp_path / "mark", tmp_path / "m.model"
+    if member:
+        write(path, {name: npy(array) for name, array in arrays_of(files["gp"]).items()} | {member: payload(mark)})
+    else:
+        path.write_bytes(payload(mark))
+    shelf = ModelShelf()
+    with pytest.raises(ModelFileError, match=r"m\.model: "):
+        shelf.load(path)
+    assert not mark.exists() and not len(shelf)
+    np.load(io.BytesIO(objects(mark)), allow_pickle=True)
+    assert mark.exists()  # it would have
+
+
+# --- forged files -------------------------------------------------------------------------------------------------
+
+
+def peak_of(load: Callable[[], object]) -> int:
+    tracemalloc.start()
+    try:
+        load()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("claimed", [100, 1 << 31])
+def test_a_member_that_unpacks_to_more_than_it_claims_costs_no_memory(tmp_path: Path, claimed: int) -> None:
+    path = tmp_path / "bomb.model"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("inputs.npy", bytes(100 << 20))
+    data = bytearray(path.read_bytes())
+    entry = data.rindex(b"PK\1\2")
+    data[entry + 24 : entry + 28] = struct.pack("<I", claimed)
+    path.write_bytes(data)
+
+    def load() -> None:
+        with pytest.raises(ModelFileError, match=r"bomb\.model: "):
+            load_model(path)
+
+    assert peak_of(load) < MEMORY
+
+
+@pytest.mark.parametrize("shape", [(10**9, 3), (10**18, 3), (-1, 3), (2**63, 2**63)])
+def test_an_array_that_claims_to_be_huge_costs_no_memory(
+    files: dict[str, Path], shape: tuple[int, ...], tmp_path: Path
+) -> None:
+    header = repr({"descr": "<f8", "fortran_order": False, "shape": shape}).ljust(117).encode() + b"\n"
+    path, members = tmp_path / "m.model", {name: npy(array) for name, array in arrays_of(files["gp"]).items()}
+    write(path, members | {"inputs.npy": b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header + bytes(2400)})
+
+    def load() -> None:
+        with pytest.raises(ModelFileError, match=r"m\.model: "):
+            load_model(path)
+
+    assert peak_of(load) < MEMORY
+
+
+LIES: list[tuple[str, tuple[Any, ...], Any]] = [
+    ("gp", ("format_version",), FORMAT_VERSION + 1),
+    ("gp", ("format_version",), 0),
+    ("gp", ("format_version",), True),
+    ("gp", ("format_version",), "5"),
+    ("gp", ("format",), "another model"),
+    ("gp", ("kind",), "forest"),
+    ("gp", ("provenance", "pushes"), float("inf")),
+    ("gp", ("covariates",), ["a", "b", "c", "d", "e"]),
+    ("gp", ("rig", "outline"), "[[0, 0], [1, 0]]"),
+    ("gp", ("body",), []),
+    ("gp", ("body", "scaling", "outcome_sd"), [0.0, 0.0, 0.0]),
+    ("gp", ("body", "scaling", "columns"), [10**9]),
+    ("gp", ("body", "regressions"), []),
+    ("gp", ("body", "regressions", 0, "log_noise_sd"), float("nan")),
+    ("gp", ("body", "regressions", 0, "log_noise_sd"), 1e300),
+    ("gp", ("body", "regressions", 0, "log_signal_sd"), 10**400),
+    ("gp", ("body", "regressions", 0, "log_lengthscales"), []),
+    ("gp", ("body", "regressions", 0, "family"), "unheard of"),
+    ("sparse", ("body", "regressions", 0, "log_signal_sd"), float("inf")),
+    ("sparse", ("body", "regressions", 0, "noise_mean"), 1e300),
+    ("sparse", ("body", "regressions", 0, "noise_log_sd"), 1e300),
+    ("analytical", ("rig", "pusher_radius"), "1e9"),
+    ("analytical", ("body", "length"), 1e-300),
+    ("analytical", ("body", "centre"), [1e300, 0.0]),
+    ("analytical", ("body", "contact_friction"), -1.0),
+    ("analytical", ("body", "covariance"), [[0.0] * 3] * 3),
+    ("analytical", ("body", "covariance"), [[float("nan")] * 3] * 3),
+]
+
+
+@pytest.mark.parametrize(("kind", "field", "value"), LIES, ids=[f"{k}-{f[-1]}-{n}" for n, (k, f, _) in enumerate(LIES)])
+def test_a_header_that_lies_is_refused(
+    files: dict[str, Path], kind: str, field: tuple[Any, ...], value: Any, tmp_path: Path
+) -> None:
+    arrays = arrays_of(files[kind])
+    place = header = json.loads(arrays["header"].tobytes())
+    for key in field[:-1]:
+        place = place[key]
+    place[field[-1]] = value
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    write(tmp_path / "m.model", {name: npy(array) for name, array in arrays.items()})
+    assert ("update it" in refused_in_time(tmp_path / "m.model")) == (
+        field == ("format_version",) and value == FORMAT_VERSION + 1
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "change"),
+    [
+        ("analytical", "inputs", lambda a: a * 1e300),
+        ("analytical", "duration", lambda a: a + 1e9),
+        ("analytical", "outcomes", lambda a: a * np.nan),
+        ("gp", "outcomes", lambda a: a[:-1]),
+        ("gp", "inputs", lambda a: a[None]),
+        ("gp", "push_of_row", lambda a: a + 10**6),
+        ("vhgp", "site_precisions_0", lambda a: -a),
+        ("vhgp", "site_precisions_0", lambda a: a * 1e300),
+        ("sparse", "site_precisions_1", lambda a: a * np.nan),
+        ("sparse", "inducing_signal_0", lambda a: a + 10**6),
+        ("sparse", "inducing_signal_0", lambda a: a * 0),
+        ("sparse", "inducing_noise_2", lambda a: a[None]),
+        ("extended", "effect_covariance_0", lambda a: -a),
+        ("extended", "effect_covariance_0", lambda a: a[:0]),
+    ],
+)
+def test_an_array_that_lies_is_refused(
+    files: dict[str, Path], kind: str, name: str, change: Callable[[np.ndarray], np.ndarray], tmp_path: Path
+) -> None:
+    arrays = arrays_of(files[kind])
+    arrays[name] = change(arrays[name])
+    write(tmp_path / "m.model", {name: npy(array) for name, array in arrays.items()})
+    refused_in_time(tmp_path / "m.model")
+
+
+def refused_in_time(path: Path) -> str:
+    """Why the file is not served; a load that never ends is a failure too."""
+    problems: list[str] = []
+    loading = threading.Thread(target=lambda: problems.extend(ModelShelf().load_all([str(path)])), daemon=True)
+    loading.start()
+    loading.join(20.0)
+    assert not loading.is_alive()
+    assert len(problems) == 1 and problems[0].startswith(f"{path}: ")
+    return problems[0]
+
+
+@pytest.mark.parametrize("place", ["~nobody_of_that_name/x", "a\0b", "x" * 300, "loop/x", "/dev/zero", "pipe"])
+def test_a_path_that_leads_nowhere_is_told_and_blocks_nothing(
+    files: dict[str, Path], place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    Path("loop").symlink_to("loop")
+    shelf, problems = ModelShelf(), []
+    loading = threading.Thread(target=lambda: problems.extend(shelf.load_all([place, str(files["gp"])])), daemon=True)
+    loading.start()
+    loading.join(20.0)
+    assert not loading.is_alive()
+    assert len(problems) == 1 and place[:100].replace("\0", "\\x00").rstrip("/x") in problems[0]
+    assert shelf.names == ["gp"]
+
+
+# --- under a running server ---------------------------------------------------------------------------------------
+
+
+def test_a_file_overwritten_under_a_server_changes_nothing_until_it_is_loaded_whole(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path, new = tmp_path / "served.model", files["analytical"].read_bytes()
+    path.write_bytes(files["gp"].read_bytes())
+    with server_of([path]) as server:
+        before = list(server.push().mean)
+        for written in (0, 40, len(new) // 2, len(new) - 1):  # in place, as a copy that is going on
+            path.write_bytes(new[:written])
+            assert list(server.push().mean) == before
+            refused = server.load(path, name="gp")
+            assert not refused.success and refused.message.startswith(f"{path}: "), refused.message
+            assert list(server.push(GOOD).mean) == before
+        path.write_bytes(new)
+        assert list(server.push().mean) == before
+        assert server.load(path, name="gp").success
+        assert list(server.push().mean) != before
+
+
+def arrays_of(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def npy(array: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=False)
+    return stream.getvalue()
+
+
+def write(path: Path, members: dict[str, bytes]) -> None:
+    """A zip of these; an array's name may come without its ending."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in {n if "." in n else f"{n}.npy": d for n, d in members.items()}.items():
+            archive.writestr(name, data)

@@ -1,0 +1,309 @@
+"""Strangers on the network, and the health that nodes state: what happens with real nodes over DDS.
+
+Other machines are network namespaces joined by a cable; where these cannot be made, the test says so and is skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+from ros_harness import (
+    REPOSITORY,
+    acquaint,
+    call,
+    free_domain,
+    node_environment,
+    node_process,
+    ros_context,
+    wait_until,
+)
+
+from push_predictor.nodes.network_security import DISCOVERY, RANGE, limit_discovery
+from push_predictor_interfaces.srv import Resume
+
+NODES = {"predict_server": "push_predictor", "push_replay": "push_replay", "push_validator": "push_validator"}
+BAG = REPOSITORY / "bags" / "square_abs_test"
+SHORT = {"play.playback_duration.sec": 1, "play.exclude_topics_to_filter": ["surface/temperature"]}
+
+
+# --- security that the middleware does not have ----------------------------------------------------------------------
+
+
+def refused(executable: str, **environment: str) -> str:
+    """What a node prints that ends with status 1 and one line."""
+    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}"]
+    parameters = ["--ros-args", "-p", f"recording:={BAG}"] if executable == "push_replay" else []
+    done = subprocess.run(
+        [*command, *parameters],
+        env={**node_environment(free_domain()), **environment},
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+    )
+    assert (done.returncode, done.stdout) == (1, ""), done.stderr
+    assert done.stderr.count("\n") == 1 and done.stderr.startswith(f"{executable}: "), done.stderr
+    return done.stderr
+
+
+ENFORCED = {"ROS_SECURITY_STRATEGY": "Enforce", "ROS_SECURITY_KEYSTORE": str(REPOSITORY)}
+
+
+@pytest.mark.parametrize(
+    ("executable", "given"), [("predict_server", {}), ("push_replay", ENFORCED), ("push_validator", {})]
+)
+def test_a_node_that_should_be_secured_and_cannot_be_refuses_to_start(executable: str, given: Mapping[str, str]):
+    """Where it is not enforced, rcl alone would go on without a word, open to everybody."""
+    said = refused(executable, ROS_SECURITY_ENABLE="true", **given)
+    assert "built without DDS security" in said and "ROS_SECURITY_ENABLE=true" in said
+
+
+def test_a_word_that_ros_takes_for_no_is_refused_too():
+    """To rcl `True` is not `true`: it would not even look for security."""
+    assert "ROS_SECURITY_ENABLE=True secures nothing" in refused("push_validator", ROS_SECURITY_ENABLE="True")
+
+
+# --- discovery -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("outside", "limited"),
+    [({}, True), ({RANGE: ""}, True), ({RANGE: "SUBNET"}, False), ({"ROS_STATIC_PEERS": "10.0.0.1"}, False)],
+)
+def test_a_node_keeps_to_this_machine_unless_the_environment_tells_how_far_to_look(
+    outside: Mapping[str, str], limited: bool, monkeypatch: pytest.MonkeyPatch
+):
+    for name in DISCOVERY:
+        monkeypatch.delenv(name, raising=False)
+    for name, value in outside.items():
+        monkeypatch.setenv(name, value)
+    assert limit_discovery() == limited
+    assert os.environ.get(RANGE) == ("LOCALHOST" if limited else outside.get(RANGE))
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True, text=True, timeout=10.0)
+
+
+@contextmanager
+def two_machines() -> Iterator[tuple[str, str]]:
+    """Two network namespaces with a cable between them."""
+    names = [f"push{os.getpid()}{end}" for end in "ab"]
+    try:
+        for name in names:
+            ip("netns", "add", name)
+        cables = [f"v{os.getpid()}{end}" for end in "ab"]
+        ip("link", "add", cables[0], "netns", names[0], "type", "veth", "peer", "name", cables[1], "netns", names[1])
+        for k, (name, cable) in enumerate(zip(names, cables, strict=True)):
+            ip("-n", name, "address", "add", f"10.213.57.{k + 1}/24", "dev", cable)
+            for link in ("lo", cable):
+                ip("-n", name, "link", "set", link, "up")
+            ip("-n", name, "route", "add", "default", "dev", cable)
+        yield names[0], names[1]
+    except (FileNotFoundError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"network namespaces cannot be made here: {getattr(error, 'stderr', error)}")
+    finally:
+        for name in names:
+            subprocess.run(["ip", "netns", "delete", name], capture_output=True)
+
+
+LOOK = """
+import sys, time, rclpy
+rclpy.init()
+node, end = rclpy.create_node("stranger"), time.monotonic() + float(sys.argv[1])
+while time.monotonic() < end and "push_validator" not in node.get_node_names():
+    time.sleep(0.05)
+print("push_validator" in node.get_node_names())
+"""
+
+
+def on(machine: str, environment: Mapping[str, str], *command: str, **how: Any) -> subprocess.Popen[str]:
+    unset = [word for name in DISCOVERY for word in ("-u", name)]
+    words = ["ip", "netns", "exec", machine, "env", *unset, *(f"{k}={v}" for k, v in environment.items()), *command]
+    # Without shared memory, which network namespaces have in common, and with it all tests in a domain of this number.
+    alone = {**node_environment(DOMAIN), "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+    return subprocess.Popen(words, env=alone, cwd=REPOSITORY, text=True, **how)
+
+
+DOMAIN = 57  # these machines have no other nodes
+
+
+def finds(machine: str, patience: float) -> bool:
+    """Does somebody on this machine, who looks as far as ROS does by default, find the validator?"""
+    stranger = on(machine, {}, sys.executable, "-c", LOOK, str(patience), stdout=subprocess.PIPE)
+    out, _ = stranger.communicate(timeout=60.0)
+    return "True" in out
+
+
+@pytest.mark.parametrize("asked", [{}, {RANGE: "SUBNET"}], ids=["as it is", "asked for the network"])
+def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[str, str], tmp_path: Path):
+    log = tmp_path / "log"
+    with two_machines() as (here, there), log.open("w") as output:
+        command = (sys.executable, "-m", "push_predictor.nodes.push_validator")
+        node = on(here, asked, *command, stdout=output, stderr=output)
+        try:
+            assert wait_until(lambda: "waiting for" in log.read_text()), log.read_text()
+            assert asked or finds(here, 25.0)  # who looks far on the same machine finds it in any case
+            assert finds(there, 25.0 if asked else 3.0) == bool(asked)
+        finally:
+            node.terminate()
+            node.wait(30.0)
+    assert ("other machines cannot find this node" in log.read_text()) == (not asked)
+
+
+# --- health and policy: three nodes, /clock standing still ------------------------------------------------------------
+
+
+@dataclass
+class Listener:
+    """When each node stated its health, by its own clock, and in which state it was."""
+
+    heard: dict[str, list[tuple[float, str]]] = field(default_factory=dict)
+
+    def __call__(self, message: DiagnosticArray, info: Mapping[str, int]) -> None:
+        for status in message.status:
+            state = {pair.key: pair.value for pair in status.values}["state"]
+            node = status.name.split(":")[0].strip("/")
+            self.heard.setdefault(node, []).append((1e-9 * info["source_timestamp"], state))
+
+    def in_state(self, node: str, state: str) -> list[float]:
+        return [when for when, said in self.heard.get(node, []) if said == state]
+
+
+@dataclass(frozen=True)
+class Graph:
+    """The three nodes, idle and with /clock standing still."""
+
+    node: Node
+    listener: Listener
+
+    def change(self, transition: int) -> None:
+        client = self.node.create_client(ChangeState, "/push_predictor/change_state")
+        acquaint(self.node, "/push_predictor")  # a transition that is asked for twice is refused
+        assert call(client, ChangeState.Request(transition=Transition(id=transition))).success
+
+
+@pytest.fixture(scope="module")
+def graph() -> Iterator[Graph]:
+    params: dict[str, dict[str, Any]] = {
+        "predict_server": {"autostart": False, "introspection": "metadata"},
+        "push_replay": {"recording": BAG, "play.start_paused": True, "play.clock_publish_frequency": 0.0, **SHORT},
+        "push_validator": {},
+    }
+    domain = free_domain()
+    with ExitStack() as stack:
+        node = stack.enter_context(ros_context(domain))
+        listener = Listener()
+        node.create_subscription(DiagnosticArray, "/diagnostics", listener, 100)
+        for executable, given in params.items():
+            given = {"use_sim_time": True, **given}
+            stack.enter_context(node_process(executable, domain=domain, params=given))
+        assert wait_until(lambda: set(listener.heard) == set(NODES.values())), listener.heard
+        yield Graph(node, listener)
+
+
+def assert_every_second(graph: Graph, node: str, state: str) -> None:
+    """Statements of this state, a second apart; the first may be late by what the change took."""
+    assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 8, 60.0), graph.listener.heard
+    gaps = np.diff(graph.listener.in_state(node, state)[1:8])
+    assert 0.75 < np.median(gaps) < 1.75, gaps
+
+
+def test_every_node_states_its_health_once_a_second_also_where_it_has_nothing_to_do(graph: Graph):
+    assert_every_second(graph, "push_predictor", "unconfigured")
+    assert_every_second(graph, "push_validator", "waiting for samples")
+    assert_every_second(graph, "push_replay", "paused")
+
+
+RULES = {
+    ("topics", "publish"), ("topics", "subscribe"), ("services", "reply"), ("services", "request"),
+    ("actions", "execute"),
+}  # fmt: skip
+
+
+def permissions(ns: str = "/") -> dict[str, dict[tuple[str, str], set[str]]]:
+    """By node: what config/sros2_policy.xml allows, {(what, how): full names}."""
+    root = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
+    allowed: dict[str, dict[tuple[str, str], set[str]]] = {}
+    for enclave in root.findall("enclaves/enclave"):
+        for profile in enclave.findall("profiles/profile"):
+            node, rules = profile.attrib["node"], allowed.setdefault(profile.attrib["node"], {})
+            assert profile.attrib["ns"] == ns and enclave.attrib["path"].startswith("/push_predictor/")
+            for group in profile:
+                for how, verdict in group.attrib.items():
+                    assert verdict == "ALLOW" and (group.tag, how) in RULES
+                    names = rules.setdefault((group.tag, how), set())
+                    names |= {full_name(str(entry.text), node) for entry in group}
+    return allowed
+
+
+def full_name(name: str, node: str) -> str:
+    return name if name.startswith("/") else f"/{node}{name[1:]}" if name.startswith("~") else f"/{name}"
+
+
+def with_parts_of_actions(rules: Mapping[tuple[str, str], set[str]]) -> dict[str, set[str]]:
+    """By kind of entity, as the graph has them: an action is three services and two topics."""
+    actions = rules.get(("actions", "execute"), set())
+    topics = {f"{name}/_action/{part}" for name in actions for part in ("feedback", "status")}
+    services = {f"{name}/_action/{part}" for name in actions for part in ("send_goal", "cancel_goal", "get_result")}
+    return {
+        "publisher": rules.get(("topics", "publish"), set()) | topics,
+        "subscriber": rules.get(("topics", "subscribe"), set()),
+        "service": rules.get(("services", "reply"), set()) | services,
+        "client": rules.get(("services", "request"), set()),
+    }
+
+
+def used(node: Node, name: str) -> dict[str, set[str]]:
+    """What a node of the graph has, by kind of entity."""
+    found = {}
+    for kind in ("publisher", "subscriber", "service", "client"):
+        rows = getattr(node, f"get_{kind}_names_and_types_by_node")(name, "/")
+        found[kind] = {topic for topic, _ in rows}
+    return found
+
+
+def test_the_policy_allows_what_each_node_does_and_nothing_else(graph: Graph):
+    """Introspection and simulated time are on, so that what comes with them counts too."""
+    graph.change(Transition.TRANSITION_CONFIGURE)
+    assert wait_until(lambda: graph.node.count_services("/predict_push") > 0)
+    allowed = permissions()
+    assert allowed.keys() == set(NODES.values())
+    for name, rules in allowed.items():
+        wanted = with_parts_of_actions(rules)
+        wanted["subscriber"] -= set() if tf_is_there() else {"/tf", "/tf_static"}
+        if name == "push_validator":  # it listens to /clock itself where it dates scalar topics
+            assert "/clock" in wanted["subscriber"]
+        assert wait_until(lambda name=name, wanted=wanted: used(graph.node, name) == wanted, 30.0), (  # type: ignore[misc]  # bound at once
+            name,
+            {kind: names ^ wanted[kind] for kind, names in used(graph.node, name).items()},
+        )
+
+
+def tf_is_there() -> bool:
+    return subprocess.run([sys.executable, "-c", "import tf2_ros"], capture_output=True).returncode == 0
+
+
+def test_health_is_stated_in_the_other_states_too(graph: Graph):
+    assert_every_second(graph, "push_predictor", "inactive")
+    assert call(graph.node.create_client(Resume, "/push_replay/resume"), Resume.Request()) is not None
+    assert_every_second(graph, "push_replay", "finished")
+
+
+def test_the_harness_of_the_tests_keeps_to_this_machine():
+    assert ros_harness.node_environment(1)[RANGE] == "LOCALHOST"

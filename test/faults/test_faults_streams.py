@@ -1,0 +1,432 @@
+"""Streams that a lab really sees: what is wrong is counted by its kind, and no window is made of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from ros_harness import REPOSITORY
+from synthetic import START, Push, rows, translating_push, wrench_rows
+
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.windows.finder import WindowFinder
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.stream_faults import APART, FAULTS, clocks_apart, recording_faults
+from push_predictor.types import Array
+
+Stream = PoseStream | WrenchStream
+SECOND, DAY = 10**9, 86_400 * 10**9
+PERIOD = 25_000_000  # ns, the longest of all streams
+PLACES = st.floats(0.02, 0.98)
+SENSORS = ("slider", "pusher", "wrench")
+EXAMPLES = int(os.environ.get("FAULT_EXAMPLES", "8"))
+OFTEN = settings(max_examples=EXAMPLES, deadline=None, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+
+
+def taken(stream: Stream, keep: np.ndarray) -> Stream:
+    return rows(stream, keep) if isinstance(stream, PoseStream) else wrench_rows(stream, keep)
+
+
+def of(recording: Recording, name: str) -> Stream:
+    stream = getattr(recording, name)
+    assert isinstance(stream, (PoseStream, WrenchStream))
+    return stream
+
+
+def changed(recording: Recording, streams: Mapping[str, Stream]) -> Recording:
+    """With other streams."""
+    values: dict[str, Any] = dict(streams)
+    return replace(recording, **values)
+
+
+def found_in(recording: Recording) -> tuple[list[PushWindow], dict[str, int]]:
+    assert recording.rig is not None
+    finder = WindowFinder(recording.rig)
+    windows = finder.find(recording)
+    return windows, finder.counts
+
+
+def measured() -> Recording:
+    """The beginning of a recording with the noise and the resets of a rig."""
+    whole = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    until = whole.slider.stamp[0] + 10 * SECOND
+    assert whole.wrench is not None
+    slider, pusher = (rows(stream, stream.stamp < until) for stream in (whole.slider, whole.pusher))
+    return replace(whole, slider=slider, pusher=pusher, wrench=wrench_rows(whole.wrench, whole.wrench.stamp < until))
+
+
+@dataclass(frozen=True)
+class Clean:
+    recording: Recording
+    windows: list[PushWindow]
+
+    @property
+    def name(self) -> str:
+        return self.recording.name
+
+
+def clean(recording: Recording) -> Clean:
+    return Clean(recording, found_in(recording)[0])
+
+
+MADE_UP = clean(translating_push(Push(0.5, 3.0)))
+FORCELESS = clean(replace(MADE_UP.recording, wrench=None))
+MEASURED = clean(measured())
+CLEAN = {"made up": MADE_UP, "no wrench": FORCELESS, "measured": MEASURED}
+any_clean = st.sampled_from(list(CLEAN))
+with_wrench = st.sampled_from(["made up", "measured"])
+
+
+def test_the_clean_recordings_have_windows_to_lose() -> None:
+    assert [len(c.windows) for c in CLEAN.values()] >= [12, 12, 10]
+    assert max(np.hypot(*w.displacement[:2]) for c in CLEAN.values() for w in c.windows) > 0.003
+
+
+# --- what a true window is -------------------------------------------------------------------------------------------
+
+
+def numbers(window: PushWindow) -> list[float]:
+    return [window.velocity, window.contact, window.angle, window.duration, *window.displacement]
+
+
+def at(stream: PoseStream, stamps: Sequence[int]) -> Array:
+    """x, y, heading at stamps, from the samples around them."""
+    columns = (stream.x, stream.y, np.unwrap(stream.heading))
+    return np.column_stack([np.interp(np.array(stamps) - START, stream.stamp - START, column) for column in columns])
+
+
+def assert_true(windows: Sequence[PushWindow], truth: Clean, damaged: Sequence[tuple[int, int]], late: int = 0) -> None:
+    """Each window is one of the clean recording, or lies off the damage; all say what the clean recording saw.
+
+    damaged: from and to (ns). late: by how much (ns) the true time is ahead of the stamps.
+    """
+    known = {(w.start, w.end): w for w in truth.windows}
+    for window in windows:
+        same = known.get((window.start + late, window.end + late))
+        if same is not None and numbers(window) == pytest.approx(numbers(same), rel=0.0, abs=1e-9):
+            continue
+        touched = [d for d in damaged if window.start <= d[1] and d[0] <= window.end]
+        assert not touched, f"{window} spans {touched}"
+        ends = [window.start + late, window.end + late]
+        before, after = at(truth.recording.slider, ends)
+        moved, turned = window.displacement[:2], window.displacement[2]
+        assert np.hypot(*moved) == pytest.approx(np.hypot(*(after - before)[:2]), abs=1e-6)
+        assert turned == pytest.approx(after[2] - before[2], abs=1e-6)
+        tip = at(truth.recording.pusher, ends)[:, :2]
+        assert np.hypot(*moved) < 1.25 * np.hypot(*(tip[1] - tip[0])) + 0.002
+
+
+def place_in(stream: Stream, share: float, count: int = 1) -> int:
+    return int(share * (len(stream) - count - 1)) + 1
+
+
+# --- samples that are not used ---------------------------------------------------------------------------------------
+
+
+@OFTEN
+@given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, back=st.integers(2, 60))
+def test_a_sample_that_comes_late_is_not_used_and_counted(which: str, name: str, share: float, back: int) -> None:
+    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    place = min(place_in(stream, share), len(stream) - back - 8)
+    order = np.r_[0:place, place + 1 : place + back + 1, place, place + back + 1 : len(stream)]
+    windows, counts = found_in(changed(truth.recording, {name: taken(stream, order)}))
+    assert (counts["late"], counts[f"{name} late"], counts["refused"]) == (1, 1, 1)
+    assert_is_as_without(windows, truth, name, [place])
+
+
+@OFTEN
+@given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 40))
+def test_samples_that_come_twice_are_used_once(which: str, name: str, share: float, count: int) -> None:
+    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    place = place_in(stream, share, count)
+    order = np.r_[0 : place + count, place : len(stream)]
+    windows, counts = found_in(changed(truth.recording, {name: taken(stream, order)}))
+    assert (counts["repeated"], counts[f"{name} repeated"]) == (count, count)
+    assert list(map(numbers, windows)) == list(map(numbers, truth.windows))
+
+
+@OFTEN
+@given(
+    which=with_wrench,
+    name=st.sampled_from(SENSORS),
+    share=PLACES,
+    count=st.integers(1, 3),
+    ahead=st.sampled_from([5 * PERIOD, SECOND, 30 * SECOND, DAY, 3650 * DAY]),
+)
+def test_a_stamp_from_the_future_costs_its_own_sample_only(
+    which: str, name: str, share: float, count: int, ahead: int
+) -> None:
+    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    place = place_in(stream, share, 12)
+    stamp = stream.stamp.copy()
+    stamp[place : place + count] += ahead
+    windows, counts = found_in(changed(truth.recording, {name: replace(stream, stamp=stamp)}))
+    assert (counts["ahead"], counts[f"{name} ahead"], counts["clock_set_back"]) == (count, count, 0)
+    assert_is_as_without(windows, truth, name, range(place, place + count))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+@pytest.mark.parametrize("stamp", [0, START - 3 * DAY, START + 3 * DAY])
+def test_a_first_or_last_stamp_of_another_time_is_not_used(name: str, stamp: int) -> None:
+    stream = of(MADE_UP.recording, name)
+    for place in (0, len(stream) - 1):
+        stamps = stream.stamp.copy()
+        stamps[place] = stamp
+        windows, counts = found_in(changed(MADE_UP.recording, {name: replace(stream, stamp=stamps)}))
+        assert counts["refused"] == 1 and counts["clock_set_back"] == 0
+        assert list(map(numbers, windows)) == [pytest.approx(numbers(w), abs=1e-9) for w in MADE_UP.windows]
+
+
+@OFTEN
+@given(
+    which=any_clean,
+    name=st.sampled_from(["slider", "pusher"]),
+    share=PLACES,
+    count=st.integers(1, 3),
+    leap=st.floats(0.03, 2.0),
+    way=st.floats(-3.2, 3.2),
+)
+def test_a_tracker_that_leaps_there_and_back_costs_the_samples_elsewhere(
+    which: str, name: str, share: float, count: int, leap: float, way: float
+) -> None:
+    truth, stream = CLEAN[which], CLEAN[which].recording.__getattribute__(name)
+    place = place_in(stream, share, 12)
+    x, y = stream.x.copy(), stream.y.copy()
+    x[place : place + count] += leap * np.cos(way)
+    y[place : place + count] += leap * np.sin(way)
+    windows, counts = found_in(changed(truth.recording, {name: replace(stream, x=x, y=y)}))
+    assert counts[f"{name} jumps"] in (count, count + 1)  # one more where the slider itself was put elsewhere
+    assert_is_as_without(windows, truth, name, range(place, place + count))
+
+
+@OFTEN
+@given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 3))
+def test_a_number_that_is_none_costs_its_own_sample_only(which: str, name: str, share: float, count: int) -> None:
+    truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
+    place, column = place_in(stream, share, count), "fx" if name == "wrench" else "x"
+    values = getattr(stream, column).copy()
+    values[place : place + count] = np.nan
+    windows, counts = found_in(changed(truth.recording, {name: replace(stream, **{column: values})}))
+    assert (counts["not_finite"], counts[f"{name} not_finite"]) == (count, count)
+    assert_is_as_without(windows, truth, name, range(place, place + count))
+
+
+def assert_is_as_without(windows: list[PushWindow], truth: Clean, name: str, places: Sequence[int]) -> None:
+    """The windows are those of the recording without some samples, and true."""
+    stream = of(truth.recording, name)
+    left, _ = found_in(changed(truth.recording, {name: taken(stream, np.delete(np.arange(len(stream)), places))}))
+    assert [(w.push_id, w.start) for w in windows] == [(w.push_id, w.start) for w in left]
+    for found, expected in zip(windows, left, strict=True):
+        assert numbers(found) == pytest.approx(numbers(expected), rel=0.0, abs=1e-9)
+    if truth is not MEASURED:  # straight lines: what lies between the samples around is exact
+        stamps = stream.stamp[list(places)].tolist()
+        assert_true(windows, truth, [(stamp, stamp) for stamp in stamps])
+
+
+# --- damage that cuts a push -----------------------------------------------------------------------------------------
+
+
+@OFTEN
+@given(which=any_clean, name=st.sampled_from(SENSORS), share=PLACES, length=st.floats(0.13, 2.0))
+def test_a_dropout_of_any_stream_is_spanned_by_no_window(which: str, name: str, share: float, length: float) -> None:
+    truth = CLEAN[which]
+    if truth.recording.wrench is None and name == "wrench":
+        return
+    stream = of(truth.recording, name)
+    begin = stream.stamp[place_in(stream, share)]
+    gone = (stream.stamp > begin) & (stream.stamp < begin + length * SECOND)
+    windows, counts = found_in(changed(truth.recording, {name: taken(stream, ~gone)}))
+    after = stream.stamp[~gone & (stream.stamp > begin)]
+    if len(after):
+        assert counts[f"{name} dropouts"] >= 1
+    inside = (int(begin) + 1, int(after[0]) - 1 if len(after) else int(stream.stamp[-1]) + DAY)
+    assert_true(windows, truth, [inside])
+
+
+@OFTEN
+@given(
+    which=any_clean,
+    share=PLACES,
+    leap=st.floats(0.03, 0.5),
+    way=st.floats(-3.2, 3.2),
+    unseen=st.sampled_from([0.0, 0.1, 0.5]),
+    tip_too=st.booleans(),
+)
+def test_an_object_that_is_reset_in_mid_push_ends_it(
+    which: str, share: float, leap: float, way: float, unseen: float, tip_too: bool
+) -> None:
+    truth = CLEAN[which]
+    slider, pusher = truth.recording.slider, truth.recording.pusher
+    begin = int(slider.stamp[place_in(slider, share)])
+    end = begin + round(unseen * SECOND)
+
+    def put(stream: PoseStream) -> PoseStream:
+        late = stream.stamp > begin
+        x, y = stream.x + leap * np.cos(way) * late, stream.y + leap * np.sin(way) * late
+        return rows(replace(stream, x=x, y=y), (stream.stamp <= begin) | (stream.stamp > end))
+
+    reset = replace(truth.recording, slider=put(slider), pusher=put(pusher) if tip_too else pusher)
+    windows, counts = found_in(reset)
+    after = int(min(reset.slider.stamp[reset.slider.stamp > begin], default=begin + DAY))
+    if after < begin + DAY and not (tip_too and unseen):  # else it may have been pushed there
+        assert counts["resets"] >= 1
+    assert all(w.end <= begin + 1 or w.start >= after for w in windows)
+    if tip_too:
+        assert_true(windows, truth, [(begin + 1, after - 1)])
+    ids = [{w.push_id for w in windows if w.end <= begin}, {w.push_id for w in windows if w.start >= after}]
+    assert not ids[0] & ids[1] or (tip_too and unseen)
+
+
+@OFTEN
+@given(which=any_clean, share=PLACES, leap=st.floats(0.03, 0.5), way=st.floats(-3.2, 3.2))
+def test_a_tip_that_is_seen_elsewhere_from_one_sample_on_is_followed_by_no_window_across(
+    which: str, share: float, leap: float, way: float
+) -> None:
+    truth = CLEAN[which]
+    pusher = truth.recording.pusher
+    place = place_in(pusher, share)
+    late = np.arange(len(pusher)) > place
+    moved = replace(pusher, x=pusher.x + leap * np.cos(way) * late, y=pusher.y + leap * np.sin(way) * late)
+    windows, counts = found_in(replace(truth.recording, pusher=moved))
+    assert counts["pusher jumps"] >= 1
+    stamps = pusher.stamp[[place, place + 1]].tolist()
+    assert all(w.end <= stamps[1] or w.start >= stamps[0] for w in windows)
+    assert_true([w for w in windows if w.end <= stamps[0]], truth, [])
+
+
+@OFTEN
+@given(which=any_clean, share=PLACES, step=st.floats(0.1, 0.9))
+def test_a_clock_that_is_put_back_by_less_than_a_second_is_spanned_by_no_window(
+    which: str, share: float, step: float
+) -> None:
+    truth = CLEAN[which]
+    when = int(truth.recording.slider.stamp[place_in(truth.recording.slider, share)])
+    back = round(step * SECOND) + 1_234_567  # no stamp comes twice
+    names = [name for name in SENSORS if getattr(truth.recording, name) is not None]
+
+    def put_back(stream: Stream) -> Stream:
+        return replace(stream, stamp=np.where(stream.stamp > when, stream.stamp - back, stream.stamp))
+
+    windows, counts = found_in(changed(truth.recording, {name: put_back(of(truth.recording, name)) for name in names}))
+    if when < truth.recording.slider.stamp[-1] - 2 * SECOND:
+        assert counts["slider late"] >= 8
+    assert_true([w for w in windows if w.end <= when], truth, [])
+    assert_true([w for w in windows if w.end > when], truth, [(when - back, when)], late=back)
+
+
+# --- clocks ----------------------------------------------------------------------------------------------------------
+
+
+@OFTEN
+@given(which=any_clean, lag=st.floats(0.3, 8.0), sign=st.sampled_from([-1, 1]), force_too=st.booleans())
+def test_clocks_of_pusher_and_slider_that_are_apart_make_no_window_and_are_told(
+    which: str, lag: float, sign: int, force_too: bool
+) -> None:
+    recording, shift = CLEAN[which].recording, sign * round(lag * SECOND)
+    shifted = replace(recording, pusher=replace(recording.pusher, stamp=recording.pusher.stamp + shift))
+    if force_too and recording.wrench is not None:
+        shifted = replace(shifted, wrench=replace(recording.wrench, stamp=recording.wrench.stamp + shift))
+    windows, counts = found_in(shifted)
+    assert clocks_apart(shifted.pusher, shifted.slider) == pytest.approx(sign * lag, abs=0.05)
+    ahead = "ahead of" if sign > 0 else "behind"
+    assert any(f"{ahead} those of the slider" in text for text in recording_faults(shifted, counts))
+    for window in windows:
+        tip = at(shifted.pusher, [window.start, window.end])[:, :2]
+        driven, moved = np.hypot(*(tip[1] - tip[0])), np.hypot(*window.displacement[:2])
+        assert 0.25 * driven - 0.001 < moved < 1.25 * driven + 0.002, "the slider did not move with the tip"
+    if which != "measured":
+        assert windows == []
+
+
+@pytest.mark.parametrize("lag", [0.2, 0.4, 1.0])
+def test_a_tip_that_seems_to_go_into_the_slider_makes_no_window(lag: float) -> None:
+    recording, shift = translating_push(Push(2.0, 4.0)), round(lag * SECOND)
+    assert recording.wrench is not None
+    early = {name: replace(of(recording, name), stamp=of(recording, name).stamp - shift) for name in SENSORS[1:]}
+    windows, counts = found_in(changed(recording, early))
+    assert all(w.displacement[0] > 0.003 for w in windows), "the tip drove 4 mm in each"
+    assert counts["left_behind"] >= 1 and (lag < 0.3 or windows == [])
+    assert counts["inside"] == (lag > 0.3)
+
+
+def test_clocks_of_a_good_recording_are_not_apart() -> None:
+    for truth in CLEAN.values():
+        assert abs(clocks_apart(truth.recording.pusher, truth.recording.slider)) < APART
+        words = recording_faults(truth.recording, found_in(truth.recording)[1])
+        assert words == ([] if truth.recording.wrench is not None else [words[0]]), words
+    assert "geometry alone" in words[0] if (words := recording_faults(FORCELESS.recording, {})) else False
+
+
+@OFTEN
+@given(
+    which=any_clean,
+    cut=st.floats(0.3, 1.0),
+    to=st.floats(0.0, 0.25),
+    portion=st.integers(1, 90),
+    order=st.permutations(SENSORS),
+)
+def test_time_that_jumps_back_keeps_the_windows_of_both_times(
+    which: str, cut: float, to: float, portion: int, order: list[str]
+) -> None:
+    """As a replay does that is sought, or loops: what arrives first and in what portions does not matter."""
+    truth = CLEAN[which]
+    first = truth.recording.slider.stamp[0]
+    span = truth.recording.slider.stamp[-1] - first
+    jump, back = int(first + cut * span), int(first + to * span)
+    streams, until = {}, {}
+    for name in SENSORS:
+        if (stream := getattr(truth.recording, name)) is not None:
+            before, again = np.flatnonzero(stream.stamp <= jump), np.flatnonzero(stream.stamp >= back)
+            streams[name], until[name] = taken(stream, np.concatenate([before, again])), taken(stream, before)
+    assert truth.recording.rig is not None
+    finder = WindowFinder(truth.recording.rig)
+    add = {"slider": finder.add_slider, "pusher": finder.add_pusher, "wrench": finder.add_wrench}
+    windows: list[PushWindow] = []
+    longest = max(map(len, streams.values()))
+    for begin in range(0, longest, portion):
+        for name in order:
+            if name in streams:
+                share = slice(begin * len(streams[name]) // longest, (begin + portion) * len(streams[name]) // longest)
+                add[name](taken(streams[name], share))  # type: ignore[operator,arg-type] # one adder for each kind
+                if begin:  # those that come later still tell the old time
+                    windows += finder.take_ready()
+    windows += finder.finish()
+    assert_true(windows, truth, [])
+    if jump - back > 1.05 * SECOND:
+        assert finder.counts["clock_set_back"] == 1
+        expected = [w.start for w in found_in(changed(truth.recording, until))[0]]
+        assert [w.start for w in windows][: len(expected)] == expected
+        anew = [w for w in truth.windows if w.start >= back]
+        assert len(windows) - len(expected) >= len(anew) - 3  # a push that begins before it is tiled from there
+
+
+def test_one_clock_that_is_set_back_alone_does_not_stop_the_others() -> None:
+    recording = translating_push(Push(0.5, 90.0))
+    assert recording.rig is not None and recording.wrench is not None
+    finder = WindowFinder(recording.rig)
+    pusher = recording.pusher
+    late = pusher.stamp > START + 20 * SECOND
+    alone = replace(pusher, stamp=pusher.stamp - 5 * SECOND * late)
+    windows: list[PushWindow] = []
+    for begin in range(0, len(pusher), 100):
+        part = slice(begin, begin + 100)
+        finder.add_wrench(taken(recording.wrench, part))  # type: ignore[arg-type] # a slice does as well
+        finder.add_pusher(rows(alone, part))  # type: ignore[arg-type] # a slice does as well
+        finder.add_slider(rows(recording.slider, part))  # type: ignore[arg-type] # a slice does as well
+        windows += finder.take_ready()
+        assert sum(len(stamp) for _, stamp, _ in finder._later) < 10_000
+    windows += finder.finish()
+    assert finder.counts["clock_set_back"] == 1
+    assert_true(windows, clean(recording), [(START + 20 * SECOND, START + 1000 * SECOND)])
+
+
+def test_every_count_is_explained() -> None:
+    _, counts = found_in(MADE_UP.recording)
+    assert set(counts) == set(FAULTS)

@@ -1,0 +1,210 @@
+"""All faults of the streams in turn, over DDS, in simulated time that jumps back: what push_validator makes of them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from replay_bags import stamped
+from ros_harness import free_domain, node_process, ros_context, wait_until
+from rosgraph_msgs.msg import Clock
+from synthetic import START, Push, rows, square_rig, translating_push, wrench_rows
+from validator_bench import HEXAGON, Status
+
+from msg_adapters.stamps import ns_to_stamp
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.nodes.validator import stream_sync as stream_pace
+from push_predictor.nodes.validator.sensor_subscriber import Samples
+from push_predictor.nodes.validator.stream_sync import LAGS, StreamPace
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import read_table
+from push_predictor.recordings.windows.finder import WindowFinder
+from push_predictor.recordings.windows.push_window import windows_to_table
+
+SECOND, DAY = 10**9, 86_400 * 10**9
+TOPICS = {"slider": "slider/pose", "pusher": "pusher/pose", "wrench": "pusher/wrench"}
+PORTION = 10  # samples
+
+
+def clean(start: float) -> Recording:
+    """A push of a second, `start` s after the beginning."""
+    recording = translating_push(Push(0.5, 1.7))
+    assert recording.wrench is not None
+    streams = {name: getattr(recording, name) for name in TOPICS}
+    return replace(
+        recording,
+        **{n: replace(stream, stamp=stream.stamp + round(start * SECOND)) for n, stream in streams.items()},
+    )
+
+
+def with_slider(recording: Recording, order: np.ndarray) -> Recording:
+    return replace(recording, slider=rows(recording.slider, order))
+
+
+def altered(recording: Recording, sample: int, **values: float) -> Recording:
+    """One sample of the slider with other numbers."""
+    columns = {name: getattr(recording.slider, name).copy() for name in values}
+    for name, value in values.items():
+        columns[name][sample] = value
+    return replace(recording, slider=replace(recording.slider, **columns))
+
+
+def elsewhere(recording: Recording) -> Recording:
+    """The object and the tip are put 0.1 m to the side in mid push."""
+    late = np.arange(len(recording.slider)) > 110
+    slider, pusher = (replace(s, x=s.x + 0.1 * late) for s in (recording.slider, recording.pusher))
+    return replace(recording, slider=slider, pusher=pusher)
+
+
+def day() -> list[Recording]:
+    """What the sensors deliver, one push after another; at last the time jumps back to the beginning."""
+    n = np.arange(len(clean(0.0).slider))
+    future = clean(30.0)
+    stamp = future.slider.stamp.copy()
+    stamp[100] += DAY
+    return [
+        clean(0.0),
+        with_slider(clean(10.0), np.r_[n[:90], n[91:100], 90, n[100:]]),  # late
+        with_slider(clean(20.0), np.r_[n[:100], n[97:100], n[100:]]),  # three twice
+        replace(future, slider=replace(future.slider, stamp=stamp)),
+        with_slider(clean(40.0), np.r_[n[:100], n[130:]]),  # a dropout
+        altered(clean(50.0), 100, x=0.3, y=-0.2),  # there and back
+        altered(clean(60.0), 100, x=np.nan),
+        elsewhere(clean(70.0)),
+        clean(0.0),
+    ]
+
+
+class Sensors:
+    """Publishes recordings as a tracker, a robot and a force sensor would, with the time on /clock."""
+
+    def __init__(self, node: Node) -> None:
+        kinds = {"slider": PoseStamped, "pusher": PoseStamped, "wrench": WrenchStamped}
+        self._out: dict[str, Publisher] = {n: node.create_publisher(kinds[n], t, 5000) for n, t in TOPICS.items()}
+        self._clock = node.create_publisher(Clock, "/clock", 10)
+        for publisher in (*self._out.values(), self._clock):
+            assert wait_until(partial(_is_heard, publisher))
+
+    def send(self, recording: Recording, names: tuple[str, ...] = tuple(TOPICS), pause: float = 0.01) -> None:
+        longest = max(len(getattr(recording, name)) for name in names)
+        for first in range(0, longest, PORTION):
+            for name in names:
+                for message in messages(getattr(recording, name), slice(first, first + PORTION)):
+                    self._out[name].publish(message)
+            now = recording.pusher.stamp[min(first, len(recording.pusher) - 1)]
+            self._clock.publish(Clock(clock=ns_to_stamp(int(now))))
+            time.sleep(pause)
+
+
+def _is_heard(publisher: Publisher) -> bool:
+    return bool(publisher.get_subscription_count() > 0)
+
+
+def messages(stream: PoseStream | WrenchStream, part: slice) -> list[bytes]:
+    if isinstance(stream, WrenchStream):
+        columns = np.column_stack([stream.fx, stream.fy, *np.zeros((3, len(stream))), stream.torque])
+    else:
+        turn = 0.5 * stream.heading
+        zero = np.zeros_like(turn)
+        columns = np.column_stack([stream.x, stream.y, stream.z, zero, zero, np.sin(turn), np.cos(turn)])
+    return [stamped(int(s), row) for s, row in zip(stream.stamp[part], columns[part], strict=True)]
+
+
+def offline(recordings: list[Recording]) -> PushTable:
+    """The windows, as reading the recordings one after another finds them."""
+    finder = WindowFinder(square_rig())
+    windows = []
+    for recording in recordings:
+        assert recording.wrench is not None
+        finder.add_wrench(recording.wrench)
+        finder.add_pusher(recording.pusher)
+        finder.add_slider(recording.slider)
+        windows += finder.take_ready()
+    return windows_to_table([*windows, *finder.finish()])
+
+
+def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) -> None:
+    model, rig, out = tmp_path / "model.pushmodel", tmp_path / "square.rig.yaml", tmp_path / "out"
+    save_model(train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="any"), model)
+    save_rig(square_rig(), rig)
+    recordings = day()
+    expected_rows, domain = offline(recordings), free_domain()
+    params = {"model": model, "rig": rig, "output": out, "report": False, "diagnostics_period": 0.2}
+    with (
+        ros_context(domain) as node,
+        node_process("push_validator", domain=domain, params={**params, "use_sim_time": True}) as process,
+    ):
+        status, sensors = Status(node), Sensors(node)
+        status.wait_for_first()
+        for recording in recordings:
+            sensors.send(recording)
+        status.wait_for("streams clock_set_back", "1")
+        values = status.values
+        assert values["contact from"] == "geometry and force"
+        expected = {"late": 1, "repeated": 3, "ahead": 1, "jumps": 1}
+        assert {kind: int(values[f"slider {kind}"]) for kind in expected} == expected
+        assert {kind: int(values[f"streams {kind}"]) for kind in expected} == {**expected, "jumps": 2}, "the tip's too"
+        assert values["slider rejected not finite"] == "1"
+        assert values["streams resets"] == "8"  # one in mid push, and between the pushes
+        assert int(values["slider dropouts"]) >= 1 + 7  # and between the pushes, which lie 10 s apart
+        assert "1 ahead (samples whose stamp is ahead" in status.message
+        sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor is gone, the others go on
+        status.wait_for_message("the wrench is silent")
+        assert process.stop() == 0, process.text()
+    table = read_table(out / "pushes.csv")
+    assert len(expected_rows) > 30 and len(table) == len(expected_rows)
+    assert table.inputs == pytest.approx(expected_rows.inputs, abs=1e-9)
+    assert table.outcomes == pytest.approx(expected_rows.outcomes, abs=1e-9)
+    assert table.outcomes == pytest.approx(np.tile([0.004, 0.0, 0.0], (len(table), 1)), abs=1e-9), "what the tip drove"
+
+
+def portion(slider: int, pusher: int) -> Samples:
+    """One sample each at these times (ms)."""
+    recording = clean(0.0)
+    a, b = rows(recording.slider, np.array([0])), rows(recording.pusher, np.array([0]))
+    assert recording.wrench is not None
+    none = wrench_rows(recording.wrench, np.arange(0))
+    at = [np.array([START + ms * 1_000_000]) for ms in (slider, pusher)]
+    return Samples(replace(a, stamp=at[0]), replace(b, stamp=at[1]), none)
+
+
+@pytest.mark.parametrize(("lag", "told"), [(0, {}), (200, {}), (700, {"pusher": 0.7}), (-3000, {"pusher": -3.0})])
+def test_clocks_that_stay_apart_are_told_while_they_come(lag: int, told: dict[str, float]) -> None:
+    pace = StreamPace()
+    for k in range(LAGS - 1):
+        pace.note(portion(10 * k, 10 * k + lag))
+    assert pace.apart() == {} and not pace.problems(), "too early to tell"
+    pace.note(portion(10 * LAGS, 10 * LAGS + lag))
+    assert pace.apart() == pytest.approx(told, abs=0.011)
+    assert [("ahead of" if lag > 0 else "behind") in text for text in pace.problems()] == [True] * len(told)
+
+
+def test_a_stream_that_lags_now_and_then_is_not_apart() -> None:
+    pace = StreamPace()
+    for k in range(2 * LAGS):
+        pace.note(portion(10 * k, 10 * k - (2000 if k % 10 else 0)))
+    assert pace.apart() == {}
+
+
+def test_a_sensor_that_stops_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(stream_pace, "monotonic", lambda: now[0])
+    pace = StreamPace()
+    pace.note(portion(0, 0))
+    now[0] += 3.0
+    assert pace.silent() == [], "all have stopped: a pause"
+    none = rows(clean(0.0).pusher, np.arange(0))
+    pace.note(replace(portion(10, 10), pusher=none))
+    assert pace.silent() == ["pusher"]
+    assert "the pusher is silent" in pace.problems()[0]

@@ -1,0 +1,82 @@
+"""Learning curves on the measured square: VHGP against GP, and our GP against scikit-learn's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mit_square_fits import fit_scaled, load_square, mean_scores, random_split
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
+from push_predictor.models.gaussian_process.quadrature import gaussian_log_density
+
+
+@pytest.mark.parametrize(("n", "seeds", "gain"), [(100, 5, 0.10), (500, 1, 0.25), (1000, 1, 0.37)])
+def test_vhgp_has_a_better_density_than_gp_on_the_random_split(
+    measured_data: Path, n: int, seeds: int, gain: float
+) -> None:
+    gp = mean_scores(measured_data, "random", "gp", n, seeds)
+    vhgp = mean_scores(measured_data, "random", "vhgp", n, seeds)
+    assert vhgp.nlpd <= gp.nlpd - gain
+    assert vhgp.exact_nlpd < vhgp.nlpd
+
+
+def test_the_exact_density_of_vhgp_is_better_than_gp_on_pushes_never_seen(measured_data: Path) -> None:
+    gp = mean_scores(measured_data, "push", "gp", 100, 5)
+    vhgp = mean_scores(measured_data, "push", "vhgp", 100, 5)
+    assert vhgp.exact_nlpd < gp.nlpd
+
+
+# scikit-learn's homoscedastic GP on these very splits
+@pytest.mark.parametrize(
+    ("split", "n", "seeds", "nmse", "nlpd"),
+    [
+        ("random", 100, 5, 0.153, -17.40),
+        ("random", 500, 1, 0.115, -17.83),
+        ("random", 1000, 1, 0.115, -17.84),
+        ("push", 100, 5, 0.197, -17.09),
+        ("push", 1000, 5, 0.144, -17.53),
+    ],
+)
+def test_gp_scores_what_the_reference_scores(
+    measured_data: Path, split: str, n: int, seeds: int, nmse: float, nlpd: float
+) -> None:
+    gp = mean_scores(measured_data, split, "gp", n, seeds)
+    assert gp.nmse == pytest.approx(nmse, abs=0.002)
+    assert gp.nlpd == pytest.approx(nlpd, abs=0.02)
+
+
+@pytest.mark.parametrize("n", [100, 500])
+def test_gp_equals_scikit_learn_given_its_hyperparameters(measured_data: Path, n: int) -> None:
+    square = load_square(measured_data)
+    training, test = random_split(n, 0)
+    x, y = square.inputs[training], square.outputs[training]
+    scaled = (x - x.mean(axis=0)) / x.std(axis=0)
+    new = (square.inputs[test] - x.mean(axis=0)) / x.std(axis=0)
+    for k in range(3):
+        outputs = (y[:, k] - y[:, k].mean()) / y[:, k].std()
+        expected = (square.outputs[test, k] - y[:, k].mean()) / y[:, k].std()
+        kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
+        theirs = GaussianProcessRegressor(kernel, alpha=0.0).fit(scaled, outputs)
+        mean, sd = theirs.predict(new, return_std=True)
+        log_variance, *log_lengthscales, log_noise = theirs.kernel_.theta
+        parameters = GpParameters(np.array(log_lengthscales), log_variance / 2, log_noise / 2)
+        ours = GaussianProcess(scaled, outputs, parameters).predict(new)
+        nlpd = 0.5 * (np.log(2 * np.pi * sd**2) + ((expected - mean) / sd) ** 2).mean()
+        assert -gaussian_log_density(ours, expected).mean() == pytest.approx(nlpd, abs=1e-6)
+        np.testing.assert_allclose(ours.mean, mean, atol=1e-7)
+        np.testing.assert_allclose(ours.outcome_variance, sd**2, rtol=1e-6)
+
+
+def test_gp_finds_as_good_a_likelihood_as_scikit_learn(measured_data: Path) -> None:
+    square = load_square(measured_data)
+    training, _ = random_split(200, 0)
+    fitted = fit_scaled(square.inputs[training], square.outputs[training], "gp")
+    for ours in fitted.models:
+        kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
+        theirs = GaussianProcessRegressor(kernel, alpha=0.0).fit(ours.inputs, ours.outputs)
+        assert isinstance(ours, GaussianProcess)
+        assert ours.log_marginal_likelihood >= theirs.log_marginal_likelihood_value_ - 0.01

@@ -1,0 +1,74 @@
+"""The real measured data in the paper's tables: what is found of them, the rows the splits deal, the figures told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from push_predictor_paper.data.corpus import Corpus
+from push_predictor_paper.data.measured import measured_corpora
+from push_predictor_paper.estimate import by_push, total_nlpd, total_nmse
+from push_predictor_paper.fits.fits import Fit, SplitName, scores
+from push_predictor_paper.work import Work
+
+from push_predictor.evaluation.push_scores import pooled
+from push_predictor.evaluation.splits import FOLDS, random_split, split_by_push
+
+PAIR = ("rect1", "unknown")
+
+
+@pytest.fixture(scope="module")
+def found(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Corpus, ...]:
+    folder = tmp_path_factory.mktemp("paper")
+    return measured_corpora(measured_data, Work(folder / "work", cores=1), folder / "scratch")
+
+
+def test_the_square_is_found_with_the_counts_of_its_source(found: tuple[Corpus, ...]) -> None:
+    (square,) = found
+    table = square.sets[PAIR].table
+    assert (square.origin, square.reference) == ("measured", PAIR)
+    assert (len(table), len(table.pushes)) == (3500, 89)
+    assert set(table.inputs[:, 0]) == {0.02} and set(table.duration) == {0.2}
+    assert "3500 overlapping windows of 89 pushes" in square.title and "estimate" in square.title
+
+
+def test_one_push_of_a_hexagon_is_too_little_and_is_named(found: tuple[Corpus, ...]) -> None:
+    assert found[-1].notes[0].endswith("; left out: hex on plywood (too few; pushes: 1, windows: 1).")
+
+
+def test_the_splits_deal_the_rows_that_the_tables_of_the_docs_tell(found: tuple[Corpus, ...]) -> None:
+    table = found[0].sets[PAIR].table
+    push = np.unique(table.push_id.astype(np.int64), return_inverse=True)[1]
+    folds = np.random.default_rng(0).permutation(89)[push] % 5
+    order = np.random.default_rng(0).permutation(3500)
+    for k in range(FOLDS):
+        whole, rows = split_by_push(table, k), random_split(table, k)
+        others = np.flatnonzero(folds != k)
+        np.testing.assert_array_equal(whole.test, np.flatnonzero(folds == k))
+        np.testing.assert_array_equal(whole.training, others[np.random.default_rng(k).permutation(len(others))])
+        np.testing.assert_array_equal(rows.test, order[:1000])
+        np.testing.assert_array_equal(rows.training, order[1000:][np.random.default_rng(1000 + k).permutation(2500)])
+        assert not set(push[whole.training].tolist()) & set(push[whole.test].tolist())
+
+
+# NMSE and NLPD at n = 100, all tested rows together: docs/measured.md
+@pytest.mark.parametrize(
+    ("split", "kind", "nmse", "nlpd"),
+    [
+        ("random", "analytical", 0.221, -16.82),
+        ("random", "gp", 0.153, -17.40),
+        ("random", "vhgp", 0.148, -17.52),
+        ("push", "analytical", 0.228, -16.65),
+        ("push", "gp", 0.189, -17.09),
+        ("push", "vhgp", 0.180, -17.18),
+    ],
+)
+def test_a_fit_of_the_paper_scores_what_the_docs_tell(
+    found: tuple[Corpus, ...], tmp_path: Path, split: SplitName, kind: str, nmse: float, nlpd: float
+) -> None:
+    fits = [(PAIR, Fit(kind, 100, split, k)) for k in range(FOLDS)]
+    done = scores(Work(tmp_path, cores=1), found[0], fits)
+    tally = pooled([score.tally for score in done.values()])
+    assert by_push(tally, total_nmse).value == pytest.approx(nmse, abs=0.0015)
+    assert by_push(tally, total_nlpd).value == pytest.approx(nlpd, abs=0.015)

@@ -1,0 +1,297 @@
+"""The correlation of the outputs: what it is everywhere, and whether it is found where there is one, and only there."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from synthetic import square_rig
+
+from push_predictor.errors import ModelFileError
+from push_predictor.evaluation.metrics import joint_nlpd
+from push_predictor.models import correlation_fit
+from push_predictor.models.correlation import Correlation, correlated, correlations, covariances
+from push_predictor.models.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.gaussian_process.cross_validation import moments_left_out
+from push_predictor.models.gaussian_process.gp import GaussianProcess
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
+from push_predictor.models.predictors import ExtendedBody, LearnedBody, scaled_features
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+PER_PUSH = 4
+
+
+def pushes(n: int, seed: int, strength: float) -> PushTable:
+    """Smooth outcomes with noise whose correlation of dx and dtheta is strength times the sign of the angle."""
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([np.full(n, 0.02), rng.uniform(0.0, 0.25, n), rng.uniform(-1.0, 1.0, n)])
+    noise = rng.standard_normal((n, 3))
+    along = strength * np.sign(inputs[:, 2])
+    noise[:, 2] = along * noise[:, 0] + np.sqrt(1.0 - along**2) * noise[:, 2]
+    mean = np.column_stack([4e-3 * np.cos(inputs[:, 2]), 2e-3 * np.sin(inputs[:, 2]), 0.1 * (inputs[:, 1] - 0.12)])
+    push_id = np.array([f"p{k // PER_PUSH}" for k in range(n)])
+    return PushTable(inputs, np.full(n, 0.2), mean + noise * [2e-4, 2e-4, 4e-3], push_id)
+
+
+def trained(kind: str = "gp", strength: float = 0.8, n: int = 400) -> PushModel:
+    return train_model(pushes(n, 0, strength), square_rig(), kind, name="a")
+
+
+def correlation_of(model: PushModel) -> Correlation:
+    assert isinstance(model.body, LearnedBody) and model.body.correlation is not None
+    return model.body.correlation
+
+
+def alone(model: PushModel) -> LearnedBody:
+    """Its body with independent outputs."""
+    assert isinstance(model.body, LearnedBody)
+    return replace(model.body, correlation=None)
+
+
+def without(model: PushModel) -> PushModel:
+    return replace(model, body=alone(model))
+
+
+def of(model: PushModel, inputs: Array) -> Array:
+    """The correlation (n,) of dx and dtheta that a model's process has."""
+    c = model.predict(inputs, np.full(len(inputs), 0.2)).process_covariance
+    return np.asarray(c[:, 0, 2] / np.sqrt(c[:, 0, 0] * c[:, 2, 2]))
+
+
+@pytest.fixture(scope="module")
+def model() -> PushModel:
+    return trained()
+
+
+# --- what it is, wherever it is asked -------------------------------------------------------------------------------
+
+moderate = st.floats(-4.0, 4.0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    features=arrays(float, (12, 2), elements=moderate),
+    residuals=arrays(float, (12, 3), elements=moderate),
+    asked=arrays(float, (5, 2), elements=st.floats(-1e6, 1e6)),
+    bandwidth=st.floats(0.05, 5.0),
+    shrinkage=st.floats(0.1, 100.0),
+)
+def test_it_is_a_correlation_matrix_everywhere(
+    features: Array, residuals: Array, asked: Array, bandwidth: float, shrinkage: float
+) -> None:
+    found = Correlation(features, residuals, bandwidth, shrinkage).at(np.concatenate([asked, features]))
+    assert np.array_equal(found, found.transpose(0, 2, 1))
+    assert np.all(np.diagonal(found, axis1=1, axis2=2) == 1.0)
+    assert np.all(np.linalg.eigvalsh(found) > 0.0)
+
+
+def test_far_from_the_rows_the_outputs_are_independent(model: PushModel) -> None:
+    correlation = correlation_of(model)
+    far = np.array([[1e3, 0.0], [0.0, -1e3], [1e9, 1e9]])
+    assert np.array_equal(correlation.at(far), np.broadcast_to(np.eye(3), (3, 3, 3)))
+    assert np.all(correlation.at(correlation.features[:0]).shape == np.array((0, 3, 3)))
+
+
+def test_where_rows_are_many_it_is_theirs() -> None:
+    rng, r = np.random.default_rng(0), np.array([[1.0, 0.5, -0.6], [0.5, 1.0, 0.1], [-0.6, 0.1, 1.0]])
+    z = rng.multivariate_normal(np.zeros(3), r, 20_000)
+    found = Correlation(rng.standard_normal((20_000, 2)) * 0.1, z, 1.0, 2.0).at(np.zeros((1, 2)))[0]
+    assert found == pytest.approx(r, abs=0.03)
+
+
+def test_many_points_are_asked_in_parts(monkeypatch: pytest.MonkeyPatch, model: PushModel) -> None:
+    correlation = correlation_of(model)
+    asked = np.random.default_rng(1).standard_normal((500, 2))
+    whole = correlation.at(asked)
+    monkeypatch.setattr("push_predictor.models.correlation._WEIGHTS_AT_ONCE", 7 * len(correlation.features))
+    assert correlation.at(asked) == pytest.approx(whole, abs=1e-12)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    numbers=arrays(float, (4, 3), elements=st.floats(-6.0, 6.0)),
+    latent=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
+    process=arrays(float, (4, 3), elements=st.floats(1e-8, 1e2)),
+)
+def test_outcome_process_and_their_difference_are_covariances(numbers: Array, latent: Array, process: Array) -> None:
+    total, of_process = covariances(latent, process, bounded(numbers))
+    for covariance, variances in ((total, latent + process), (of_process, process), (total - of_process, latent)):
+        assert np.diagonal(covariance, axis1=1, axis2=2) == pytest.approx(variances, rel=1e-6)
+    for covariance in (total, of_process):
+        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        assert np.all(np.linalg.eigvalsh(covariance / sd[:, :, None] / sd[:, None, :]) > 0.0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
+def test_three_numbers_stand_for_a_correlation_matrix(numbers: Array) -> None:
+    matrices = bounded(numbers)
+    assert np.all(np.linalg.eigvalsh(matrices) > 0.0)
+    for one, matrix in zip(numbers, matrices, strict=True):
+        assert bounded_one(one.tolist()) == pytest.approx((matrix[0, 1], matrix[0, 2], matrix[1, 2]), abs=1e-12)
+    assert bounded(unbounded(matrices)) == pytest.approx(matrices, abs=1e-7)
+
+
+# --- what is learnt -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
+    model, angles = trained(kind), np.array([-0.8, -0.5, 0.5, 0.8])
+    inputs = np.column_stack([np.full(4, 0.02), np.full(4, 0.12), angles])
+    assert of(model, inputs) == pytest.approx(0.8 * np.sign(angles), abs=0.25)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_pushes_that_it_has_not_seen_are_likelier_with_it(kind: str) -> None:
+    model, new = trained(kind), pushes(400, 1, 0.8)
+    with_it, plain = (m.predict(new.inputs, new.duration) for m in (model, without(model)))
+    gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
+        with_it.mean, with_it.covariance, new.outcomes
+    )
+    assert 0.35 < gain.mean() < -0.5 * np.log(1.0 - 0.8**2) + 0.1  # what one would gain who knew the correlation
+    assert np.array_equal(with_it.mean, plain.mean)
+    for ours, theirs in (
+        (with_it.covariance, plain.covariance),
+        (with_it.process_covariance, plain.process_covariance),
+    ):
+        assert np.diagonal(ours, axis1=1, axis2=2) == pytest.approx(np.diagonal(theirs, axis1=1, axis2=2), rel=1e-12)
+
+
+def test_no_correlation_is_found_where_there_is_none() -> None:
+    model = trained(strength=0.0, n=240)
+    assert isinstance(model.body, LearnedBody)
+    scaling, found = model.body.scaling, 0
+    for seed in range(20):
+        table = pushes(240, seed, 0.0)
+        features = scaled_features(model.rig, scaling, table.inputs)
+        scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
+        regressions = tuple(
+            GaussianProcess(features, column, r.parameters)
+            for r, column in zip(model.body.regressions, scaled.T, strict=True)
+            if isinstance(r, GaussianProcess)
+        )
+        found += fit_correlation(replace(model.body, regressions=regressions), table.push_id) is not None
+    assert found <= 1
+
+
+def test_too_few_pushes_tell_nothing() -> None:
+    model = trained(n=FEWEST_PUSHES * PER_PUSH - 1 * PER_PUSH)
+    assert isinstance(model.body, LearnedBody) and model.body.correlation is None
+
+
+def test_no_residual_counts_for_more_than_is_expected_of_it(model: PushModel) -> None:
+    lengths = np.linalg.norm(correlation_of(model).residuals, axis=1)
+    assert lengths.max() == pytest.approx(LONGEST, rel=1e-6) and lengths.min() < 1.0
+
+
+# --- left out -------------------------------------------------------------------------------------------------------
+
+
+def test_left_out_is_what_the_other_blocks_say(model: PushModel) -> None:
+    correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH % 5
+    found = correlation.left_out(correlation.features, block)
+    for number in range(5):
+        out = block == number
+        others = Correlation(
+            correlation.features[~out], correlation.residuals[~out], correlation.bandwidth, correlation.shrinkage
+        )
+        assert found[out] == pytest.approx(others.at(correlation.features[out]), abs=1e-12)
+
+
+def test_of_many_rows_it_keeps_some(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(correlation_fit, "MOST_ROWS", 150)
+    monkeypatch.setattr(correlation_fit, "MOST_BLOCKS", 30)
+    model = trained()
+    correlation = correlation_of(model)
+    assert correlation.rows is not None and len(correlation.features) == 150
+    assert of(model, np.array([[0.02, 0.12, 0.6]]))[0] > 0.5
+    save_model(model, tmp_path / "m")
+    found = correlation_of(load_model(tmp_path / "m"))
+    assert isinstance(model.body, LearnedBody)
+    everywhere, block = model.body.regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
+    assert np.array_equal(found.left_out(everywhere, block), correlation.left_out(everywhere, block))
+    own = correlation.rows[7]
+    others = block[correlation.rows] != block[own]
+    expected = replace(correlation, features=correlation.features[others], residuals=correlation.residuals[others])
+    assert found.left_out(everywhere, block)[own] == pytest.approx(expected.at(everywhere[[own]])[0], abs=1e-12)
+
+
+def test_moments_left_out_are_full_ones(model: PushModel) -> None:
+    assert isinstance(model.body, LearnedBody)
+    correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH
+    mean, total, process = moments_left_out(model.body, block)
+    plain = moments_left_out(alone(model), block)
+    assert np.array_equal(mean, plain[0])
+    sd = np.sqrt(np.diagonal(plain[2], axis1=1, axis2=2))
+    assert process == pytest.approx(correlated(sd, correlation.left_out(correlation.features, block)), rel=1e-9)
+    assert np.all(np.linalg.eigvalsh(total - process) > 0.0)
+    assert np.abs(total[:, 0, 2]).max() > 0.0
+
+
+def test_the_sums_of_no_rows_are_independence() -> None:
+    assert np.array_equal(correlations(np.zeros((2, 6)), 3.0), np.broadcast_to(np.eye(3), (2, 3, 3)))
+
+
+# --- files ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_a_loaded_model_has_the_correlation_of_the_saved_one(kind: str, tmp_path: Path) -> None:
+    model = trained(kind)
+    save_model(model, tmp_path / "m")
+    loaded = load_model(tmp_path / "m")
+    assert isinstance(loaded.body, LearnedBody) and loaded.body.correlation is not None
+    inputs = model.training.inputs + [0.0, 0.01, 0.01]
+    push = Push(inputs, np.full(len(inputs), 0.2), {})
+    for ours, theirs in zip(model.body.moments(push), loaded.body.moments(push), strict=True):
+        assert np.array_equal(ours, theirs)
+
+
+def test_only_a_correlation_asks_for_version_5(model: PushModel, tmp_path: Path) -> None:
+    physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
+    tip = Effect("contact_friction", "velocity", Form("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3))
+    for body, version in ((model.body, 5), (alone(model), 1)):
+        assert isinstance(body, LearnedBody)
+        extended = ExtendedBody(body, physics, (tip,), np.array([1.0, 1.0, 2.0]))
+        for kind, least in ((body, 1), (extended, 3)):
+            save_model(replace(model, body=kind), tmp_path / "m")
+            with np.load(tmp_path / "m") as archive:
+                assert json.loads(archive["header"].tobytes())["format_version"] == max(version, least)
+            loaded = of(load_model(tmp_path / "m"), model.training.inputs)
+            expected = of(model, model.training.inputs) if version == 5 else np.zeros(len(loaded))
+            assert loaded == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"bandwidth": 0.0}, "bandwidth 0.0 of the correlation"),
+        ({"shrinkage": -1.0}, "shrinkage -1.0 of the correlation"),
+        ({"shrinkage": np.nan}, "shrinkage nan of the correlation"),
+        ({"residuals": np.zeros((7, 3))}, "residuals of the correlation are not 400 times three"),
+        ({"residuals": np.full((400, 3), np.inf)}, "residuals of the correlation are not 400 times three"),
+    ],
+)
+def test_a_damaged_correlation_is_refused_in_words(
+    model: PushModel, change: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    assert isinstance(model.body, LearnedBody)
+    damaged = replace(correlation_of(model), **change)  # type: ignore[arg-type]  # the point of the test
+    save_model(replace(model, body=replace(model.body, correlation=damaged)), tmp_path / "m")
+    with pytest.raises(ModelFileError, match=message):
+        load_model(tmp_path / "m")

@@ -1,0 +1,110 @@
+"""What a regression says of its own rows without their block, against the regression that never had them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import square_rig
+
+from push_predictor.models.gaussian_process.cross_validation import left_out, moments_left_out
+from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
+from push_predictor.models.gaussian_process.kernels import KernelChoice
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.models.gaussian_process.vhgp_bound import VhgpProblem
+from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, IntArray
+
+BLOCKS = 6
+TO = 1e-2  # nats, to which the noise of rows left over is solved for
+FIELDS = ("mean", "variance", "log_noise_mean", "log_noise_variance")
+
+
+def rows(n: int, seed: int = 0) -> tuple[Array, Array, IntArray]:
+    """Inputs, outputs whose noise grows along the first input, blocks of rows side by side."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.standard_normal((n, 2))
+    noise = np.exp(-1.5 + 0.8 * inputs[:, 0]) * rng.standard_normal(n)
+    return inputs, np.sin(inputs[:, 0]) + 0.5 * inputs[:, 1] + noise, np.arange(n) // 5 % BLOCKS
+
+
+def conditioned(regression: GaussianProcess | VHGP, inputs: Array, outputs: Array) -> GaussianProcess | VHGP:
+    """A regression's hyperparameters on other rows; the noise process of a VHGP is solved for on them.
+
+    Site precisions of other rows do not do: the noise's mean is a sum over all rows that nearly cancel.
+    """
+    if isinstance(regression, GaussianProcess):
+        return GaussianProcess(inputs, outputs, regression.parameters)
+    parameters = regression.parameters
+    bound = maximise_over_noise(VhgpProblem.of(inputs, outputs, parameters), None, TO)
+    return VHGP(inputs, outputs, parameters, bound.tied_precisions)
+
+
+def refitted(regression: GaussianProcess | VHGP, block: IntArray) -> dict[str, Array]:
+    """The same, from regressions that are solved for anew on the rows of the other blocks."""
+    found = {name: np.empty(len(block)) for name in FIELDS}
+    for number in range(BLOCKS):
+        out = block == number
+        without = conditioned(regression, regression.inputs[~out], regression.outputs[~out])
+        prediction = without.predict(regression.inputs[out])
+        for name in FIELDS:
+            found[name][out] = getattr(prediction, name)
+    return found
+
+
+@pytest.mark.parametrize("n", [120, 400], ids=["dense", "low rank"])
+def test_a_gp_without_a_block_is_the_gp_that_never_had_it(n: int) -> None:
+    inputs, outputs, block = rows(n)
+    regression = fit_gp(inputs, outputs)
+    found, expected = left_out(regression, block), refitted(regression, block)
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(found, name), expected[name], rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "choice", [KernelChoice(), KernelChoice("matern52", noise_nugget=True)], ids=["plain", "nugget"]
+)
+def test_a_vhgp_without_a_block_is_nearly_the_one_solved_for_without_it(choice: KernelChoice) -> None:
+    inputs, outputs, block = rows(300)
+    regression = fit_vhgp(inputs, outputs, choice, most_iterations=15)
+    found, expected = left_out(regression, block), refitted(regression, block)
+    sd = np.sqrt(expected["variance"] + np.exp(expected["log_noise_mean"]))
+    own = regression.predict(inputs)
+    for name, unit, most in (("mean", sd, 0.05), ("log_noise_mean", 1.0, 0.1)):
+        error = np.sqrt(np.mean(((getattr(found, name) - expected[name]) / unit) ** 2))
+        unaware = np.sqrt(np.mean(((getattr(own, name) - expected[name]) / unit) ** 2))
+        assert error < most and error < 0.5 * unaware, (name, error, unaware)
+    for name in ("variance", "log_noise_variance"):
+        ratio = getattr(found, name) / expected[name]
+        assert np.mean((ratio > 0.7) & (ratio < 1.4)) > 0.95, name
+
+
+def test_left_out_residuals_are_as_large_as_those_of_new_rows() -> None:
+    inputs, outputs, block = rows(300)
+    regression = fit_vhgp(inputs, outputs, most_iterations=15)
+    new_inputs, new_outputs, _ = rows(2000, seed=1)
+    old, new = left_out(regression, block), regression.predict(new_inputs)
+    size = np.std((outputs - old.mean) / np.sqrt(old.outcome_variance))
+    assert size == pytest.approx(np.std((new_outputs - new.mean) / np.sqrt(new.outcome_variance)), rel=0.1)
+
+
+def test_the_moments_of_a_body_are_those_of_its_regressions_in_si_units() -> None:
+    rng, n = np.random.default_rng(3), 80
+    inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
+    outcomes = rng.standard_normal((n, 3)) * [1e-3, 1e-3, 1e-2] + [4e-3, 0.0, 0.0]
+    push_id = np.array([f"push-{k // 4}" for k in range(n)])
+    body = train_model(PushTable(inputs, np.full(n, 0.2), outcomes, push_id), square_rig(), "gp", name="gp").body
+    assert isinstance(body, LearnedBody)
+    block = np.arange(n) // 4 % BLOCKS
+    found = moments_left_out(body, block)
+    for number in range(BLOCKS):
+        out = block == number
+        without = tuple(conditioned(r, r.inputs[~out], r.outputs[~out]) for r in body.regressions)
+        push = Push(inputs[out], np.full(int(out.sum()), 0.2), {})
+        for whole, part in zip(found, replace(body, regressions=without).moments(push), strict=True):
+            np.testing.assert_allclose(whole[out], part, rtol=1e-6, atol=1e-12)

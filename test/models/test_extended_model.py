@@ -1,0 +1,566 @@
+"""A model extended by effects: what it predicts, what it asks for, the file it lives in, and how effects are sized."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness as harness
+from synthetic import square_rig, translating_push
+
+from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
+from push_predictor.cli import main
+from push_predictor.errors import ModelFileError, RequestError
+from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.models.effects.covariate_range import range_of
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import KINDS, ExtendedBody, Prediction, PushModel
+from push_predictor.models.request import check_request, check_table
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.write import write_recording
+from push_predictor.residuals.extension.extension import extend, gain, refit_base
+from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
+
+NOISE = np.array([1e-4, 1e-4, 3e-3])
+DRIFT = Form("linear", ("elapsed_time",), (500.0,), (300.0,))
+WARMTH = Form("linear", ("topic:/warmth",), (0.0,), (1.0,))
+GRAIN = ("anisotropic_friction", "push_heading", Form("constant"))
+FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
+
+
+def physics() -> AnalyticalPush:
+    rig = square_rig()
+    return AnalyticalPush(rig.outline, rig.pusher_radius)
+
+
+def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
+    """Pushes of three windows, by the analytical model with these effects; the windows of a push share some noise."""
+    rng = np.random.default_rng(seed)
+    n = 3 * count
+    inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
+    duration = np.full(n, 0.2)
+    shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
+    outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
+    covariates = {
+        "elapsed_time": np.repeat(np.linspace(0.0, 1000.0, count), 3),
+        "topic:/warmth": np.repeat(rng.standard_normal(count), 3),
+        "slider_heading": rng.uniform(-np.pi, np.pi, n),
+    }
+    shift = sum((e.shift(physics(), Push(inputs, duration, covariates))[0] for e in effects), np.zeros((n, 3)))
+    push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
+    return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
+
+
+def slippery(size: float, sd: float = 0.0) -> Effect:
+    """A contact friction that changes by `size` in 300 s."""
+    return Effect("contact_friction", "elapsed_time", DRIFT, np.array([size]), np.array([[sd**2]]), np.ones(3))
+
+
+def grain(size: float) -> Effect:
+    return Effect(*GRAIN, np.array([size, 0.5 * size]), np.diag([1e-4, 1e-4]), np.ones(3))
+
+
+def extended(base: PushModel, *effects: Effect, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> PushModel:
+    return replace(base, body=ExtendedBody(base.body, physics(), effects, np.array(scale)))
+
+
+@pytest.fixture(scope="module")
+def bases() -> dict[str, PushModel]:
+    return {kind: train_model(pushes(40), square_rig(), kind, name=f"a_{kind}") for kind in KINDS}
+
+
+def predicted(model: Any, table: PushTable) -> Prediction:
+    return model.predict(table.inputs, table.duration, table.covariates)
+
+
+def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
+    for name in FIELDS:
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), **(precision or {"rtol": 0.0}))
+
+
+# --- what it predicts -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kind: str) -> None:
+    base, table = bases[kind], pushes(20, 1)
+    nothing = extended(base, slippery(0.0), grain(0.0).__class__(*GRAIN, np.zeros(2), np.zeros((2, 2)), np.ones(3)))
+    assert_same(predicted(nothing, table), predicted(base, table))
+    assert_same(predicted(serve(nothing), table), predicted(serve(base), table))
+    exact, own = nothing.exact_log_density(table), base.exact_log_density(table)
+    assert (exact is None) == (own is None) == (kind != "vhgp")
+    if exact is not None and own is not None:
+        np.testing.assert_allclose(exact, own, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_effects_shift_the_mean_and_add_what_they_are_unsure_of(bases: dict[str, PushModel], kind: str) -> None:
+    base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
+    model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
+    ours, theirs = predicted(model, table), predicted(base, table)
+    shifts, unsure = zip(*(effect.shift(physics(), push) for effect in effects), strict=True)
+    scale = np.diag([0.5, 1.0, 2.0])
+    np.testing.assert_allclose(ours.mean, theirs.mean + sum(shifts), rtol=1e-12)
+    np.testing.assert_allclose(ours.covariance, scale @ theirs.covariance @ scale + sum(unsure), atol=1e-18)
+    np.testing.assert_allclose(ours.process_covariance, scale @ theirs.process_covariance @ scale, atol=1e-18)
+
+
+def test_the_exact_density_is_that_of_the_base_where_the_effect_has_moved_it(bases: dict[str, PushModel]) -> None:
+    base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
+    shift, _ = effect.shift(physics(), Push(table.inputs, table.duration, table.covariates))
+    moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
+    np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
+
+
+def test_the_exact_density_has_the_variance_that_is_predicted(bases: dict[str, PushModel]) -> None:
+    model, one = extended(bases["vhgp"], slippery(0.2, sd=0.3), scale=(0.5, 1.0, 2.0)), pushes(3, 1).take([0])
+    prediction = predicted(model, one)
+    sd = np.sqrt(np.diagonal(prediction.covariance[0]))
+    steps = np.linspace(-12.0, 12.0, 4001)
+    rows = one.take(np.zeros(len(steps), dtype=int))
+    density = np.exp(model.exact_log_density(replace(rows, outcomes=prediction.mean + steps[:, None] * sd)))
+    weights = density * sd * (steps[1] - steps[0])
+    np.testing.assert_allclose(weights.sum(axis=0), 1.0, rtol=1e-6)
+    np.testing.assert_allclose((weights * steps[:, None] ** 2).sum(axis=0), 1.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_served_model_answers_one_push_as_it_answers_many(bases: dict[str, PushModel], kind: str) -> None:
+    model, table = extended(bases[kind], slippery(0.2, sd=0.1), grain(0.1)), pushes(5, 1)
+    served = serve(model)
+    assert served.tabulated == (kind != "analytical")
+    among = predicted(served, table)
+    for k in range(len(table)):
+        alone = predicted(served, table.take([k]))
+        for name in FIELDS:
+            np.testing.assert_allclose(getattr(alone, name)[0], getattr(among, name)[k], rtol=1e-7, atol=1e-12)
+    sd = np.sqrt(np.diagonal(among.covariance, axis1=1, axis2=2))
+    assert np.max(np.abs(among.mean - predicted(model, table).mean) / sd) < 1e-3
+
+
+def joint(model: PushModel, table: PushTable) -> np.ndarray:
+    """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
+    body = model.body
+    assert isinstance(body, ExtendedBody)
+    sizes = [len(effect.coefficients) for effect in body.effects]
+    ends = np.cumsum([0, *sizes])
+    whole = np.zeros((ends[-1], ends[-1]))
+    for k, effect in enumerate(body.effects):
+        whole[ends[k] : ends[k + 1], ends[k] : ends[k + 1]] = effect.covariance
+    for (i, j), shared in body.cross.items():
+        whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
+        whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
+    push = Push(table.inputs, table.duration, table.covariates)
+    design = np.concatenate([effect.design(physics(), push) for effect in body.effects], axis=2)
+    return design @ whole @ design.transpose(0, 2, 1)
+
+
+def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
+    """Two drivers that go together: neither coefficient is known, their sum is."""
+    table = pushes(100, 4, slippery(0.2))
+    slid = table.covariates["elapsed_time"] + np.repeat(40.0 * np.random.default_rng(5).standard_normal(100), 3)
+    table = replace(table, covariates={**table.covariates, "slid_distance": slid})
+    by_distance = replace(DRIFT, drivers=("slid_distance",))
+    terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
+    both = extend(refit_base(bases["analytical"], table), table, terms)
+    one = extend(refit_base(bases["analytical"], table), table, terms[:1])
+    assert isinstance(both.body, ExtendedBody) and isinstance(one.body, ExtendedBody)
+    push = Push(table.inputs, table.duration, table.covariates)
+    unsure, alone = both.body.shift(push)[1], one.body.shift(push)[1]
+    np.testing.assert_allclose(unsure, joint(both, table), rtol=1e-9, atol=1e-18)
+    apart = sum(effect.shift(physics(), push)[1] for effect in both.body.effects)
+    assert np.trace(unsure.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
+
+
+def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, PushModel], tmp_path: Path) -> None:
+    table = pushes(60, 4, slippery(0.2))
+    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+    first = extend(refit_base(bases["gp"], table), table, terms)
+    second = extend(first, table, [(None, "topic:/warmth", WARMTH), ("inertia", "model_inputs", Form("constant"))])
+    assert isinstance(first.body, ExtendedBody) and isinstance(second.body, ExtendedBody)
+    assert list(first.body.cross) == [(0, 1)] and list(second.body.cross) == [(0, 1), (2, 3)]
+    np.testing.assert_array_equal(first.body.cross[0, 1], second.body.cross[0, 1])
+    assert refit_base(second, table).body.cross == second.body.cross
+    save_model(second, tmp_path / "m")
+    loaded, probe = load_model(tmp_path / "m"), pushes(10, 3)
+    assert_same(predicted(loaded, probe), predicted(second, probe), rtol=1e-9, atol=1e-15)
+    unsure = second.body.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
+    np.testing.assert_allclose(unsure, joint(second, probe), rtol=1e-9, atol=1e-18)
+
+
+# --- where it has seen pushes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("answer", [lambda model: model, serve])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_covariate_far_from_what_was_seen_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
+    model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
+    inside = predicted(model, table).in_domain
+    np.testing.assert_array_equal(inside, predicted(answer(bases[kind]), table).in_domain)
+    assert inside.mean() > 0.8
+    for time in (-50.0, 1100.0):
+        late = replace(table, covariates={**table.covariates, "elapsed_time": np.full(58, time)})
+        assert not predicted(model, late).in_domain.any()
+        assert not predicted(model, late.take([0])).in_domain[0]
+    one_late = table.covariates["elapsed_time"].copy()
+    one_late[7] = 5000.0
+    some = predicted(model, replace(table, covariates={**table.covariates, "elapsed_time": one_late})).in_domain
+    np.testing.assert_array_equal(some, inside & (np.arange(58) != 7))
+    warm = replace(table, covariates={**table.covariates, "topic:/warmth": np.full(58, 1e6)})  # not needed
+    np.testing.assert_array_equal(predicted(model, warm).in_domain, inside)
+
+
+def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(extended(bases["gp"], slippery(0.1)), tmp_path / "m")
+    loaded, training = load_model(tmp_path / "m"), bases["gp"].training
+    assert predicted(loaded, training).in_domain.all()
+    late = replace(training, covariates={"elapsed_time": np.full(len(training), 1100.0)})
+    assert not predicted(loaded, late).in_domain.any()
+
+
+@pytest.mark.parametrize(
+    ("seen", "inside", "outside"),
+    [
+        ([-0.5, 0.0, 0.5], [-0.5, 0.2, 0.5, 0.5 + 2.0 * np.pi], [-0.6, 0.6, 3.0, -3.0]),
+        ([3.0, -3.0], [3.0, np.pi, -np.pi, -3.0, 3.1], [2.9, -2.9, 0.0]),
+        ([-2.0, 2.0, 3.1, -3.1], [2.0, 3.0, -2.5, -2.0], [0.0, 1.9, -1.9]),
+        ([0.3], [0.3], [0.31, 0.29, 0.3 + np.pi]),
+        (np.linspace(-np.pi, np.pi, 30), [-np.pi, 0.11, 3.0, 9.0], []),
+    ],
+)
+def test_headings_come_around(seen: list[float], inside: list[float], outside: list[float]) -> None:
+    known = range_of("slider_heading", np.array(seen))
+    assert known.holds(np.array(inside)).all()
+    assert not known.holds(np.array(outside)).any()
+
+
+def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]) -> None:
+    faster = Effect(
+        "inertia", "velocity", Form("linear", ("velocity",), (0.02,), (0.01,)), np.ones(1), np.eye(1), NOISE
+    )
+    sides = Form("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
+    tip = Effect("contact_friction", "edge", sides, np.array([0.1, 0.2, 0.3]), 1e-4 * np.eye(3), NOISE)
+    model, table = extended(bases["gp"], faster, tip), pushes(10, 1)
+    assert model.needs == ()
+    inputs = table.inputs * [2.0, 1.0, 1.0]
+    told = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
+    push = Push(inputs, table.duration, told)
+    shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
+    ours, theirs = (m.predict(inputs, table.duration).mean for m in (model, bases["gp"]))
+    np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
+    np.testing.assert_allclose(serve(model).predict(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
+
+
+# --- what it asks for -------------------------------------------------------------------------------------------
+
+
+def test_it_needs_what_drives_its_effects_and_what_their_mechanisms_take(bases: dict[str, PushModel]) -> None:
+    assert bases["gp"].needs == ()
+    assert extended(bases["gp"], slippery(0.1), grain(0.1), slippery(0.2)).needs == ("elapsed_time", "slider_heading")
+
+
+@pytest.mark.parametrize(
+    ("brought", "message"),
+    [
+        ({}, "covariate elapsed_time: 'missing' is not accepted, give a finite number, in s"),
+        ({"elapsed_time": np.nan}, "covariate elapsed_time: nan is not accepted, give a finite number, in s"),
+        ({"elapsed_time": 1.0, "other": np.inf}, "covariate other: inf is not accepted, give a finite number"),
+    ],
+)
+def test_a_request_without_what_it_needs_is_refused_by_name(
+    bases: dict[str, PushModel], brought: dict[str, float], message: str
+) -> None:
+    with pytest.raises(RequestError, match=message):
+        check_request(extended(bases["gp"], slippery(0.1)), 0.02, 0.1, 0.2, 0.2, brought)
+
+
+def test_what_it_does_not_need_is_no_matter(bases: dict[str, PushModel]) -> None:
+    check_request(extended(bases["gp"], slippery(0.1)), 0.02, 0.1, 0.2, 0.2, {"elapsed_time": 1.0, "other": 2.0})
+    table = pushes(5, 1)
+    table.covariates["topic:/warmth"][:] = np.nan
+    check_table(extended(bases["gp"], slippery(0.1)), table)
+
+
+def test_a_table_without_what_it_needs_is_refused_by_name(bases: dict[str, PushModel]) -> None:
+    with pytest.raises(RequestError, match="covariate elapsed_time: 'missing'"):
+        check_table(extended(bases["gp"], slippery(0.1)), replace(pushes(5, 1), covariates={}))
+
+
+# --- its file ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
+    generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
+    trained = extend(bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN])
+    body = trained.body
+    assert isinstance(body, ExtendedBody)
+    model = replace(trained, body=replace(body, effects=(*body.effects, generic), scale=np.array([0.9, 1.0, 1.1])))
+    save_model(model, tmp_path / "m")
+    loaded, table = load_model(tmp_path / "m"), pushes(10, 3)
+    assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
+    assert_same(predicted(loaded, table), predicted(model, table), rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(loaded.training.outcomes, model.training.outcomes)
+    loaded_json, ours = metrics_json(compare(loaded, table)), metrics_json(compare(model, table))
+    assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
+
+
+def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
+    apart = extended(bases["gp"], slippery(0.1), slippery(0.2))
+    assert isinstance(apart.body, ExtendedBody)
+    sharing = replace(apart, body=replace(apart.body, cross={(0, 1): np.zeros((1, 1))}))
+    for name, model, version in (("base", bases["gp"], 1), ("more", apart, 3), ("sharing", sharing, 4)):
+        save_model(model, tmp_path / name)
+        assert _header(tmp_path / name)["format_version"] == version
+
+
+@pytest.mark.parametrize(
+    ("pair", "shared", "message"),
+    [
+        ((0, 1), 2.0, "covariance of all effects is not positive semidefinite"),
+        ((0, 1), np.nan, "covariance of all effects: a number is not finite"),
+        ((0, 1), np.zeros((1, 2)), r"effects 0 and 1: covariance of shape \(1, 2\), \(1, 1\) is needed"),
+        ((1, 1), 0.0, "effects 1 and 1 of 2 share a covariance"),
+        ((0, 2), 0.0, "effects 0 and 2 of 2 share a covariance"),
+    ],
+)
+def test_a_damaged_shared_covariance_is_refused(
+    bases: dict[str, PushModel], pair: tuple[int, int], shared: Any, message: str, tmp_path: Path
+) -> None:
+    model = extended(bases["analytical"], slippery(0.1, sd=1.0), slippery(0.2, sd=1.0))
+    assert isinstance(model.body, ExtendedBody)
+    save_model(replace(model, body=replace(model.body, cross={pair: np.atleast_2d(shared)})), tmp_path / "m")
+    with pytest.raises(ModelFileError, match=message):
+        load_model(tmp_path / "m")
+
+
+def _header(path: Path) -> dict[str, Any]:
+    with np.load(path) as archive:
+        return dict(json.loads(archive["header"].tobytes()))
+
+
+DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "mechanism": (lambda e: e.update(mechanism="os.system"), "effect 1: mechanism 'os.system' is not in the library"),
+    "form": (lambda e: e["form"].update(name="eval"), "effect 1: form 'eval', known are constant, linear"),
+    "drivers": (lambda e: e["form"].update(drivers=[]), r"effect 1: form 'linear' with drivers \(\)"),
+    "scale": (lambda e: e["form"].update(scale=[0.0]), "effect 1: form 'linear' with a scale of zero"),
+    "number": (lambda e: e.update(coefficients=[float("nan")]), r"effect 1: coefficients \[nan\], 1 finite numbers"),
+    "size": (lambda e: e.update(coefficients=[1.0, 2.0]), r"effect 1: coefficients \[1.0, 2.0\], 1 finite numbers"),
+    "absent": (lambda e: e.pop("outcome_scale"), "effect 1: 'outcome_scale'"),
+    "driver": (lambda e: e["form"].update(drivers=["moon"]), "covariate moon, which the training rows do not hold"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_effect_is_refused_by_name(bases: dict[str, PushModel], damage: str, tmp_path: Path) -> None:
+    harm, message = DAMAGES[damage]
+    save_model(extended(bases["analytical"], grain(0.1), slippery(0.1)), tmp_path / "m")
+    with np.load(tmp_path / "m") as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    header = json.loads(arrays["header"].tobytes())
+    harm(header["body"]["effects"][1])
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    with (tmp_path / "m").open("wb") as stream:
+        np.savez(stream, **arrays)
+    with pytest.raises(ModelFileError, match=message):
+        load_model(tmp_path / "m")
+
+
+# --- its making -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["gp", "analytical"])
+def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushModel], kind: str) -> None:
+    terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+    away = []
+    for seed in range(10, 16):
+        table = pushes(100, seed, slippery(0.15), grain(0.1))
+        body = extend(refit_base(bases[kind], table), table, terms, bases[kind]).body
+        assert isinstance(body, ExtendedBody)
+        found = np.concatenate([effect.coefficients for effect in body.effects])
+        sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in body.effects])
+        away.append((found - [0.15, 0.1, 0.05]) / sd)
+    # In units of their own deviations: Student's t with 25 blocks, its root mean square known to 0.2 here.
+    assert 0.6 < np.sqrt(np.mean(np.square(away))) < 1.5
+    assert np.max(np.abs(away)) < 4.0
+    assert np.max(np.abs(np.mean(away, axis=0))) < 1.3  # not one-sided: 3 deviations of a mean of six
+    assert np.all(sd < [0.05, 0.05, 0.05])
+
+
+def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushModel]) -> None:
+    table = pushes(100, 4, slippery(0.2))
+    alike = Form("quadratic", ("elapsed_time",), (500.0,), (300.0,))
+    terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
+    body = extend(refit_base(bases["analytical"], table), table, terms).body
+    assert isinstance(body, ExtendedBody)
+    push = Push(table.inputs, table.duration, table.covariates)
+    shift, _ = body.shift(push)
+    planted, _ = slippery(0.2).shift(physics(), push)
+    assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
+
+
+@pytest.mark.parametrize("kind", ["gp", "analytical"])
+def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
+    table, held_out = pushes(100, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
+    refit = refit_base(bases[kind], table)
+    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
+    nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
+    assert nmse.low < nmse.value < nmse.high < 0.0
+    assert nlpd.low < nlpd.value < nlpd.high < 0.0
+    coverage = metrics_json(compare(after, held_out))["coverage"]
+    assert all(0.88 < share <= 1.0 for share in coverage["0.95"].values())
+
+
+@pytest.mark.parametrize("kind", ["gp", "analytical"])
+def test_an_effect_that_is_not_there_gains_nothing(bases: dict[str, PushModel], kind: str) -> None:
+    table, held_out = pushes(100, 7), pushes(60, 8)
+    refit = refit_base(bases[kind], table)
+    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
+    _, nlpd = gain(refit, after, held_out)
+    assert abs(nlpd.value) < 0.05
+    assert nlpd.high > 0.0
+
+
+def test_a_refit_keeps_the_physics_and_learns_the_covariance(bases: dict[str, PushModel]) -> None:
+    base, table = bases["analytical"], pushes(60, 9)
+    loud = replace(table, outcomes=table.outcomes + 5.0 * NOISE * np.random.default_rng(0).standard_normal((180, 3)))
+    refit = refit_base(base, loud)
+    probe = pushes(3, 1)
+    np.testing.assert_array_equal(predicted(refit, probe).mean, predicted(base, probe).mean)
+    assert np.all(np.diagonal(predicted(refit, probe).covariance[0] / predicted(base, probe).covariance[0]) > 9.0)
+
+
+@pytest.mark.parametrize("kind", ["gp", "analytical"])
+def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushModel], kind: str) -> None:
+    table, held_out = pushes(60, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))
+    model = extended(bases[kind], slippery(0.3))
+    refit = refit_base(model, table)
+    assert isinstance(refit.body, ExtendedBody) and isinstance(model.body, ExtendedBody)
+    assert refit.body.effects == model.body.effects
+    plain = refit_base(bases[kind], table)
+    assert gain(plain, refit, held_out)[1].high < 0.0
+    more = extend(refit, table, [GRAIN])
+    assert isinstance(more.body, ExtendedBody)
+    assert [effect.mechanism for effect in more.body.effects] == ["contact_friction", "anisotropic_friction"]
+    assert np.all(np.abs(more.body.effects[1].coefficients) < 0.1)
+
+
+def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
+    table, held_out = pushes(150, 12, slippery(0.3)), pushes(60, 13, slippery(0.3))
+    refit = refit_base(bases["analytical"], table)
+    after = extend(refit, table, [(None, "elapsed_time", DRIFT)])
+    assert gain(refit, after, held_out)[1].high < 0.0
+    design = design_of(None, DRIFT, physics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
+    assert isinstance(after.body, ExtendedBody)
+    assert after.body.effects[0].coefficients.shape == (design.shape[2],)
+
+
+# --- the command line, the shelf, the service -------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def model_file(bases: dict[str, PushModel], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("extended") / "extended.model"
+    save_model(replace(extended(bases["gp"], slippery(0.2, sd=0.1)), name="extended"), path)
+    return path
+
+
+def test_predict_takes_the_covariate_and_asks_for_it(model_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    push = ["predict", str(model_file), "--velocity", "0.02", "--contact", "0.1", "--angle", "-0.8"]
+    assert main(push) != 0
+    assert "covariate elapsed_time: 'missing' is not accepted, give a finite number, in s" in capsys.readouterr().err
+    means = []
+    for time in ("0", "1000"):
+        assert main([*push, "--covariate", f"elapsed_time={time}", "--json", "-"]) == 0
+        means.append(json.loads(capsys.readouterr().out)["mean"])
+    assert means[0] != means[1]
+
+
+def test_info_tells_what_it_needs_and_where_it_has_seen_it(
+    model_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", str(model_file), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}
+
+
+def test_evaluate_names_the_column_that_a_table_lacks(
+    model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_table(tmp_path / "whole.csv", pushes(10, 1))
+    write_table(tmp_path / "lacking.csv", replace(pushes(10, 1), covariates={}))
+    assert main(["evaluate", str(model_file), str(tmp_path / "whole.csv"), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["n_test"] == 30
+    assert main(["evaluate", str(model_file), str(tmp_path / "lacking.csv")]) == 1
+    assert "covariate elapsed_time" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("driver", ["elapsed_time", "topic:/warmth"])
+def test_validate_takes_from_the_windows_what_it_needs_or_names_it(
+    bases: dict[str, PushModel], driver: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    effect = replace(slippery(0.2), form=replace(DRIFT, drivers=(driver,)))
+    save_model(extended(bases["gp"], effect), tmp_path / "m")
+    write_recording(tmp_path / "bag", translating_push())
+    status = main(["validate", str(tmp_path / "m"), str(tmp_path / "bag"), "--json", "-"])
+    heard = capsys.readouterr()
+    if driver == "elapsed_time":
+        assert (status, json.loads(heard.out)["n_test"]) == (0, 5)
+    else:
+        assert status == 1
+        assert "covariate topic:/warmth: 'missing' is not accepted" in heard.err
+
+
+def test_the_shelf_lists_what_a_request_must_bring(model_file: Path) -> None:
+    shelf = ModelShelf()
+    shelf.load(model_file)
+    assert "covariates=elapsed_time;" in shelf.describe("extended")
+
+
+@pytest.fixture(scope="module")
+def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
+    """Calls a service of a running predict_server that serves the extended model."""
+    domain, kinds = (
+        harness.free_domain(),
+        {"predict_push": PredictPush, "predict_push_batch": PredictPushBatch, "list_models": ListModels},
+    )
+    params = {"models": [str(model_file)]}
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(harness.node_process("predict_server", domain=domain, params=params))
+        node = stack.enter_context(harness.ros_context(domain))
+        clients = {name: node.create_client(kind, name) for name, kind in kinds.items()}
+        yield lambda name, request: harness.call(clients[name], request)
+
+
+def test_the_service_refuses_a_push_without_the_covariate_by_name(ask: Callable[..., Any]) -> None:
+    response = ask("predict_push", query_to_request("", np.array([0.02, 0.1, 0.2]), 0.2))
+    assert not response.success
+    assert response.message.startswith("covariate elapsed_time: 'missing' is not accepted, give a finite number, in s")
+    batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", np.array([[0.02, 0.1, 0.2]]), 0.2, {})))
+    assert (batch.success, "covariate elapsed_time" in batch.message) == (False, True)
+
+
+def test_the_service_answers_with_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
+    table = pushes(10, 1)
+    time = {"elapsed_time": table.covariates["elapsed_time"]}
+    expected = serve(load_model(model_file)).predict(table.inputs, table.duration, time)
+    batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", table.inputs, 0.2, time)))
+    assert_same(prediction_from_response(batch), expected, rtol=1e-9, atol=1e-15)
+    first = {name: float(column[0]) for name, column in time.items()}
+    one = ask("predict_push", query_to_request("", table.inputs[0], 0.2, first))
+    np.testing.assert_allclose(prediction_from_response(one).mean[0], expected.mean[0], rtol=1e-7)
+    assert "covariates=elapsed_time;" in ask("list_models", ListModels.Request()).descriptions[0]

@@ -1,0 +1,128 @@
+"""The homoscedastic Gaussian process: Bayes' rule, its limits and its fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, log_likelihood_and_gradient
+from push_predictor.types import Array
+
+PARAMETERS = GpParameters(np.array([0.2, -0.3]), 0.1, -1.2)
+
+
+def rows(n: int, seed: int = 0, noise: float = 0.3) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    inputs = rng.normal(size=(n, 2))
+    return inputs, np.sin(2.0 * inputs[:, 0]) + noise * rng.normal(size=n)
+
+
+def test_marginal_likelihood_is_the_density_of_the_outputs() -> None:
+    inputs, outputs = rows(30)
+    covariance = PARAMETERS.kernel.matrix(inputs) + PARAMETERS.noise_variance * np.eye(30)
+    expected = multivariate_normal(np.zeros(30), covariance).logpdf(outputs)
+    assert GaussianProcess(inputs, outputs, PARAMETERS).log_marginal_likelihood == pytest.approx(expected, abs=1e-9)
+
+
+def test_prediction_is_the_conditional_gaussian() -> None:
+    inputs, outputs = rows(30)
+    new = rows(5, seed=1)[0]
+    kernel = PARAMETERS.kernel
+    gain = kernel.cross(new, inputs) @ np.linalg.inv(kernel.matrix(inputs) + PARAMETERS.noise_variance * np.eye(30))
+    prediction = GaussianProcess(inputs, outputs, PARAMETERS).predict(new)
+    np.testing.assert_allclose(prediction.mean, gain @ outputs, atol=1e-12)
+    conditional = kernel.matrix(new) - gain @ kernel.cross(inputs, new)
+    np.testing.assert_allclose(prediction.variance, np.diagonal(conditional), atol=1e-12)
+    np.testing.assert_allclose(prediction.process_variance, PARAMETERS.noise_variance)
+
+
+@pytest.mark.parametrize("n", [60, 300])
+def test_gradient_equals_finite_differences(n: int) -> None:
+    inputs, outputs = rows(n)
+    at = np.append(PARAMETERS.log_lengthscales, [PARAMETERS.log_signal_sd, PARAMETERS.log_noise_sd])
+
+    def value(vector: Array) -> float:
+        parameters = GpParameters(vector[:2], vector[2], vector[3])
+        return GaussianProcess(inputs, outputs, parameters).log_marginal_likelihood
+
+    found, gradient = log_likelihood_and_gradient(inputs, outputs, PARAMETERS)
+    assert found == pytest.approx(value(at), abs=1e-8)
+    for i, h in enumerate(1e-3 * np.eye(4)):
+        expected = (8 * (value(at + h) - value(at - h)) - (value(at + 2 * h) - value(at - 2 * h))) / 12e-3
+        assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
+
+
+def test_far_from_the_data_the_prior_is_left() -> None:
+    prediction = GaussianProcess(*rows(30), PARAMETERS).predict(np.array([[50.0, 50.0]]))
+    assert prediction.mean[0] == pytest.approx(0.0, abs=1e-12)
+    assert prediction.variance[0] == pytest.approx(PARAMETERS.kernel.variance)
+
+
+def test_rows_have_no_order() -> None:
+    inputs, outputs = rows(40)
+    order = np.random.default_rng(5).permutation(40)
+    new = rows(6, seed=1)[0]
+    straight = GaussianProcess(inputs, outputs, PARAMETERS).predict(new)
+    shuffled = GaussianProcess(inputs[order], outputs[order], PARAMETERS).predict(new)
+    np.testing.assert_allclose(straight.mean, shuffled.mean, atol=1e-12)
+    np.testing.assert_allclose(straight.variance, shuffled.variance, atol=1e-12)
+
+
+def test_more_rows_never_make_the_model_less_sure() -> None:
+    inputs, outputs = rows(40)
+    new = rows(50, seed=1)[0]
+    few = GaussianProcess(inputs[:20], outputs[:20], PARAMETERS).predict(new)
+    many = GaussianProcess(inputs, outputs, PARAMETERS).predict(new)
+    assert (many.variance <= few.variance + 1e-12).all()
+
+
+def test_one_input_is_predicted_as_in_a_batch() -> None:
+    gp = GaussianProcess(*rows(40), PARAMETERS)
+    new = rows(7, seed=1)[0]
+    batch = gp.predict(new)
+    for i in range(7):
+        single = gp.predict(new[i : i + 1])
+        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-12)
+        assert single.variance[0] == pytest.approx(batch.variance[i], rel=1e-10)
+
+
+def test_the_fit_finds_the_noise_and_the_input_that_matters() -> None:
+    inputs, outputs = rows(300, noise=0.2)
+    fitted = fit_gp(inputs, outputs)
+    assert np.exp(fitted.parameters.log_noise_sd) == pytest.approx(0.2, rel=0.15)
+    relevant, irrelevant = fitted.parameters.log_lengthscales
+    assert irrelevant > relevant + 2.0
+
+
+def test_jumps_from_side_to_side_are_learnt_and_not_called_noise() -> None:
+    """Five sides that no symmetry folds, the outcome turning its sign on each: features.EDGE_SPACING apart."""
+    rng = np.random.default_rng(0)
+    side, along, angle = rng.integers(5, size=300), rng.random(300), rng.uniform(-1.0, 1.0, 300)
+    outputs = 2.0 * along - 1.0 + 0.5 * angle + 0.1 * rng.normal(size=300)
+    inputs = np.column_stack([3.0 * side + along, angle])
+    inputs, outputs = ((x - x.mean(axis=0)) / x.std(axis=0) for x in (inputs, outputs))
+    assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
+
+
+def test_the_fit_is_where_the_likelihood_is_level() -> None:
+    fitted = fit_gp(*rows(100))
+    _, gradient = log_likelihood_and_gradient(fitted.inputs, fitted.outputs, fitted.parameters)
+    inside = np.append(fitted.parameters.log_lengthscales < 6.8, [True, True])
+    assert np.abs(gradient[inside]).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "complaint"),
+    [
+        (np.zeros((5, 2)), np.zeros(4), "shape"),
+        (np.zeros(5), np.zeros(5), "shape"),
+        (np.zeros((1, 2)), np.zeros(1), "n >= 2"),
+        (np.zeros((5, 2)), np.array([0.0, 0.0, np.nan, 0.0, 0.0]), "NaN"),
+        (np.full((5, 2), np.inf), np.zeros(5), "infinity"),
+    ],
+)
+def test_rows_that_cannot_be_learnt_from_are_refused(inputs: Array, outputs: Array, complaint: str) -> None:
+    with pytest.raises(TrainingError, match=complaint):
+        fit_gp(inputs, outputs)

@@ -1,0 +1,114 @@
+"""The ARD squared exponential kernel and the regularised systems built on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_predictor.models.gaussian_process.kernels import SquaredExponential
+from push_predictor.models.gaussian_process.posterior import KernelPosterior
+from push_predictor.models.gaussian_process.ridge import RegularisableKernel, factorise
+from push_predictor.types import Array
+
+KERNEL = SquaredExponential(np.array([0.3, -0.4, 1.0]), 0.2)
+
+
+def normal(*shape: int, seed: int = 0) -> Array:
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def test_values_are_the_formula() -> None:
+    left, right = normal(4, 3), normal(5, 3, seed=1)
+    scaled = (left[:, None] - right) / np.exp(KERNEL.log_lengthscales)
+    expected = np.exp(0.4) * np.exp(-0.5 * (scaled**2).sum(axis=2))
+    np.testing.assert_allclose(KERNEL.cross(left, right), expected, rtol=1e-14)
+
+
+def test_one_row_gives_what_many_give() -> None:
+    left, right = normal(6, 3), normal(40, 3, seed=1)
+    rows = [KERNEL.cross(left[i : i + 1], right)[0] for i in range(6)]
+    np.testing.assert_allclose(rows, KERNEL.cross(left, right), rtol=1e-13)
+
+
+@given(st.integers(0, 10_000), st.floats(-3.0, 3.0), st.floats(-3.0, 1.5))
+def test_matrix_is_symmetric_positive_and_at_most_its_diagonal(seed: int, log_scale: float, log_sd: float) -> None:
+    kernel = SquaredExponential(np.full(2, log_scale), log_sd)
+    matrix = kernel.matrix(normal(30, 2, seed=seed))
+    assert (matrix == matrix.T).all()
+    assert matrix.max() <= kernel.variance * (1.0 + 1e-14)
+    np.testing.assert_allclose(np.diagonal(matrix), kernel.variance, rtol=1e-9)
+    assert np.linalg.eigvalsh(matrix).min() > -1e-10 * kernel.variance
+
+
+@given(st.floats(-50.0, 50.0))
+def test_only_differences_of_inputs_matter(shift: float) -> None:
+    inputs = normal(20, 3)
+    np.testing.assert_allclose(KERNEL.matrix(inputs + shift), KERNEL.matrix(inputs), rtol=1e-9, atol=1e-11)
+
+
+def test_an_endless_lengthscale_removes_its_input() -> None:
+    inputs = normal(20, 3)
+    blind = SquaredExponential(np.array([0.3, -0.4, 20.0]), 0.2)
+    pair = SquaredExponential(np.array([0.3, -0.4]), 0.2)
+    np.testing.assert_allclose(blind.matrix(inputs), pair.matrix(inputs[:, :2]), rtol=1e-12)
+
+
+def test_gradient_equals_finite_differences() -> None:
+    inputs, weights = normal(25, 3), normal(25, 25, seed=1)
+    weights = weights + weights.T
+
+    def contracted(vector: Array) -> float:
+        return float((weights * SquaredExponential(vector[:3], vector[3]).matrix(inputs)).sum())
+
+    at = np.append(KERNEL.log_lengthscales, KERNEL.log_sd)
+    gradient = KERNEL.gradient(inputs, KERNEL.matrix(inputs), weights.copy())
+    steps = 1e-3 * np.eye(4)
+    expected = [
+        (8 * (contracted(at + h) - contracted(at - h)) - (contracted(at + 2 * h) - contracted(at - 2 * h))) / 12e-3
+        for h in steps
+    ]
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-9 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("n", [50, 300])
+def test_a_regularised_kernel_equals_its_textbook_formulas(n: int) -> None:
+    matrix = SquaredExponential(np.array([0.5, 0.5]), 0.1).matrix(normal(n, 2))
+    diagonal = np.exp(normal(n, seed=2))
+    ridge = factorise(matrix).regularise(1.0 / diagonal)
+    inverse = np.linalg.inv(matrix + np.diag(diagonal))
+    values = normal(n, seed=3)
+    np.testing.assert_allclose(ridge.precision(), inverse, atol=1e-11)
+    np.testing.assert_allclose(ridge.residual(values), inverse @ (diagonal * values), atol=1e-10)
+    np.testing.assert_allclose(ridge.posterior_diagonal, np.diagonal(matrix - matrix @ inverse @ matrix), atol=1e-10)
+    expected = np.linalg.slogdet(matrix + np.diag(diagonal))[1] - np.log(diagonal).sum()
+    assert ridge.log_determinant == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_smooth_kernel_of_many_rows_is_factorised_and_a_rough_one_is_not() -> None:
+    inputs = normal(300, 2)
+    smooth, rough = SquaredExponential(np.zeros(2), 0.0), SquaredExponential(np.full(2, -4.0), 0.0)
+    assert factorise(smooth.matrix(inputs)).root is not None
+    assert factorise(rough.matrix(inputs)).root is None
+
+
+def test_low_rank_and_dense_agree_where_the_diagonal_spans_many_decades() -> None:
+    matrix = SquaredExponential(np.zeros(2), 0.0).matrix(normal(300, 2))
+    weights = 10.0 ** np.random.default_rng(1).uniform(-3, 3, 300)
+    low, dense = factorise(matrix).regularise(weights), RegularisableKernel(matrix, None).regularise(weights)
+    np.testing.assert_allclose(low.posterior_diagonal, dense.posterior_diagonal, rtol=1e-5, atol=1e-10)
+    assert low.log_determinant == pytest.approx(dense.log_determinant, abs=1e-6)
+
+
+def test_posterior_of_a_noiseless_function_passes_through_its_values() -> None:
+    inputs, values = normal(15, 3), normal(15, seed=1)
+    posterior = KernelPosterior(KERNEL.matrix(inputs), np.full(15, 1e-10))
+    cross = KERNEL.cross(inputs, inputs)
+    np.testing.assert_allclose(cross @ posterior.weights(values), values, atol=1e-6)
+    np.testing.assert_allclose(posterior.explained_variance(cross), KERNEL.variance, atol=1e-8)
+
+
+def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        KernelPosterior(np.ones((3, 3)), np.full(3, -2.0))

@@ -1,0 +1,265 @@
+"""Push models: training, symmetry, domain, requests, and the files they live in."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import square_rig, triangle
+
+from push_predictor.errors import ModelFileError, RequestError, TrainingError
+from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.features import push_features
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import KINDS, PushModel
+from push_predictor.models.request import check_request, check_requests
+from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
+from push_predictor.models.train import train_model, training_rows
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+
+
+def noisy_pushes(n: int = 120, seed: int = 0, rig: Rig | None = None, windows_per_push: int = 3) -> PushTable:
+    """Analytical outcomes with noise that grows with the angle."""
+    rig = rig or square_rig()
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.uniform(0.01, 0.05, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    duration = np.full(n, 0.2)
+    exact = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    push_id = np.array([f"{seed}-{k // windows_per_push}" for k in range(n)])
+    return PushTable(inputs, duration, exact + noise, push_id, {"elapsed_time": np.arange(float(n))})
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, PushModel]:
+    return {
+        kind: train_model(noisy_pushes(), square_rig(), kind, name=f"a_{kind}", sources=["made up"]) for kind in KINDS
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_model_predicts_pushes_it_has_not_seen(models: dict[str, PushModel], kind: str) -> None:
+    held_out = noisy_pushes(200, seed=1)
+    metrics = metrics_json(compare(models[kind], held_out))
+    assert metrics["nmse"]["total"] < 0.6  # three outputs: "predict the mean" scores 3
+    assert all(0.8 < share <= 1.0 for share in metrics["coverage"]["0.95"].values())
+    assert (metrics["exact_nlpd"] is not None) == (kind == "vhgp")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
+    rng = np.random.default_rng(3)
+    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 300), rng.random(300), rng.uniform(-1.57, 1.57, 300)])
+    prediction = models[kind].predict(inputs, np.full(300, 0.2))
+    assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
+    assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
+    assert not np.all(prediction.in_domain)
+
+
+@settings(max_examples=25, deadline=None)
+@given(fraction=st.floats(0.0, 0.99), angle=st.floats(-1.2, 1.2), side=st.integers(1, 3))
+def test_the_four_sides_of_a_square_are_one(
+    models: dict[str, PushModel], fraction: float, angle: float, side: int
+) -> None:
+    one, other = (np.array([[0.02, (k + fraction) / 4.0, angle]]) for k in (0, side))
+    for kind in ("vhgp", "gp"):
+        a, b = (models[kind].predict(inputs, np.array([0.2])) for inputs in (one, other))
+        assert a.mean == pytest.approx(b.mean, abs=1e-9)
+        assert a.covariance == pytest.approx(b.covariance, rel=1e-6, abs=1e-15)
+
+
+def test_a_circle_has_no_contact_and_an_ellipse_no_seam() -> None:
+    contact = np.array([0.0, 1.0 - 1e-9, 0.5])
+    inputs = np.column_stack([np.full(3, 0.02), contact, np.full(3, 0.1)])
+    assert push_features(shape_outline("ellip1"), inputs).shape == (3, 2)
+    assert np.ptp(push_features(shape_outline("ellip3"), inputs), axis=0) == pytest.approx(0.0, abs=1e-7)
+
+
+def test_edges_without_symmetry_are_kept_apart() -> None:
+    starts = triangle().edge_starts
+    across = np.array([starts[1] - 1e-9, starts[1] + 1e-9])
+    features = push_features(triangle(), np.column_stack([np.full(2, 0.02), across, np.zeros(2)]))
+    assert abs(features[1, 1] - features[0, 1]) > 1.0
+
+
+def test_rows_are_drawn_evenly_over_the_pushes() -> None:
+    table = noisy_pushes(3000, windows_per_push=30)
+    chosen = table.take(training_rows(table, None, 0))
+    counts = [int(np.sum(chosen.push_id == push)) for push in table.pushes]
+    assert len(chosen) == 1000 and set(counts) == {10}
+    assert len(training_rows(noisy_pushes(200), None, 0)) == 200
+
+
+def test_a_number_of_rows_is_drawn_by_the_seed() -> None:
+    table = noisy_pushes(100)
+    again = [training_rows(table, 30, seed).tolist() for seed in (1, 1, 2)]
+    assert again[0] == again[1] != again[2]
+    with pytest.raises(TrainingError, match=r"n_train: 101 .* 1 to 100"):
+        training_rows(table, 101, 0)
+
+
+def test_constant_inputs_are_left_out_and_constant_outcomes_refused() -> None:
+    table = noisy_pushes(60)
+    table.inputs[:, 0] = 0.02
+    assert len(train_model(table, square_rig(), "gp", name="g").body.scaling.columns) == 2
+    table.outcomes[:, 1] = 0.0
+    with pytest.raises(TrainingError, match="dy: does not vary"):
+        train_model(table, square_rig(), "gp", name="g")
+    with pytest.raises(TrainingError, match="'forest' is not accepted"):
+        train_model(table, square_rig(), "forest", name="g")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"velocity": float("nan")}, r"velocity: nan is not accepted, give .* above 0"),
+        ({"velocity": -0.1}, "velocity: -0.1"),
+        ({"velocity": float("inf")}, "velocity: inf"),
+        ({"contact": 1.0}, r"contact: 1.0 .* \[0, 1\)"),
+        ({"contact": -1e-9}, "contact"),
+        ({"angle": np.pi / 2}, r"angle: 1.57.* \(-pi/2, pi/2\)"),
+        ({"duration": 0.0}, "duration: 0.0"),
+        ({"duration": 1.0}, r"duration: 1.0 .* 0.18 to 0.22 s"),
+        ({"covariates": {"topic:/heat": float("nan")}}, "covariate topic:/heat: nan"),
+    ],
+)
+def test_a_bad_request_names_field_value_and_what_is_accepted(
+    models: dict[str, PushModel], change: dict[str, object], message: str
+) -> None:
+    request = {"velocity": 0.02, "contact": 0.1, "angle": 0.2, "duration": 0.2, "covariates": {}}
+    check_request(models["vhgp"], **request)
+    with pytest.raises(RequestError, match=message):
+        check_request(models["vhgp"], **{**request, **change})
+
+
+def test_the_first_bad_push_of_a_batch_is_named_by_its_index(models: dict[str, PushModel]) -> None:
+    inputs = np.tile([0.02, 0.1, 0.2], (5, 1))
+    inputs[3, 1] = 1.2
+    with pytest.raises(RequestError, match=r"contact\[3\]: 1.2"):
+        check_requests(models["gp"], inputs, 0.2, {})
+
+
+def test_the_analytical_model_takes_any_duration(models: dict[str, PushModel]) -> None:
+    check_request(models["analytical"], 0.02, 0.1, 0.0, 6.0, {})
+
+
+# --- files ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_loaded_model_predicts_what_the_saved_one_did(
+    models: dict[str, PushModel], kind: str, tmp_path: Path
+) -> None:
+    save_model(models[kind], tmp_path / "m")
+    loaded, table = load_model(tmp_path / "m"), noisy_pushes(50, seed=2)
+    a, b = (m.predict(table.inputs, table.duration) for m in (models[kind], loaded))
+    assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
+    assert (loaded.name, loaded.kind, loaded.provenance) == (f"a_{kind}", kind, models[kind].provenance)
+    assert loaded.training.push_id.tolist() == models[kind].training.push_id.tolist()
+    assert np.array_equal(loaded.training.outcomes, models[kind].training.outcomes)
+    assert np.array_equal(loaded.training.covariates["elapsed_time"], np.arange(120.0))
+
+
+def test_no_damaged_copy_of_a_model_is_served_with_other_numbers(models: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(models["gp"], tmp_path / "m")
+    whole, rng = (tmp_path / "m").read_bytes(), np.random.default_rng(0)
+    probe = np.array([[0.02, 0.1, 0.2]]), np.array([0.2])
+    expected = models["gp"].predict(*probe).mean
+    refused = 0
+    for k in range(150):
+        data = bytearray(whole)
+        if k % 3 == 0:
+            del data[int(rng.integers(0, len(data))) :]
+        else:
+            data[int(rng.integers(0, len(data)))] ^= 1 << int(rng.integers(0, 8))
+        (tmp_path / "d").write_bytes(data)
+        try:
+            found = load_model(tmp_path / "d").predict(*probe).mean
+        except ModelFileError as error:
+            refused += 1
+            assert str(tmp_path / "d") in str(error)
+        else:
+            assert np.array_equal(found, expected)  # the flipped bit was in a part that says nothing
+    assert refused > 120
+
+
+def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("not a model")
+    np.savez(tmp_path / "arrays.npz", a=np.zeros(3))
+    for name in ("text", "arrays.npz"):
+        assert not is_model_file(tmp_path / name)
+        with pytest.raises(ModelFileError, match=name):
+            load_model(tmp_path / name)
+    with pytest.raises(ModelFileError, match="absent"):
+        load_model(tmp_path / "absent")
+
+
+def test_a_newer_file_says_what_to_do(models: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(models["gp"], tmp_path / "m")
+    _rewrite_header(tmp_path / "m", {"format_version": FORMAT_VERSION + 1, "written_by": "9.9"})
+    with pytest.raises(
+        ModelFileError, match=rf"format version {FORMAT_VERSION + 1}, written by push_predictor '9.9'.*update"
+    ):
+        load_model(tmp_path / "m")
+
+
+class _Bomb:
+    def __reduce__(self) -> tuple[object, ...]:
+        return (Path.touch, (Path("/tmp/push_predictor_bomb"),))
+
+
+def test_no_code_from_a_file_is_executed(models: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(models["gp"], tmp_path / "m")
+    buffer = io.BytesIO()
+    np.save(buffer, np.array([_Bomb()], dtype=object), allow_pickle=True)
+    _rewrite(tmp_path / "m", {"inputs.npy": buffer.getvalue()})
+    with pytest.raises(ModelFileError):
+        load_model(tmp_path / "m")
+    (tmp_path / "p").write_bytes(pickle.dumps(_Bomb()))
+    with pytest.raises(ModelFileError):
+        load_model(tmp_path / "p")
+    assert not Path("/tmp/push_predictor_bomb").exists()
+
+
+def test_a_failed_save_leaves_the_old_file(models: dict[str, PushModel], tmp_path: Path) -> None:
+    save_model(models["gp"], tmp_path / "m")
+    before = (tmp_path / "m").read_bytes()
+    (tmp_path / "m.d").mkdir()
+    with pytest.raises(OSError, match=r"m\.d"):
+        save_model(models["vhgp"], tmp_path / "m.d")
+    assert (tmp_path / "m").read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m", "m.d"]
+
+
+def test_a_thousand_windows_make_a_small_file(tmp_path: Path) -> None:
+    table = noisy_pushes(1000)
+    covariates = {f"covariate {k}": np.random.default_rng(k).random(1000) for k in range(11)}
+    full = PushTable(table.inputs, table.duration, table.outcomes, table.push_id, covariates)
+    save_model(train_model(full, square_rig(), "analytical", name="a"), tmp_path / "m")
+    with_sites = (tmp_path / "m").stat().st_size + 3 * 1000 * 8  # what a VHGP stores besides
+    assert with_sites < 200_000
+
+
+def _rewrite_header(path: Path, change: dict[str, object]) -> None:
+    with np.load(path) as archive:
+        header = json.loads(archive["header"].tobytes())
+    buffer = io.BytesIO()
+    np.save(buffer, np.frombuffer(json.dumps({**header, **change}).encode(), dtype=np.uint8))
+    _rewrite(path, {"header.npy": buffer.getvalue()})
+
+
+def _rewrite(path: Path, members: dict[str, bytes]) -> None:
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in {**content, **members}.items():
+            archive.writestr(name, data)

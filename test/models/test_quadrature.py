@@ -1,0 +1,61 @@
+"""The exact predictive density of a VHGP against adaptive integration and against what it must be in limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.quadrature import exact_cdf, exact_log_density, gaussian_log_density
+from push_predictor.types import Array
+
+
+def prediction(
+    mean: float, variance: float, log_noise: float, log_noise_variance: float, m: int = 1
+) -> LatentPrediction:
+    return LatentPrediction(*(np.full(m, value) for value in (mean, variance, log_noise, log_noise_variance)))
+
+
+def density(at: float, of: LatentPrediction) -> float:
+    return float(np.exp(exact_log_density(of, np.array([at]))[0]))
+
+
+@pytest.mark.parametrize("d", [0.1, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize("outcome", [0.3, 1.5, 4.0])
+def test_density_and_cdf_equal_adaptive_integration(d: float, outcome: float) -> None:
+    of = prediction(0.3, 0.05, -1.0, d**2)
+
+    def integral(function: Array) -> float:
+        def integrand(g: float) -> float:
+            return float(function(outcome, 0.3, np.sqrt(0.05 + np.exp(g))) * norm.pdf(g, -1.0, d))
+
+        return float(quad(integrand, -1 - 12 * d, -1 + 12 * d, epsabs=1e-14, epsrel=1e-12, limit=400)[0])
+
+    assert density(outcome, of) == pytest.approx(integral(norm.pdf), rel=1e-6)
+    assert exact_cdf(of, np.array([outcome]))[0] == pytest.approx(integral(norm.cdf), abs=1e-8)
+
+
+def test_moments_are_those_of_the_matched_gaussian() -> None:
+    of = prediction(-0.4, 0.1, -1.5, 0.6)
+    moments = [quad(lambda y, k=k: y**k * density(y, of), -25, 25, limit=400, points=[-0.4])[0] for k in range(3)]
+    assert moments[0] == pytest.approx(1.0, abs=1e-8)
+    assert moments[1] == pytest.approx(-0.4, abs=1e-8)
+    assert moments[2] - moments[1] ** 2 == pytest.approx(of.outcome_variance[0], rel=1e-6)
+
+
+def test_a_known_noise_level_makes_both_densities_the_same() -> None:
+    of = prediction(0.2, 0.1, -0.5, 0.0, m=9)
+    outcomes = np.linspace(-3, 3, 9)
+    np.testing.assert_allclose(exact_log_density(of, outcomes), gaussian_log_density(of, outcomes), atol=1e-12)
+    np.testing.assert_allclose(
+        exact_cdf(of, outcomes), norm.cdf(outcomes, 0.2, np.sqrt(0.1 + np.exp(-0.5))), atol=1e-12
+    )
+
+
+def test_an_unsure_noise_level_has_heavier_tails() -> None:
+    of = prediction(0.0, 0.01, -1.0, 1.0, m=2)
+    outcomes = 5.0 * np.sqrt(of.outcome_variance[0]) * np.array([-1.0, 1.0])
+    assert (exact_log_density(of, outcomes) > gaussian_log_density(of, outcomes) + 1.0).all()
+    assert exact_cdf(of, outcomes)[0] == pytest.approx(1.0 - exact_cdf(of, outcomes)[1], abs=1e-12)

@@ -1,0 +1,134 @@
+"""The sparse bound: the dense one where every row is an inducing input, below it where not; inducing inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sparse_rows import PARAMETERS, rows
+
+from push_predictor.models.gaussian_process.sparse.bound import SparseBound, SparseProblem
+from push_predictor.models.gaussian_process.sparse.fit import maximise_over_noise, noise_penalty
+from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
+from push_predictor.models.gaussian_process.sparse.kernel import InducedKernel
+from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem
+from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise as dense_maximum
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.types import Array
+
+
+def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAMETERS) -> SparseProblem:
+    """With the first `signal` rows for inducing inputs of f, the last `noise` for those of g."""
+    inputs, outputs = rows(n)
+    return SparseProblem.of(inputs, outputs, parameters, inputs[:signal], inputs[n - noise :])
+
+
+def test_with_every_row_an_inducing_input_it_is_the_dense_bound() -> None:
+    inputs, outputs = rows(60)
+    sites = np.exp(0.5 * np.random.default_rng(1).normal(size=60) - 0.7)
+    dense = Bound.tied(VhgpProblem.of(inputs, outputs, PARAMETERS), sites)
+    sparse = SparseBound.tied(problem(60, 60, 60), sites)
+    assert sparse.value == pytest.approx(dense.value, abs=1e-6)
+    np.testing.assert_allclose(sparse.signal.optimal_precisions, dense.optimal_precisions, atol=1e-6)
+
+
+def test_and_its_maximum_over_q_is_that_of_the_dense_one() -> None:
+    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-13)
+    sparse = maximise_over_noise(problem(60, 60, 60), [], 1e-13)
+    assert sparse.value == pytest.approx(dense.value, abs=1e-6)
+    np.testing.assert_allclose(sparse.hyperparameter_gradient(), dense.hyperparameter_gradient(), atol=1e-5)
+
+
+def test_fewer_inducing_inputs_never_give_a_higher_bound() -> None:
+    dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-10).value
+    values = [maximise_over_noise(problem(60, m, m), [], 1e-10).value for m in (60, 40, 20, 10)]
+    assert values[0] == pytest.approx(dense, abs=1e-6)
+    assert dense > values[1] > values[2] > values[3]
+
+
+def settled(bound: SparseBound) -> SparseBound:
+    """The bound is flat at its maximum, to rounding: only further steps bring the sites there, and with them the
+    gradient, which feels them in the first order.
+    """
+    for _ in range(6):
+        bound = SparseBound.at(bound.problem, bound.optimal_sites)
+    return bound
+
+
+@pytest.mark.parametrize(("n", "signal", "noise"), [(60, 20, 30), (4500, 12, 9)])
+def test_gradient_of_every_hyperparameter_equals_finite_differences(n: int, signal: int, noise: int) -> None:
+    """Also across several blocks of rows."""
+
+    def maximum(vector: Array) -> SparseBound:
+        return settled(maximise_over_noise(problem(n, signal, noise, VhgpParameters.from_vector(vector)), [], 0.0))
+
+    at, h = PARAMETERS.to_vector(), 1e-3
+    gradient = maximum(at).hyperparameter_gradient()
+    for i, step in enumerate(h * np.eye(7)):
+        near = maximum(at + step).value - maximum(at - step).value
+        far = maximum(at + 2 * step).value - maximum(at - 2 * step).value
+        assert gradient[i] == pytest.approx((8.0 * near - far) / (12.0 * h), abs=1e-7 * np.abs(gradient).max())
+
+
+def test_the_prior_is_for_the_noise_alone_and_has_its_gradient() -> None:
+    vector, h = PARAMETERS.to_vector(), 1e-4
+    steps = h * np.eye(7)
+    numbers = [(noise_penalty(vector + s, 300)[0] - noise_penalty(vector - s, 300)[0]) / (2.0 * h) for s in steps]
+    slope = noise_penalty(vector, 300)[1]
+    np.testing.assert_allclose(slope, numbers, atol=1e-7)
+    assert np.flatnonzero(slope).tolist() == [3, 4, 5]
+    assert noise_penalty(vector, 600)[0] == pytest.approx(2.0 * noise_penalty(vector, 300)[0])
+
+
+def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
+    found = problem(200, 20, 15)
+    best = maximise_over_noise(found, [], 1e-12)
+    rng = np.random.default_rng(3)
+    for size in (1e-2, 1e-1, 1.0):
+        precisions = best.sites.precisions * np.exp(size * rng.normal(size=200))
+        potentials = best.sites.potentials + size * rng.normal(size=200)
+        assert SparseBound.at(found, Sites(precisions, potentials)).value < best.value
+
+
+def test_at_the_maximum_one_number_per_row_describes_q() -> None:
+    found = problem(200, 20, 15)
+    best = maximise_over_noise(found, [], 1e-12)
+    np.testing.assert_allclose(best.tied_precisions, best.sites.precisions, atol=1e-5)
+    assert SparseBound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
+
+
+def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
+    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
+    start = maximise_over_noise(problem(200, 20, 15, elsewhere), [], 1e-3).sites
+    fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in ([], [start]))
+    assert warm == pytest.approx(fresh, abs=1e-7)
+
+
+def test_what_is_left_unknown_is_the_diagonal_of_the_dense_kernel_less_what_is_told() -> None:
+    inputs, _ = rows(50)
+    kernel = PARAMETERS.signal
+    induced = InducedKernel.of(kernel, inputs, inputs[:15])
+    cross, between = kernel.cross(inputs, inputs[:15]), kernel.matrix(inputs[:15])
+    told = cross @ np.linalg.solve(between + 1e-9 * kernel.variance * np.eye(15), cross.T)
+    np.testing.assert_allclose(induced.missing, kernel.variance - np.diagonal(told), atol=1e-7)
+    np.testing.assert_allclose(induced.times(inputs[:, 0]), told @ inputs[:, 0], atol=1e-6)
+    weights = np.exp(inputs[:, 1])
+    ridge, precision = induced.regularise(weights), np.linalg.inv(told + np.diag(1.0 / weights))
+    np.testing.assert_allclose(ridge.residual(inputs[:, 0]), precision @ (inputs[:, 0] / weights), atol=1e-6)
+    np.testing.assert_allclose(ridge.posterior_diagonal, np.diagonal(told - told @ precision @ told), atol=1e-6)
+
+
+def test_inducing_inputs_tell_more_than_as_many_random_rows() -> None:
+    inputs, _ = rows(2000)
+    kernel = PARAMETERS.signal
+    chosen = inducing_rows(kernel, inputs, 30)
+    assert len(np.unique(chosen)) == 30
+    at_random = np.random.default_rng(0).permutation(2000)[:30]
+    unknown, then = (InducedKernel.of(kernel, inputs, inputs[z]).missing.max() for z in (chosen, at_random))
+    assert unknown < 0.3 * then
+
+
+def test_where_few_rows_tell_of_all_others_no_more_are_taken() -> None:
+    inputs = np.random.default_rng(0).integers(0, 3, size=(500, 2)).astype(float)
+    chosen = inducing_rows(PARAMETERS.signal, inputs, 100)
+    assert len(chosen) == 9
+    assert len(np.unique(inputs[chosen], axis=0)) == 9

@@ -1,0 +1,227 @@
+"""The sparse VHGP: learnt from many rows, predicting, left out, on grids, in files, as a push model."""
+
+from __future__ import annotations
+
+import tracemalloc
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sparse_rows import PARAMETERS, rows
+from synthetic import square_rig
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.cross_validation import left_out
+from push_predictor.models.gaussian_process.kernels import KernelChoice
+from push_predictor.models.gaussian_process.sparse.bound import SparseProblem
+from push_predictor.models.gaussian_process.sparse.cross_validation import sparse_left_out
+from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
+from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
+from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
+from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.train import MOST_DENSE_ROWS, inducing_inputs, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+
+@cache
+def dense_and_sparse(n: int) -> tuple[VHGP, SparseVHGP]:
+    """The same hyperparameters and sites; as many inducing inputs as tell of all rows."""
+    inputs, outputs = rows(n)
+    dense = fit_vhgp(inputs, outputs)
+    chosen = inducing_rows(dense.parameters.signal, inputs, n), inducing_rows(dense.parameters.noise, inputs, n)
+    return dense, SparseVHGP(inputs, outputs, dense.parameters, dense.site_precisions, *chosen)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> SparseVHGP:
+    return fit_sparse_vhgp(*rows(3000), 40)
+
+
+def test_the_fit_finds_where_it_is_noisy(fitted: SparseVHGP) -> None:
+    new = np.random.default_rng(9).uniform(-1.2, 1.2, size=(200, 2))
+    prediction = fitted.predict(new)
+    ratio = np.sqrt(prediction.process_variance) / np.exp(new[:, 1] - 1.0)
+    assert np.exp(np.abs(np.log(ratio)).mean()) < 1.1
+    assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.03
+
+
+def test_it_predicts_what_a_dense_model_of_the_same_rows_and_hyperparameters_does() -> None:
+    dense, sparse = dense_and_sparse(300)
+    new = rows(50, seed=3)[0]
+    one, other = dense.predict(new), sparse.predict(new)
+    np.testing.assert_allclose(other.mean, one.mean, atol=2e-4)
+    np.testing.assert_allclose(other.outcome_variance, one.outcome_variance, rtol=2e-3)
+    np.testing.assert_allclose(other.log_noise_variance, one.log_noise_variance, rtol=1e-2, atol=1e-4)
+
+
+def test_more_rows_than_a_dense_model_takes_teach_it_more(fitted: SparseVHGP) -> None:
+    inputs, outputs = rows(3000)
+    new, truth = rows(500, seed=5)[0], np.sin(rows(500, seed=5)[0][:, 0])
+    dense: VHGP = fit_vhgp(inputs[:300], outputs[:300])
+    error, of_dense = (np.mean((m.predict(new).mean - truth) ** 2) for m in (fitted, dense))
+    assert error < 0.5 * of_dense
+
+
+def test_the_same_rows_give_the_same_model(fitted: SparseVHGP) -> None:
+    again = fit_sparse_vhgp(*rows(3000), 40)
+    new = rows(20, seed=4)[0]
+    np.testing.assert_array_equal(again.predict(new).mean, fitted.predict(new).mean)
+    np.testing.assert_array_equal(again.inducing_noise, fitted.inducing_noise)
+
+
+def test_a_model_is_its_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
+    chosen = fitted.inducing_signal, fitted.inducing_noise
+    again = SparseVHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions, *chosen)
+    one, other = fitted.predict(fitted.inputs[:50]), again.predict(fitted.inputs[:50])
+    np.testing.assert_array_equal(one.outcome_variance, other.outcome_variance)
+
+
+def test_one_input_is_predicted_as_in_a_batch(fitted: SparseVHGP) -> None:
+    new = rows(7, seed=1)[0]
+    batch = fitted.predict(new)
+    for i in range(7):
+        single = fitted.predict(new[i : i + 1])
+        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-9)
+        assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-7)
+
+
+def test_left_out_it_says_what_a_dense_model_does_left_out() -> None:
+    dense, sparse = dense_and_sparse(300)
+    block = np.random.default_rng(0).integers(0, 40, size=300)
+    of_dense, of_sparse = left_out(dense, block), sparse_left_out(sparse, block)
+    for name in ("mean", "variance", "log_noise_mean", "log_noise_variance"):
+        np.testing.assert_allclose(getattr(of_sparse, name), getattr(of_dense, name), atol=1e-4, err_msg=name)
+
+
+def test_left_out_a_row_does_not_know_itself() -> None:
+    """A value that no other row would expect moves what is predicted where it is, but not with the row left out."""
+    _, sparse = dense_and_sparse(300)
+    wrong = sparse.outputs.copy()
+    wrong[7] += 3.0
+    chosen = sparse.inducing_signal, sparse.inducing_noise
+    told = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
+    one, other = (sparse_left_out(model, np.arange(300)).mean[7] for model in (sparse, told))
+    assert one == pytest.approx(other, abs=1e-9)
+    assert told.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
+
+
+def test_on_a_grid_it_is_what_it_predicts(fitted: SparseVHGP) -> None:
+    regression = sparse_grid_regression(fitted)
+    axes = np.linspace(-1.0, 1.0, 7), np.linspace(-1.5, 1.0, 5)
+    points = fitted.predict(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
+    assert regression.noise is not None
+    for posterior, prior, mean, variance in (
+        (regression.signal, 0.0, points.mean, points.variance),
+        (regression.noise, regression.log_noise, points.log_noise_mean, points.log_noise_variance),
+    ):
+        scale = np.exp(posterior.kernel.log_lengthscales)
+        factors = [
+            np.exp(-0.5 * ((axis[:, None] - posterior.inputs[:, d]) / scale[d]) ** 2) for d, axis in enumerate(axes)
+        ]
+        on_grid = posterior.moments(factors)
+        np.testing.assert_allclose(on_grid[0].ravel() + prior, mean, atol=1e-9)
+        np.testing.assert_allclose(on_grid[1].ravel(), variance, rtol=1e-7)
+
+
+def test_a_record_gives_the_same_model_again(fitted: SparseVHGP) -> None:
+    arrays: dict[str, np.ndarray] = {}
+    put_inducing(fitted, 1, arrays)
+    assert has_inducing(1, arrays) and not has_inducing(0, arrays)
+    known = fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions
+    again = sparse_regression(*known, 1, arrays)
+    new = rows(20, seed=8)[0]
+    np.testing.assert_array_equal(again.predict(new).outcome_variance, fitted.predict(new).outcome_variance)
+    for wrong in (np.array([3, 3]), np.array([-1]), np.array([3000]), np.array([[1]]), np.empty(0)):
+        with pytest.raises(ValueError, match="different rows out of 3000"):
+            sparse_regression(*known, 1, {**arrays, "inducing_noise_1": wrong})
+
+
+def test_far_from_the_data_the_prior_is_left(fitted: SparseVHGP) -> None:
+    far, parameters = fitted.predict(np.array([[1e6, 1e6]])), fitted.parameters
+    assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
+    assert far.variance[0] == pytest.approx(parameters.signal.variance, rel=1e-5)
+    assert far.log_noise_mean[0] == pytest.approx(parameters.noise_mean)
+    assert far.log_noise_variance[0] == pytest.approx(parameters.noise.variance)
+
+
+def test_memory_is_that_of_the_rows_times_the_inducing_inputs() -> None:
+    inputs, outputs = rows(20_000)
+    chosen = np.arange(0, 20_000, 400)
+    tracemalloc.start()
+    try:
+        SparseVHGP(inputs, outputs, PARAMETERS, np.full(20_000, 0.5), chosen, chosen)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 3.0 * 8 * 20_000 * len(chosen)  # features of f and of g, and blocks
+
+
+@pytest.mark.parametrize("outputs", [np.zeros(200), np.sign(np.arange(200) - 20.0), np.eye(200)[3] * 30.0])
+def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
+    inputs = np.random.default_rng(0).normal(size=(200, 2))
+    prediction = fit_sparse_vhgp(inputs, outputs, 20).predict(inputs)
+    assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
+
+
+def test_repeated_inputs_are_no_obstacle() -> None:
+    inputs, outputs = rows(1200)
+    inputs = inputs[np.arange(1200) // 40 * 40]
+    assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 50).bound)
+
+
+def test_rows_and_kernels_that_cannot_be_learnt_from_are_refused() -> None:
+    with pytest.raises(TrainingError, match="NaN"):
+        fit_sparse_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
+    rough = VhgpParameters.from_vector(PARAMETERS.to_vector(), KernelChoice("matern52"))
+    with pytest.raises(TrainingError, match="Matern52"):
+        SparseProblem.of(*rows(10), rough, np.zeros((1, 2)), np.zeros((1, 2)))
+
+
+def table(n: int) -> PushTable:
+    """Pushes of five windows each, with noise that grows with the angle."""
+    rng = np.random.default_rng(0)
+    inputs = np.column_stack([np.full(n, 0.02), rng.uniform(0.0, 0.25, n), rng.uniform(-0.5, 0.5, n)])
+    noise = rng.normal(size=(n, 3)) * np.exp(2.0 * inputs[:, 2:] - 1.0)
+    outcomes = 1e-3 * (np.column_stack([np.cos(inputs[:, 2]), np.sin(inputs[:, 2]), inputs[:, 1]]) + noise)
+    return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"push-{k // 5}" for k in range(n)]))
+
+
+def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None:
+    assert inducing_inputs("vhgp", MOST_DENSE_ROWS) is None
+    assert inducing_inputs("vhgp", MOST_DENSE_ROWS + 1) == DEFAULT_INDUCING
+    assert inducing_inputs("vhgp", 100, 30) == 30
+    assert inducing_inputs("analytical", 100_000) is None
+    for kind, wanted in (("gp", 30), ("analytical", 30), ("vhgp", 0)):
+        with pytest.raises(TrainingError, match=f"inducing: {wanted} is not accepted"):
+            inducing_inputs(kind, 100, wanted)
+
+
+def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) -> None:
+    rows = table(400)
+    model = train_model(rows, square_rig(), "vhgp", name="sparse", n_train=400, inducing=30)
+    assert isinstance(model.body, LearnedBody)
+    assert all(isinstance(regression, SparseVHGP) for regression in model.body.regressions)
+    save_model(model, tmp_path / "sparse.pushmodel")
+    again = load_model(tmp_path / "sparse.pushmodel")
+    push = rows.inputs[:40], rows.duration[:40]
+    np.testing.assert_array_equal(again.predict(*push).covariance, model.predict(*push).covariance)
+    served = serve(again)
+    assert served.domain is not None, served.how
+    variance = np.diagonal(model.predict(*push).covariance, axis1=1, axis2=2)
+    of_table = np.diagonal(served.predict(*push).covariance, axis1=1, axis2=2)
+    np.testing.assert_allclose(of_table, variance, rtol=1e-2)
+    truth = 1e-6 * np.exp(4.0 * rows.inputs[:40, 2] - 2.0)
+    assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4
+
+
+def test_a_sparse_model_takes_no_other_kernels() -> None:
+    with pytest.raises(TrainingError, match="squared exponential"):
+        train_model(table(50), square_rig(), "vhgp", name="m", inducing=10, choice=KernelChoice("matern52"))

@@ -1,0 +1,355 @@
+"""Served models: a table that is true to the model inside its domain, the model itself everywhere else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import triangle
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.correlation import Correlation
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.tabulated import prediction_table
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
+from push_predictor.models.tabulated.tabulated_model import (
+    COVARIANCE_TOLERANCE,
+    MEAN_TOLERANCE,
+    ServedModel,
+    TableError,
+    relative_error,
+    serve,
+)
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+OUTLINES = {
+    "square": shape_outline("rect1"),
+    "hexagon": shape_outline("hex"),
+    "ellipse": shape_outline("ellip3"),
+    "circle": shape_outline("ellip1"),
+    "triangle": triangle(),
+}
+SIZES = {"mean": 1e-3, "covariance": 1e-9, "process_covariance": 1e-9, "in_domain": 0.0}  # SI, of the smaller ones
+FIELDS = tuple(SIZES)
+
+
+def pushes(outline: Outline, n: int, low: Array, high: Array, seed: int = 0) -> PushTable:
+    """Analytical outcomes with noise that grows with the angle; velocity, contact, angle between low and high (3,)."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.uniform(low, high, (n, 3))
+    duration = np.full(n, 0.2)
+    exact = AnalyticalPush(outline, 0.00475).displacement(inputs, duration)
+    noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    return PushTable(inputs, duration, exact + noise, np.array([f"p{k}" for k in range(n)]))
+
+
+def trained(outline: Outline, kind: str, low: Array, high: Array, n: int = 100) -> PushModel:
+    rig = Rig("made_up", outline, 0.00475, "plywood", 0.8)
+    return train_model(pushes(outline, n, low, high), rig, kind, name=f"a {kind}")
+
+
+WIDE = np.array([0.01, 0.0, -1.0]), np.array([0.05, 1.0, 1.0])
+
+
+KINDS = ("gp", "vhgp", "coupled vhgp")
+
+
+@cache
+def served(shape: str, kind: str) -> ServedModel:
+    """Trained on pushes at all velocities, contacts and angles; coupled: with a correlation that changes its sign."""
+    model = trained(OUTLINES[shape], kind.split()[-1], *WIDE, n=200 if shape == "triangle" else 100)
+    return serve(coupled(model) if "coupled" in kind else independent(model))
+
+
+def independent(model: PushModel) -> PushModel:
+    assert isinstance(model.body, LearnedBody)
+    return replace(model, body=replace(model.body, correlation=None))
+
+
+def coupled(model: PushModel, bandwidth: float = 0.5) -> PushModel:
+    assert isinstance(model.body, LearnedBody)
+    return replace(model, body=replace(model.body, correlation=sign_change(model, bandwidth)))
+
+
+def sign_change(model: PushModel, bandwidth: float) -> Correlation:
+    """dx and dtheta go together at angles above zero, against each other below, dy goes with neither."""
+    assert isinstance(model.body, LearnedBody)
+    z = np.random.default_rng(7).standard_normal((len(model.training), 3))
+    z[:, 2] = 0.2 * z[:, 2] + np.sign(model.training.inputs[:, 2]) * z[:, 0]
+    return Correlation(model.body.regressions[0].inputs, z.astype(np.float32).astype(float), bandwidth, 2.0)
+
+
+def inside(model: PushModel, n: int, seed: int = 5) -> Array:
+    """Pushes spread over the domain of a model."""
+    known = model.training.inputs
+    drawn = np.random.default_rng(seed).uniform(known.min(axis=0), known.max(axis=0), (10 * n, 3))
+    chosen = drawn[model.in_domain(drawn)][:n]
+    assert len(chosen) == n
+    return chosen
+
+
+def of(model: PushModel | ServedModel, inputs: Array) -> Prediction:
+    return model.predict(inputs, np.full(len(inputs), 0.2))
+
+
+def variances(covariance: Array) -> Array:
+    return np.diagonal(covariance, axis1=1, axis2=2)
+
+
+def assert_close(alone: Prediction, among: Prediction, row: int, precision: float) -> None:
+    """The first of one are those in a row of the other."""
+    for name, size in SIZES.items():
+        one, other = getattr(alone, name)[0], getattr(among, name)[row]
+        np.testing.assert_allclose(one, other, rtol=precision, atol=precision * size)
+
+
+def assert_true_to_the_model(answers: ServedModel, n: int = 400) -> None:
+    inputs = inside(answers.model, n)
+    table, exact = of(answers, inputs), of(answers.model, inputs)
+    assert answers.tabulated, answers.how
+    assert np.max(np.abs(table.mean - exact.mean) / np.sqrt(variances(exact.covariance))) < MEAN_TOLERANCE
+    for ours, theirs in ((table.covariance, exact.covariance), (table.process_covariance, exact.process_covariance)):
+        ratios = np.linalg.eigvals(np.linalg.solve(theirs, ours))
+        assert np.max(np.abs(ratios - 1.0)) < COVARIANCE_TOLERANCE
+    assert np.array_equal(table.in_domain, exact.in_domain)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
+def test_the_table_is_true_to_the_model(shape: str, kind: str) -> None:
+    assert_true_to_the_model(served(shape, kind))
+
+
+def test_the_made_up_correlation_is_a_strong_one_of_either_sign() -> None:
+    answers = served("square", "coupled vhgp")
+    covariance = of(answers, inside(answers.model, 200)).process_covariance
+    correlation = covariance[:, 0, 2] / np.sqrt(covariance[:, 0, 0] * covariance[:, 2, 2])
+    assert correlation.max() > 0.7 and correlation.min() < -0.7
+
+
+def test_independent_outputs_have_no_covariance() -> None:
+    for count in (1, 50):
+        table = of(served("square", "vhgp"), inside(served("square", "vhgp").model, count))
+        for covariance in (table.covariance, table.process_covariance):
+            assert np.all(covariance - variances(covariance)[:, :, None] * np.eye(3) == 0.0)
+
+
+def test_a_covariance_errs_by_what_it_says_of_the_worst_combination_of_outputs() -> None:
+    exact = np.array([[1.0, 0.0, 0.99], [0.0, 1.0, 0.0], [0.99, 0.0, 1.0]])
+    found = exact.copy()
+    found[0, 2] = found[2, 0] = 0.98  # one percent, but the variance of dx - dtheta has doubled
+    turned = np.random.default_rng(0).standard_normal((3, 3)) * [1e-3, 1e-3, 1e-1]
+    assert relative_error(found[None], exact[None]) == pytest.approx(1.0)
+    both = (turned @ matrix @ turned.T for matrix in (found, exact))
+    assert relative_error(*(matrix[None] for matrix in both)) == pytest.approx(1.0)
+    assert not TableError(0.0, 0.006).accepted and TableError(0.0, 0.004).accepted
+
+
+def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = coupled(served("circle", "gp").model, bandwidth=0.2)
+    monkeypatch.setattr(prediction_table, "COUPLING_CELLS", 1.5)
+    assert isinstance(model.body, LearnedBody)
+    first = tabulated_domain(model, model.body).table.knots
+    answers = serve(model)
+    assert answers.domain is not None and answers.domain.table.knots > first
+    assert_true_to_the_model(answers)
+
+
+NARROW = {
+    "one velocity": ([0.02, 0.0, -1.0], [0.02, 1.0, 1.0]),
+    "one angle": ([0.01, 0.0, 0.1], [0.05, 1.0, 0.1]),
+    "one contact": ([0.01, 0.1, -1.0], [0.05, 0.1, 1.0]),
+    "one velocity and contact": ([0.02, 0.4, -1.0], [0.02, 0.4, 1.0]),
+    "a part of an edge": ([0.01, 0.05, -1.0], [0.05, 0.2, 1.0]),
+}
+
+
+@pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
+@pytest.mark.parametrize("narrow", NARROW)
+def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
+    low, high = (np.array(limit) for limit in NARROW[narrow])
+    model = trained(OUTLINES[shape], "gp", low, high, n=60)
+    assert_true_to_the_model(serve(coupled(model)), n=200)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    shape=st.sampled_from(list(OUTLINES)),
+    kind=st.sampled_from(["gp", "coupled gp"]),
+    velocity=st.floats(0.005, 0.06),
+    contact=st.floats(0.0, 1.0, exclude_max=True),
+    angle=st.floats(-1.2, 1.2),
+)
+def test_a_push_gets_the_same_answer_alone_and_among_others(
+    shape: str, kind: str, velocity: float, contact: float, angle: float
+) -> None:
+    model, push = served(shape, kind), np.array([[velocity, contact, angle]])
+    others = inside(model.model, 20)
+    alone, among = of(model, push), of(model, np.concatenate([others[:10], push, others[10:]]))
+    # Outside the domain the model itself answers, whose solver takes one row or many in a different order.
+    precision = 1e-12 if alone.in_domain[0] else 1e-8
+    assert_close(alone, among, 10, precision)
+
+
+@settings(max_examples=40, deadline=None)
+@given(fraction=st.floats(0.02, 0.95), angle=st.floats(-0.9, 0.9), kind=st.sampled_from(KINDS))
+def test_sides_that_symmetry_makes_one_are_one(fraction: float, angle: float, kind: str) -> None:
+    for shape, order in (("square", 4), ("ellipse", 2)):
+        turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
+        prediction = of(served(shape, kind), turned)
+        for k in range(1, order):
+            assert_close(of(served(shape, kind), turned[k : k + 1]), prediction, 0, 1e-9)
+
+
+@pytest.mark.parametrize("kind", ["gp", "vhgp"])
+def test_a_circle_does_not_tell_contacts_apart(kind: str) -> None:
+    contact = np.linspace(0.0, 0.999, 7)
+    inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
+    assert np.ptp(of(served("circle", kind), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("shape", OUTLINES)
+def test_outside_the_domain_the_model_itself_answers(shape: str) -> None:
+    model = served(shape, "coupled gp")
+    out = inside(model.model, 30)
+    out[::2, 0] = 0.2
+    out[1::2, 2] = 1.4
+    table, exact = of(model, out), of(model.model, out)
+    assert not table.in_domain.any()
+    mixed = of(model, np.concatenate([out, inside(model.model, 5)]))
+    for name in FIELDS:
+        assert np.array_equal(getattr(table, name), getattr(exact, name))
+        assert np.array_equal(getattr(mixed, name)[:30], getattr(exact, name))
+    assert np.array_equal(mixed.in_domain, [False] * 30 + [True] * 5)
+
+
+def test_the_rim_of_the_domain_belongs_to_it() -> None:
+    for model in (served(shape, kind) for shape in OUTLINES for kind in ("gp", "vhgp")):
+        rim = np.array([[v, 0.3, a] for v in (0.0, 1.0) for a in (0.0, 1.0)])
+        known = model.model.training.inputs
+        rim[:, [0, 2]] = known.min(axis=0)[[0, 2]] + rim[:, [0, 2]] * np.ptp(known, axis=0)[[0, 2]]
+        table, exact = of(model, rim), of(model.model, rim)
+        assert np.array_equal(table.in_domain, exact.in_domain)
+        assert table.mean == pytest.approx(exact.mean, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_covariances_are_symmetric_and_positive_definite(kind: str) -> None:
+    for shape in ("square", "ellipse", "circle"):
+        prediction = of(served(shape, kind), inside(served(shape, kind).model, 300))
+        assert np.array_equal(prediction.covariance, prediction.covariance.transpose(0, 2, 1))
+        assert np.all(np.linalg.eigvalsh(prediction.process_covariance) > 0.0)
+        assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > 0.0)
+
+
+def test_no_rows_give_no_predictions() -> None:
+    prediction = of(served("square", "vhgp"), np.empty((0, 3)))
+    assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
+
+
+def test_the_analytical_model_answers_itself() -> None:
+    model = trained(OUTLINES["square"], "analytical", *WIDE)
+    answers, inputs = serve(model), inside(model, 5)
+    assert not answers.tabulated and answers.error is None and answers.how.startswith("exact")
+    for count in (1, 5):  # in plain numbers
+        np.testing.assert_allclose(of(answers, inputs[:count]).mean, of(model, inputs[:count]).mean, rtol=1e-12)
+
+
+def test_a_table_that_would_be_too_large_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    for limit in ("MOST_KNOTS", "MOST_NODES"):
+        with monkeypatch.context() as patch:
+            patch.setattr(prediction_table, limit, 100)
+            answers = serve(served("square", "gp").model)
+        assert not answers.tabulated
+        assert "at most 100" in answers.how
+
+
+def test_a_table_that_is_not_true_to_the_model_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = served("square", "vhgp").model
+    for name in ("SIGNAL", "NOISE"):
+        monkeypatch.setattr(prediction_table, name, prediction_table.Density(nodes=0.3, cells=0.3))
+    for name in ("FEWEST_NODES", "FEWEST_CELLS"):
+        monkeypatch.setattr(prediction_table, name, 4)
+    answers, inputs = serve(model), inside(model, 5)
+    assert not answers.tabulated
+    assert "too far off" in answers.how
+    assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
+
+
+# --- interpolation ----------------------------------------------------------------------------------------------
+
+
+def test_a_spline_takes_the_values_at_its_knots_and_reproduces_cubics() -> None:
+    axes = [Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7)]
+
+    def cubic(x: Array, y: Array) -> Array:
+        return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
+
+    knots = np.meshgrid(np.linspace(-1.0, 2.0, 6), np.linspace(0.0, 0.5, 8), indexing="ij")
+    spline = TensorSpline(axes, cubic(*knots)[None])
+    points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
+    points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
+    assert spline(points, 0) == pytest.approx(cubic(*points.T), abs=1e-12)
+    assert np.array([spline.at(p.tolist(), 0) for p in points]) == pytest.approx(cubic(*points.T), abs=1e-12)
+
+
+def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
+    points = np.linspace(0.0, 1.0, 997)[:, None]
+    errors = []
+    for cells in (40, 80):
+        values = np.exp(np.sin(6.0 * np.linspace(0.0, 1.0, cells + 1)))
+        spline = TensorSpline([Axis(0.0, 1.0, cells)], values[None, :, None])
+        errors.append(np.max(np.abs(spline(points, 0)[:, 0] - np.exp(np.sin(6.0 * points[:, 0])))[100:-100]))
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.15)
+
+
+def test_few_nodes_resolve_a_smooth_function() -> None:
+    axis = Axis(0.2, 3.0, 10)
+    for count, error in ((8, 1e-2), (16, 1e-6), (24, 1e-11)):
+        knots = along(0, axis.nodes_to_knots(count), np.exp(-(axis.nodes(count) ** 2)))
+        assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
+
+
+# --- what the server answers ------------------------------------------------------------------------------------
+
+
+def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    from msg_adapters.predictions import (
+        PushQuery,
+        prediction_from_response,
+        query_to_batch_request,
+        query_to_request,
+    )
+    from push_predictor.models.store.model_registry import ModelShelf
+    from push_predictor.nodes.server.answers import answer_batch, answer_load, answer_push
+    from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
+
+    model = coupled(trained(OUTLINES["square"], "vhgp", *WIDE))
+    save_model(model, tmp_path / "m.model")
+    shelf, loaded = ModelShelf(), LoadModel.Response()
+    answer_load(shelf, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
+    expected = serve(model)
+    assert expected.tabulated and expected.how in loaded.message and shelf.answering == [f"a vhgp: {expected.how}"]
+    inputs = inside(model, 40)
+    inputs[0, 0] = 0.2  # outside the domain
+    together, batch = of(expected, inputs), PredictPushBatch.Response()
+    answer_batch(lambda: None, shelf, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
+    for k, push in enumerate(inputs):
+        answer_push(shelf, query_to_request("", push, 0.2), single := PredictPush.Response())
+        assert_close(prediction_from_response(single), together, k, 1e-12 if k else 1e-8)
+    for name in FIELDS:
+        assert np.array_equal(getattr(prediction_from_response(batch), name), getattr(together, name))

@@ -1,0 +1,221 @@
+"""The VHGP: its bound is a bound, its gradient is the gradient, it finds noise that depends on the input."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+from scipy.stats import multivariate_normal
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.models.gaussian_process.vhgp_bound import Bound, Sites, VhgpProblem, bound_and_gradient
+from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.types import Array
+
+PARAMETERS = VhgpParameters(np.array([0.1, -0.2]), 0.2, np.array([0.3, 0.1]), -0.1, -1.0)
+
+
+def rows(n: int, seed: int = 0) -> tuple[Array, Array]:
+    """A sine of the first input, with noise whose standard deviation is exp(second input - 1)."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.normal(size=(n, 2))
+    return inputs, np.sin(inputs[:, 0]) + rng.normal(size=n) * np.exp(inputs[:, 1] - 1.0)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> VHGP:
+    return fit_vhgp(*rows(250))
+
+
+@pytest.mark.parametrize(("n", "every"), [(60, 1), (220, 40)])
+def test_gradient_of_every_parameter_equals_finite_differences(n: int, every: int) -> None:
+    """Of 60 rows all, of 220 (where kernels are factorised) some of the sites and all hyperparameters."""
+    inputs, outputs = rows(n)
+    sites = np.exp(0.5 * np.random.default_rng(1).normal(size=n) - 0.7)
+    at = np.concatenate([sites, PARAMETERS.to_vector()])
+
+    def value(vector: Array) -> float:
+        problem = VhgpProblem.of(inputs, outputs, VhgpParameters.from_vector(vector[n:]))
+        return Bound.tied(problem, vector[:n]).value
+
+    _, of_sites, of_parameters = bound_and_gradient(inputs, outputs, PARAMETERS, sites)
+    gradient = np.concatenate([of_sites, of_parameters])
+    scales = np.concatenate([sites, np.ones(7)])
+    for i in [*range(0, n, every), *range(n, n + 7)]:
+        h = np.zeros_like(at)
+        h[i] = 1e-3 * scales[i]
+        near, far = value(at + h) - value(at - h), value(at + 2 * h) - value(at - 2 * h)
+        expected = (8.0 * near - far) / (12.0 * h[i])
+        assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
+
+
+def test_the_bound_is_below_the_marginal_likelihood_and_near_it() -> None:
+    inputs, outputs = np.array([[0.0], [0.8]]), np.array([0.4, -0.9])
+    parameters = VhgpParameters(np.zeros(1), 0.0, np.zeros(1), -0.7, -1.0)
+    signal, noise = parameters.signal.matrix(inputs), parameters.noise.matrix(inputs)
+
+    def joint(g2: float, g1: float) -> float:
+        covariance = signal + np.diag(np.exp([g1, g2])) + parameters.jitter * np.eye(2)
+        likelihood = multivariate_normal.pdf(outputs, np.zeros(2), covariance)
+        return float(likelihood * multivariate_normal.pdf([g1, g2], [-1.0, -1.0], noise))
+
+    evidence = np.log(dblquad(joint, -4.5, 2.5, -4.5, 2.5, epsabs=1e-7)[0])
+    bound = maximise_over_noise(VhgpProblem.of(inputs, outputs, parameters), None, 1e-12).value
+    assert evidence - 0.1 < bound < evidence
+
+
+def test_without_freedom_for_the_noise_the_bound_is_the_homoscedastic_likelihood() -> None:
+    inputs, outputs = rows(60)
+    parameters = VhgpParameters(PARAMETERS.log_lengthscales, 0.2, np.zeros(2), -9.0, -1.0)
+    problem = VhgpProblem.of(inputs, outputs, parameters)
+    jittered = 0.5 * np.log(np.exp(-1.0) + parameters.jitter)
+    gp = GaussianProcess(inputs, outputs, GpParameters(PARAMETERS.log_lengthscales, 0.2, jittered))
+    assert maximise_over_noise(problem, None, 1e-12).value == pytest.approx(gp.log_marginal_likelihood, abs=1e-3)
+
+
+def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
+    inputs, outputs = rows(60)
+    problem = VhgpProblem.of(inputs, outputs, PARAMETERS)
+    best = maximise_over_noise(problem, None, 1e-13)
+    rng = np.random.default_rng(3)
+    for size in (1e-3, 1e-2, 1e-1, 1.0):
+        precisions = best.sites.precisions * np.exp(size * rng.normal(size=60))
+        potentials = best.sites.potentials + size * rng.normal(size=60)
+        assert Bound.at(problem, Sites(precisions, potentials)).value < best.value
+
+
+def test_at_the_maximum_one_number_per_row_describes_q() -> None:
+    problem = VhgpProblem.of(*rows(60), PARAMETERS)
+    best = maximise_over_noise(problem, None, 1e-13)
+    np.testing.assert_allclose(best.mean_weights, best.site_precisions - 0.5, atol=1e-5)
+    np.testing.assert_allclose(best.optimal_precisions, best.site_precisions, atol=1e-5)
+    assert Bound.tied(problem, best.site_precisions).value == pytest.approx(best.value, abs=1e-8)
+
+
+def test_a_loose_search_for_q_is_described_by_one_number_per_row_too() -> None:
+    problem = VhgpProblem.of(*rows(250), PARAMETERS)
+    loose = maximise_over_noise(problem, None, 1e-4)
+    best = maximise_over_noise(problem, None, 1e-12).value
+    tied = Bound.tied(problem, loose.tied_precisions)
+    np.testing.assert_allclose(tied.noise_mean, loose.noise_mean, atol=1e-9)
+    assert best - 1e-3 < loose.value <= best + 1e-9
+    assert best - 1e-3 < tied.value <= best + 1e-9
+
+
+def test_far_from_a_goal_the_search_for_q_ends_sooner() -> None:
+    problem = VhgpProblem.of(*rows(60), PARAMETERS)
+    best = maximise_over_noise(problem, None, 1e-12).value
+    near, far = (maximise_over_noise(problem, None, 1e-12, goal=best + gap).value for gap in (0.0, 50.0))
+    assert near == pytest.approx(best, abs=1e-6)
+    assert best - 1.0 < far < best - 1e-6
+
+
+@pytest.mark.parametrize("choice", [DEFAULT_CHOICE, KernelChoice("matern52", noise_nugget=True)])
+def test_a_fit_takes_less_memory_than_six_dense_matrices(choice: KernelChoice) -> None:
+    inputs, outputs = rows(700)
+    tracemalloc.start()
+    try:
+        fit_vhgp(inputs, outputs, choice, most_iterations=3)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 6 * 8 * 700**2
+
+
+def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
+    inputs, outputs = rows(80)
+    elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
+    start = maximise_over_noise(VhgpProblem.of(inputs, outputs, elsewhere), None, 1e-3).sites
+    problem = VhgpProblem.of(inputs, outputs, PARAMETERS)
+    fresh, warm = (maximise_over_noise(problem, where, 1e-12) for where in (None, start))
+    assert warm.value == pytest.approx(fresh.value, abs=1e-8)
+
+
+def test_the_fit_finds_where_it_is_noisy(fitted: VHGP) -> None:
+    new = np.random.default_rng(9).uniform(-1.2, 1.2, size=(200, 2))
+    prediction = fitted.predict(new)
+    ratio = np.sqrt(prediction.process_variance) / np.exp(new[:, 1] - 1.0)
+    assert np.exp(np.abs(np.log(ratio)).mean()) < 1.3
+    assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.1
+
+
+def test_heteroscedastic_data_are_explained_better_than_by_one_noise_level(fitted: VHGP) -> None:
+    assert fitted.bound > fit_gp(*rows(250)).log_marginal_likelihood + 30.0
+
+
+def test_homoscedastic_data_get_nearly_one_noise_level() -> None:
+    rng = np.random.default_rng(2)
+    inputs = rng.normal(size=(150, 2))
+    outputs = np.sin(inputs[:, 0]) + 0.3 * rng.normal(size=150)
+    noise = np.sqrt(fit_vhgp(inputs, outputs).predict(inputs).process_variance)
+    assert np.median(noise) == pytest.approx(0.3, rel=0.2)
+    assert noise.std() < 0.1
+
+
+def test_the_same_data_and_parameters_give_the_same_model(fitted: VHGP) -> None:
+    new = rows(50, seed=4)[0]
+    again = VHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions)
+    one, other = fitted.predict(new), again.predict(new)
+    np.testing.assert_allclose(one.mean, other.mean, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(one.outcome_variance, other.outcome_variance, rtol=1e-12)
+    assert again.bound == pytest.approx(fitted.bound, abs=1e-9)
+
+
+def test_one_input_is_predicted_as_in_a_batch(fitted: VHGP) -> None:
+    new = rows(7, seed=1)[0]
+    batch = fitted.predict(new)
+    for i in range(7):
+        single = fitted.predict(new[i : i + 1])
+        assert single.mean[0] == pytest.approx(batch.mean[i], abs=1e-11)
+        assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-9)
+
+
+def test_rows_have_no_order(fitted: VHGP) -> None:
+    order = np.random.default_rng(5).permutation(250)
+    shuffled = VHGP(fitted.inputs[order], fitted.outputs[order], fitted.parameters, fitted.site_precisions[order])
+    new = rows(20, seed=6)[0]
+    one, other = fitted.predict(new), shuffled.predict(new)
+    np.testing.assert_allclose(one.mean, other.mean, atol=1e-9)
+    np.testing.assert_allclose(one.outcome_variance, other.outcome_variance, rtol=1e-8)
+
+
+def test_far_from_the_data_the_prior_is_left(fitted: VHGP) -> None:
+    far = fitted.predict(np.array([[1e6, 1e6]]))
+    parameters = fitted.parameters
+    assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
+    assert far.variance[0] == pytest.approx(parameters.signal.variance, rel=1e-5)
+    assert far.log_noise_mean[0] == pytest.approx(parameters.noise_mean)
+    assert far.log_noise_variance[0] == pytest.approx(parameters.noise.variance)
+
+
+def test_variances_stay_positive_at_and_between_noiseless_rows() -> None:
+    inputs = np.random.default_rng(0).normal(size=(120, 2))
+    model = fit_vhgp(inputs, np.sin(inputs[:, 0]))
+    prediction = model.predict(np.concatenate([inputs, 0.5 * (inputs[1:] + inputs[:-1])]))
+    assert (prediction.variance > 0.0).all() and (prediction.log_noise_variance > 0.0).all()
+    assert np.isfinite(prediction.outcome_variance).all()
+    assert np.abs(prediction.mean[:120] - model.outputs).max() < 1e-2
+
+
+@pytest.mark.parametrize("outputs", [np.zeros(40), np.sign(np.arange(40) - 20.0), np.eye(40)[3] * 30.0])
+def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
+    inputs = np.random.default_rng(0).normal(size=(40, 2))
+    prediction = fit_vhgp(inputs, outputs).predict(inputs)
+    assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
+
+
+def test_repeated_inputs_are_no_obstacle() -> None:
+    inputs, outputs = rows(300)
+    inputs = inputs[np.arange(300) // 10 * 10]
+    assert np.isfinite(fit_vhgp(inputs, outputs).bound)
+
+
+def test_rows_that_cannot_be_learnt_from_are_refused() -> None:
+    with pytest.raises(TrainingError, match="NaN"):
+        fit_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))

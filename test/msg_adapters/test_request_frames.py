@@ -1,0 +1,419 @@
+"""Requests in the world frame and in others: frames in space, messages, and a made-up tf.
+
+tf2_ros is not among what the tests can install: MadeUpTf stands for it, and shows no more than that it is asked as its
+documentation says.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from scipy.spatial.transform import Rotation
+from std_msgs.msg import Header
+from synthetic import square_pushes
+
+from msg_adapters import MessageError
+from msg_adapters.slider_poses import FLAT, fill_slider_response, query_from_slider_request, world_push
+from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.train import train_model
+from push_predictor.nodes.server.pose_answers import answer_slider_pose
+from push_predictor.nodes.server.request_frames import RequestFrames
+from push_predictor.planning.slider_pose import SliderAfter, slider_after
+from push_predictor_interfaces.srv import PredictSliderPose
+
+COVARIANCE = np.array([[4e-8, 1e-8, 3e-7], [1e-8, 1e-8, 2e-7], [3e-7, 2e-7, 3e-5]])
+NUMBERS = st.floats(-3.0, 3.0)
+POSES = st.builds(
+    lambda p, q: SpatialPose(np.array(p), np.array(q) / np.linalg.norm(q)),
+    st.tuples(NUMBERS, NUMBERS, NUMBERS),
+    st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS).filter(lambda q: np.linalg.norm(q) > 0.1),
+)
+TABLE_TOP = SpatialPose(np.array([0.5, -0.3, 0.8]), vertical_turn(2.0))  # flat, but turned and shifted
+CAMERA = SpatialPose(np.array([1.0, 0.2, 1.5]), Rotation.from_euler("xyz", [2.4, 0.3, -1.0]).as_quat())  # looks down
+
+
+def slider_request(frame_id: str = "world", **change: Any) -> PredictSliderPose.Request:
+    """A tip that drives along x at the first edge of the square, which is at (0.3, 0.1, 0.02) and not turned."""
+    request = PredictSliderPose.Request(
+        header=Header(stamp=Time(sec=100, nanosec=900_000_000), frame_id=frame_id),
+        slider=Pose(position=Point(x=0.3, y=0.1, z=0.02), orientation=Quaternion(w=1.0)),
+        pusher=Point(x=0.3 - 0.045 - 0.00475, y=0.11, z=0.03),
+        pusher_velocity=Vector3(x=0.02, y=0.004),
+        duration=0.2,
+    )
+    for name, value in change.items():
+        *path, last = name.split("__")
+        place = request
+        for part in path:
+            place = getattr(place, part)
+        setattr(place, last, value)
+    return request
+
+
+def seen_from(frame: SpatialPose, request: PredictSliderPose.Request, frame_id: str) -> PredictSliderPose.Request:
+    """The same request, asked in another frame."""
+    query, there = query_from_slider_request(request), frame.inverse
+    slider, pusher, velocity = there @ query.slider, there.point(query.pusher), there.vector(query.velocity)
+    request = slider_request(frame_id)
+    request.slider = Pose(position=Point(**axes(slider.position)), orientation=Quaternion(**axes(slider.quaternion)))
+    request.pusher, request.pusher_velocity = Point(**axes(pusher)), Vector3(**axes(velocity))
+    return request
+
+
+def axes(values: np.ndarray) -> dict[str, float]:
+    return dict(zip("xyzw", values.tolist(), strict=False))
+
+
+def pose_of(answer: Any) -> SpatialPose:
+    pose = answer.pose.pose
+    position, turn = pose.position, pose.orientation
+    return SpatialPose(np.array([position.x, position.y, position.z]), np.array([turn.x, turn.y, turn.z, turn.w]))
+
+
+def assert_same_pose(one: SpatialPose, other: SpatialPose, atol: float = 1e-12) -> None:
+    np.testing.assert_allclose(one.position, other.position, atol=atol)
+    np.testing.assert_allclose(one.rotation, other.rotation, atol=atol)
+
+
+# --- poses in space ---------------------------------------------------------------------------------------------
+
+
+@settings(deadline=None)
+@given(POSES, POSES, st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array))
+def test_poses_compose_as_rotations_and_shifts_do(outer: SpatialPose, inner: SpatialPose, point: np.ndarray) -> None:
+    np.testing.assert_allclose(outer.rotation, Rotation.from_quat(outer.quaternion).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose((outer @ inner).point(point), outer.point(inner.point(point)), atol=1e-12)
+    np.testing.assert_allclose(outer.inverse.point(outer.point(point)), point, atol=1e-12)
+    np.testing.assert_allclose(outer.vector(point), outer.point(point) - outer.point(np.zeros(3)), atol=1e-12)
+    assert_same_pose(outer.inverse @ (outer @ inner), inner)
+    assert_same_pose(SAME_FRAME @ inner, inner, atol=0.0)
+
+
+@settings(deadline=None)
+@given(POSES, NUMBERS)
+def test_tilt_is_the_angle_between_the_vertical_axes(pose: SpatialPose, turn: float) -> None:
+    up = pose.vector(np.array([0.0, 0.0, 1.0]))
+    assert pose.tilt == pytest.approx(np.arctan2(np.hypot(*up[:2]), up[2]), abs=1e-7)
+    assert pose.turned(turn).tilt == pytest.approx(pose.tilt, abs=1e-7)
+    before, after = (Rotation.from_quat(p.quaternion) for p in (pose, pose.turned(turn)))
+    np.testing.assert_allclose(
+        (after * before.inv()).as_matrix(), Rotation.from_euler("z", turn).as_matrix(), atol=1e-12
+    )
+
+
+def test_a_covariance_in_space_is_that_of_samples_seen_from_the_other_frame() -> None:
+    """Small errors of a pose, drawn in one frame: shift and turn as a fixed-axis rotation vector."""
+    rng = np.random.default_rng(0)
+    root = 1e-4 * rng.standard_normal((6, 6))
+    body, outer = SpatialPose(np.array([0.1, 0.2, 0.3]), CAMERA.quaternion), TABLE_TOP @ CAMERA
+    seen, base = [], outer @ body
+    for error in rng.standard_normal((2000, 6)) @ root.T:
+        turned = Rotation.from_rotvec(error[3:]) * Rotation.from_quat(body.quaternion)
+        there = outer @ SpatialPose(body.position + error[:3], turned.as_quat())
+        turn = Rotation.from_quat(there.quaternion) * Rotation.from_quat(base.quaternion).inv()
+        seen.append(np.concatenate([there.position - base.position, turn.as_rotvec()]))
+    expected = outer.covariance(root @ root.T)
+    assert np.abs(np.cov(np.array(seen).T) - expected).max() < 0.1 * np.abs(expected).max()
+    # The draws themselves rotate exactly, whatever their scatter:
+    errors = np.random.default_rng(0)
+    errors.standard_normal((6, 6))
+    drawn = errors.standard_normal((2000, 6)) @ root.T
+    np.testing.assert_allclose(np.cov(np.array(seen).T), outer.covariance(np.cov(drawn.T)), atol=1e-3 * expected.max())
+
+
+# --- messages ---------------------------------------------------------------------------------------------------
+
+
+def answered(request: Any, after: SliderAfter, frame: SpatialPose = SAME_FRAME) -> PredictSliderPose.Response:
+    response, query = PredictSliderPose.Response(), query_from_slider_request(request)
+    fill_slider_response(response, request.header, query, frame, world_push(query, frame), after)
+    return deserialize_message(serialize_message(response), PredictSliderPose.Response)
+
+
+def test_a_request_says_what_is_pushed() -> None:
+    request = slider_request(
+        slider__orientation=Quaternion(z=np.sin(0.35), w=np.cos(0.35)),
+        covariate_names=["elapsed_time", "topic:/warmth"],
+        covariate_values=[3.0, 21.5],
+    )
+    push = world_push(query_from_slider_request(request), SAME_FRAME)
+    np.testing.assert_allclose(push.slider, [0.3, 0.1, 0.7], atol=1e-15)
+    np.testing.assert_array_equal(push.pusher, [0.3 - 0.045 - 0.00475, 0.11])
+    np.testing.assert_array_equal(push.velocity, [0.02, 0.004])
+    assert push.duration == 0.2
+    assert push.covariates == {"elapsed_time": 3.0, "topic:/warmth": 21.5}
+
+
+def test_an_answer_is_a_pose_with_covariance_in_the_order_of_geometry_msgs() -> None:
+    response = answered(slider_request(), SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True))
+    assert response.success and response.in_domain and response.message == ""
+    after = response.slider_after
+    assert after.header.frame_id == "world"
+    assert (after.header.stamp.sec, after.header.stamp.nanosec) == (101, 100_000_000)  # 100.9 s and the push of 0.2 s
+    pose = pose_of(after)
+    np.testing.assert_array_equal(pose.position, [0.304, 0.101, 0.02])  # the slider stays on the table
+    np.testing.assert_allclose(pose.quaternion, [0.0, 0.0, np.sin(0.025), np.cos(0.025)], atol=1e-15)
+    assert (pose.quaternion[:2] == 0.0).all()
+    matrix = np.array(after.pose.covariance).reshape(6, 6)
+    np.testing.assert_array_equal(matrix[np.ix_([0, 1, 5], [0, 1, 5])], COVARIANCE)
+    others = [2, 3, 4]
+    assert not matrix[others].any() and not matrix[:, others].any()
+
+
+def test_an_unknown_time_stays_unknown() -> None:
+    after = answered(slider_request(header__stamp=Time()), SliderAfter(np.zeros(3), COVARIANCE, False)).slider_after
+    assert (after.header.stamp.sec, after.header.stamp.nanosec) == (0, 0)
+
+
+def test_a_time_beyond_what_a_stamp_holds_is_refused() -> None:
+    with pytest.raises(MessageError, match="stamp"):
+        answered(slider_request(duration=1e10), SliderAfter(np.zeros(3), COVARIANCE, False))
+
+
+def test_a_small_tilt_stays_as_it_was() -> None:
+    tilted = Rotation.from_euler("z", 0.4) * Rotation.from_euler("xy", [0.03, -0.02])
+    request = slider_request(slider__orientation=Quaternion(**axes(tilted.as_quat())))
+    response = answered(request, SliderAfter(np.array([0.3, 0.1, 0.4 + 0.2]), COVARIANCE, True))
+    turned = Rotation.from_quat(pose_of(response.slider_after).quaternion) * tilted.inv()
+    assert turned.as_rotvec() == pytest.approx(
+        [0.0, 0.0, 0.2], abs=2e-3
+    )  # the heading of a tilted body is not its turn
+    assert pose_of(response.slider_after).tilt == pytest.approx(
+        SpatialPose(np.zeros(3), tilted.as_quat()).tilt, abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    ("field", "shown"),
+    [(f"slider__position__{axis}", f"slider.position.{axis}") for axis in "xyz"]
+    + [(f"slider__orientation__{axis}", f"slider.orientation.{axis}") for axis in "xyzw"]
+    + [(f"pusher__{axis}", f"pusher.{axis}") for axis in "xyz"]
+    + [(f"pusher_velocity__{axis}", f"pusher_velocity.{axis}") for axis in "xyz"],
+)
+def test_a_number_that_is_not_finite_is_refused_by_field(field: str, shown: str, bad: float) -> None:
+    with pytest.raises(RequestError, match=f"^{shown}: {bad!r} is not accepted, give a finite number"):
+        query_from_slider_request(slider_request(**{field: bad}))
+
+
+@pytest.mark.parametrize(
+    ("change", "begins"),
+    [
+        ({"slider__orientation": Quaternion(w=0.0)}, "slider.orientation norm: 0.0 is not accepted, give a unit"),
+        ({"slider__orientation": Quaternion(w=1.01)}, "slider.orientation norm: 1.01"),
+        ({"slider__orientation": Quaternion(x=1.0, w=0.0)}, "slider.orientation tilt: 3.1416"),  # on its head
+        ({"slider__orientation": Quaternion(x=math.sin(0.06), w=math.cos(0.06))}, "slider.orientation tilt: 0.12 "),
+        ({"pusher__z": 0.05}, "pusher.z: 0.05 is not accepted, give a tip at most 0.02 m above the slider's frame"),
+        ({"pusher_velocity__z": -0.01}, "pusher_velocity.z: -0.01 is not accepted, give a velocity within 0.1 rad"),
+        ({"pusher_velocity": Vector3(z=0.01)}, "pusher_velocity.z: 0.01"),
+        ({"covariate_names": ["a"]}, "covariate_values length: 0 is not accepted, give 1, one a name and push"),
+        ({"covariate_values": [1.0]}, "covariate_values length: 1"),
+        ({"covariate_names": ["a", "a"], "covariate_values": [1.0, 2.0]}, "covariate_names: ['a']"),
+    ],
+)
+def test_what_is_no_planar_push_is_refused_by_field(change: dict[str, Any], begins: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        world_push(query_from_slider_request(slider_request(**change)), SAME_FRAME)
+    assert str(caught.value).startswith(begins)
+
+
+def test_what_a_tracker_is_off_is_no_tilt_and_no_plunge() -> None:
+    half = 0.45 * FLAT
+    world_push(
+        query_from_slider_request(
+            slider_request(
+                slider__orientation=Quaternion(y=math.sin(half), w=math.cos(half)),
+                pusher_velocity__z=0.0015,
+                pusher__z=0.0,
+            )
+        ),
+        SAME_FRAME,
+    )
+
+
+# --- other frames -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frame", [TABLE_TOP, CAMERA], ids=["table_top", "camera"])
+def test_a_request_in_another_frame_is_the_same_push_and_gets_the_same_answer(frame: SpatialPose) -> None:
+    asked, elsewhere = slider_request(), seen_from(frame, slider_request(), "elsewhere")
+    here = world_push(query_from_slider_request(asked), SAME_FRAME)
+    there = world_push(query_from_slider_request(elsewhere), frame)
+    for name in ("slider", "pusher", "velocity"):
+        np.testing.assert_allclose(getattr(there, name), getattr(here, name), atol=1e-12)
+    after = SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True)
+    in_world, in_frame = answered(asked, after).slider_after, answered(elsewhere, after, frame).slider_after
+    assert in_frame.header.frame_id == "elsewhere"
+    assert_same_pose(frame @ pose_of(in_frame), pose_of(in_world))
+    world, own = (np.array(a.pose.covariance).reshape(6, 6) for a in (in_world, in_frame))
+    np.testing.assert_array_equal(own, own.T)
+    np.testing.assert_allclose(frame.covariance(own), world, atol=1e-18)
+
+
+def test_a_flat_frame_gets_a_flat_answer() -> None:
+    """No height, roll or pitch comes in by the transform; the heading's variance is the same in both."""
+    elsewhere = seen_from(TABLE_TOP, slider_request(), "table_top")
+    after = answered(elsewhere, SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True), TABLE_TOP).slider_after
+    pose, matrix = pose_of(after), np.array(after.pose.covariance).reshape(6, 6)
+    assert (pose.quaternion[:2] == 0.0).all()
+    assert not matrix[[2, 3, 4]].any()
+    assert matrix[5, 5] == pytest.approx(3e-5, rel=1e-12)
+    assert np.linalg.eigvalsh(matrix[:2, :2]) == pytest.approx(np.linalg.eigvalsh(COVARIANCE[:2, :2]), rel=1e-9)
+
+
+def test_a_slider_that_is_flat_only_in_its_own_frame_is_refused() -> None:
+    with pytest.raises(RequestError, match=r"slider\.orientation tilt"):
+        world_push(query_from_slider_request(slider_request("camera")), CAMERA)
+
+
+@settings(max_examples=30, deadline=None)
+@given(POSES)
+def test_any_frame_in_space_leads_to_the_same_prediction(frame: SpatialPose) -> None:
+    model = analytical()
+    here = slider_after(model, world_push(query_from_slider_request(slider_request()), SAME_FRAME))
+    elsewhere = query_from_slider_request(seen_from(frame, slider_request(), "elsewhere"))
+    there = slider_after(model, world_push(elsewhere, frame))
+    np.testing.assert_allclose(there.pose, here.pose, atol=1e-9)
+    np.testing.assert_allclose(there.covariance, here.covariance, rtol=1e-6, atol=1e-16)
+
+
+# --- which frames are known -------------------------------------------------------------------------------------
+
+
+class MadeUpError(Exception):
+    """Stands for tf2_ros.TransformException."""
+
+
+class MadeUpBuffer:
+    """Stands for tf2_ros.Buffer: knows `table_top` and `camera` in `world`, from 50 s on."""
+
+    asked: list[tuple[str, str, int]]
+
+    def __init__(self) -> None:
+        self.asked = []
+
+    def lookup_transform(self, target_frame: str, source_frame: str, time: Any) -> Any:  # no timeout: it would block
+        self.asked.append((target_frame, source_frame, time.nanoseconds))
+        known = {"table_top": TABLE_TOP, "camera": CAMERA}
+        if source_frame not in known:
+            raise MadeUpError(f'"{source_frame}" passed to lookupTransform argument source_frame does not exist.')
+        if 0 < time.nanoseconds < 50_000_000_000:
+            raise MadeUpError("Lookup would require extrapolation into the past.")
+        pose = known[source_frame]
+        transform = Transform(translation=Vector3(**axes(pose.position)), rotation=Quaternion(**axes(pose.quaternion)))
+        return SimpleNamespace(transform=transform)
+
+
+class MadeUpTf(SimpleNamespace):
+    """Stands for the module tf2_ros."""
+
+    def __init__(self) -> None:
+        self.buffers: list[MadeUpBuffer] = []
+        self.listeners: list[tuple[Any, Any]] = []
+        super().__init__(TransformException=MadeUpError)
+
+    def Buffer(self) -> MadeUpBuffer:  # noqa: N802 (its name in tf2_ros)
+        self.buffers.append(MadeUpBuffer())
+        return self.buffers[-1]
+
+    def TransformListener(self, buffer: Any, node: Any) -> object:  # noqa: N802 (its name in tf2_ros)
+        self.listeners.append((buffer, node))
+        return object()
+
+
+@pytest.fixture
+def tf(monkeypatch: pytest.MonkeyPatch) -> MadeUpTf:
+    made_up = MadeUpTf()
+    monkeypatch.setitem(sys.modules, "tf2_ros", made_up)
+    return made_up
+
+
+@pytest.fixture
+def no_tf(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "tf2_ros", None)  # importing it fails
+
+
+def header(frame_id: str, sec: int = 100) -> Header:
+    return Header(frame_id=frame_id, stamp=Time(sec=sec))
+
+
+def test_the_world_frame_is_used_as_it_is(no_tf: None) -> None:
+    assert RequestFrames(object(), "table").located(header("table")) is SAME_FRAME
+
+
+@pytest.mark.parametrize("frame_id", ["map", "World"])
+def test_without_tf_another_frame_is_refused_by_name(no_tf: None, frame_id: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        RequestFrames(object(), "world").located(header(frame_id))
+    expected = f"header.frame_id: {frame_id!r} is not accepted, give 'world'; tf2_ros is not installed"
+    assert str(caught.value) == expected
+
+
+def test_a_slash_of_old_habit_is_named(tf: MadeUpTf) -> None:
+    with pytest.raises(RequestError, match="give 'world', without a slash"):
+        RequestFrames(object(), "world").located(header("/world"))
+
+
+def test_a_frame_without_a_name_is_refused(tf: MadeUpTf) -> None:
+    with pytest.raises(RequestError, match=r"header\.frame_id: '' is not accepted, give .* 'world'"):
+        RequestFrames(object(), "world").located(header(""))
+    assert not tf.buffers[0].asked
+
+
+def test_made_up_tf_is_asked_for_the_frame_in_the_world_at_the_stamp(tf: MadeUpTf) -> None:
+    node = object()
+    frames = RequestFrames(node, "world")
+    assert tf.listeners == [(tf.buffers[0], node)]
+    assert_same_pose(frames.located(header("camera", 100)), CAMERA)
+    assert_same_pose(frames.located(header("table_top", 0)), TABLE_TOP)  # zero: the latest
+    assert frames.located(header("world")) is SAME_FRAME
+    assert tf.buffers[0].asked == [("world", "camera", 100_000_000_000), ("world", "table_top", 0)]
+
+
+@pytest.mark.parametrize(("frame_id", "sec", "said"), [("map", 100, '"map" passed'), ("camera", 10, "extrapolation")])
+def test_what_made_up_tf_says_is_passed_on(tf: MadeUpTf, frame_id: str, sec: int, said: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        RequestFrames(object(), "world").located(header(frame_id, sec))
+    assert str(caught.value).startswith(f"header.frame_id: {frame_id!r} is not accepted, give 'world', or a frame")
+    assert said in str(caught.value)
+
+
+@cache
+def analytical() -> Any:
+    return train_model(*square_pushes(30), "analytical", name="square")
+
+
+def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_path: Any) -> None:
+    shelf, frames = ModelShelf(), RequestFrames(object(), "world")
+    save_model(analytical(), tmp_path / "square.model")
+    shelf.load(tmp_path / "square.model")
+    here, there = PredictSliderPose.Response(), PredictSliderPose.Response()
+    answer_slider_pose(frames, shelf, slider_request(), here)
+    answer_slider_pose(frames, shelf, seen_from(CAMERA, slider_request(), "camera"), there)
+    assert here.success and there.success
+    assert here.slider_after.header.frame_id == "world" and there.slider_after.header.frame_id == "camera"
+    assert_same_pose(CAMERA @ pose_of(there.slider_after), pose_of(here.slider_after), atol=1e-9)
+    world, own = (np.array(r.slider_after.pose.covariance).reshape(6, 6) for r in (here, there))
+    np.testing.assert_allclose(CAMERA.covariance(own), world, atol=1e-12)
+    assert world.any()
+
+
+def test_a_refusal_leaves_no_number_behind(no_tf: None, tmp_path: Any) -> None:
+    shelf, response = ModelShelf(), PredictSliderPose.Response()
+    with pytest.raises(PushPredictorError):
+        answer_slider_pose(RequestFrames(object(), "world"), shelf, slider_request(), response)
+    assert response == PredictSliderPose.Response()

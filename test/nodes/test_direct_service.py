@@ -1,0 +1,120 @@
+"""DirectService: a service that no executor has to get round to."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+import ros_harness as harness
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+
+from push_predictor.nodes.server.direct_service import DirectService
+
+DEPTH = QoSProfile(depth=100)
+
+
+@pytest.fixture(scope="module")
+def client_node():
+    with harness.ros_context(harness.free_domain()) as node:
+        yield node
+
+
+@pytest.fixture
+def server(client_node):
+    node = Node("server", context=client_node.context)
+    yield node
+    node.destroy_node()
+
+
+def thread_name(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    response.success, response.message = True, threading.current_thread().name
+    return response
+
+
+def test_it_answers_though_nobody_spins_its_node(client_node, server):
+    service = DirectService(server, Trigger, "alone", thread_name, DEPTH)
+    service.begin()
+    client = client_node.create_client(Trigger, "alone", qos_profile=DEPTH)
+    for _ in range(20):
+        assert harness.call(client, Trigger.Request()).message == "alone"
+    service.close()
+
+
+def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_node, server):
+    service = DirectService(server, Trigger, "direct", thread_name, DEPTH)
+    service.begin()
+    server.create_service(Trigger, "usual", thread_name, qos_profile=DEPTH)
+    clients = {name: client_node.create_client(Trigger, name, qos_profile=DEPTH) for name in ("direct", "usual")}
+    executor = SingleThreadedExecutor(context=client_node.context)
+    executor.add_node(server)
+    spinning = threading.Thread(target=executor.spin, name="executor")
+    spinning.start()
+    try:
+        for _ in range(20):
+            names = {name: harness.call(client, Trigger.Request()).message for name, client in clients.items()}
+            assert names == {"direct": "direct", "usual": "executor"}
+    finally:
+        service.close()
+        executor.shutdown()
+        spinning.join()
+
+
+def test_requests_that_arrive_together_are_all_answered(client_node, server):
+    service = DirectService(server, Trigger, "many", thread_name, DEPTH)
+    service.begin()
+    client = client_node.create_client(Trigger, "many", qos_profile=DEPTH)
+    harness.call(client, Trigger.Request())
+    futures = [client.call_async(Trigger.Request()) for _ in range(30)]
+    assert harness.wait_until(lambda: all(future.done() for future in futures))
+    service.close()
+
+
+def test_requests_wait_until_it_begins_and_those_that_wait_when_it_ends_are_answered(client_node, server):
+    def slow(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        time.sleep(0.05)
+        return thread_name(request, response)
+
+    service = DirectService(server, Trigger, "late", slow, DEPTH)
+    client = client_node.create_client(Trigger, "late", qos_profile=DEPTH)
+    assert client.wait_for_service(harness.START_TIMEOUT)
+    futures = [client.call_async(Trigger.Request()) for _ in range(5)]
+    assert not harness.wait_until(lambda: any(future.done() for future in futures), 0.3)
+    service.begin()
+    assert harness.wait_until(lambda: futures[0].done())
+    service.close()
+    assert harness.wait_until(lambda: all(future.done() for future in futures))
+
+
+def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(client_node, server, capfd):
+    def broken_once(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not asked:
+            asked.append(request)
+            raise ZeroDivisionError("a bug")
+        return thread_name(request, response)
+
+    asked: list[Trigger.Request] = []
+    service = DirectService(server, Trigger, "broken", broken_once, DEPTH)
+    service.begin()
+    client = client_node.create_client(Trigger, "broken", qos_profile=DEPTH)
+    assert client.wait_for_service(harness.START_TIMEOUT)
+    unanswered = client.call_async(Trigger.Request())
+    assert harness.call(client, Trigger.Request()).success
+    assert not unanswered.done()
+    assert "ZeroDivisionError: a bug" in capfd.readouterr().err
+    service.close()
+
+
+def test_closing_ends_the_thread_and_takes_the_service_off_the_graph(client_node, server):
+    for _ in range(3):  # it can be offered again
+        service = DirectService(server, Trigger, "passing", thread_name, DEPTH)
+        service.begin()
+        client = client_node.create_client(Trigger, "passing", qos_profile=DEPTH)
+        assert harness.call(client, Trigger.Request()).success
+        service.close()
+        assert "passing" not in [thread.name for thread in threading.enumerate()]
+        assert harness.wait_until(lambda ready=client.service_is_ready: not ready())
+        client_node.destroy_client(client)

@@ -1,0 +1,185 @@
+"""The launch file: it starts the three nodes with parameters that they have.
+
+Neither launch nor launch_ros can be installed beside the ROS wheels, so the few names that the file uses are stood in
+for here; what is tested is what the file asks of them.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+from ros_harness import REPOSITORY
+
+from push_predictor.nodes import predict_server, push_validator
+from push_predictor.nodes.replay import options as replay_options
+
+FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
+PARAMETERS = {
+    "predict_server": predict_server.PARAMETERS,
+    "push_replay": replay_options.PARAMETERS,
+    "push_validator": push_validator.PARAMETERS,
+}
+
+
+@dataclass
+class Standin:
+    """An action of launch: remembers how it was made."""
+
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any] = field(default_factory=dict)
+
+
+def standin(name: str) -> type[Standin]:
+    return type(name, (Standin,), {"__init__": lambda self, *args, **kwargs: Standin.__init__(self, args, kwargs)})
+
+
+@pytest.fixture
+def launch_file(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """The names the launch file defines."""
+    needed = {
+        "launch": ("LaunchContext", "LaunchDescription"),
+        "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable"),
+        "launch_ros": (),
+        "launch_ros.actions": ("Node",),
+    }
+    for module, names in needed.items():
+        made = ModuleType(module)
+        vars(made).update({name: standin(name) for name in names})
+        monkeypatch.setitem(sys.modules, module, made)
+    return runpy.run_path(str(FILE))
+
+
+def actions(launch_file: dict[str, Any]) -> list[Standin]:
+    return list(launch_file["generate_launch_description"]().args[0])
+
+
+def nodes(launch_file: dict[str, Any], **given: str) -> dict[str, dict[str, Any]]:
+    """What each node is started with when these arguments are given, by executable."""
+    (opaque,) = (action for action in actions(launch_file) if type(action).__name__ == "OpaqueFunction")
+    defaults = {name: value for name, value, _ in launch_file["ARGUMENTS"]}
+    assert given.keys() <= defaults.keys()
+    context = SimpleNamespace(launch_configurations={**defaults, **given})
+    return {node.kwargs["executable"]: node.kwargs for node in opaque.kwargs["function"](context)}
+
+
+def parameters(node: dict[str, Any]) -> dict[str, Any]:
+    return dict(node["parameters"][-1])
+
+
+def test_every_argument_is_declared_with_a_default_and_a_description(launch_file):
+    declared = {a.args[0]: a.kwargs for a in actions(launch_file) if type(a).__name__ == "DeclareLaunchArgument"}
+    wanted = [
+        "namespace",
+        "params_file",
+        "use_sim_time",
+        "log_level",
+        "enclaves",
+        "autostart",
+        "recording",
+        "bag",
+        "model",
+        "rate",
+        "output",
+        "rig",
+        "rviz",
+        "rviz_config",
+    ]
+    assert sorted(declared) == sorted(wanted)
+    for kwargs in declared.values():
+        assert isinstance(kwargs["default_value"], str) and kwargs["description"]
+
+
+@pytest.mark.parametrize(("outside", "inside"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
+def test_discovery_stays_on_this_machine_unless_the_environment_says_otherwise(
+    outside: str | None, inside: str, launch_file, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    if outside:
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", outside)
+    (setting,) = (action for action in actions(launch_file) if type(action).__name__ == "SetEnvironmentVariable")
+    assert setting.args == ("ROS_AUTOMATIC_DISCOVERY_RANGE", inside)
+
+
+def test_three_nodes_start_each_with_what_it_needs_to_know(launch_file):
+    given = {"model": "m.pushmodel", "output": "~/result", "rig": "a.rig.yaml", "rate": "10"}
+    started = nodes(launch_file, recording="bags/x", **given)
+    here, home = str(Path.cwd()), str(Path.home())
+    assert parameters(started["predict_server"]) == {"models": [f"{here}/m.pushmodel"]}
+    assert parameters(started["push_validator"]) == {
+        "model": f"{here}/m.pushmodel",
+        "output": f"{home}/result",
+        "rig": f"{here}/a.rig.yaml",
+    }
+    assert parameters(started["push_replay"]) == {
+        "recording": f"{here}/bags/x",
+        "rig": f"{here}/a.rig.yaml",
+        "play.rate": 10.0,
+        "wait_for_subscribers": 30.0,
+    }
+
+
+def test_every_parameter_is_one_that_the_node_declares_and_accepts(launch_file):
+    given = {"recording": "bags/x", "model": "m", "output": "o", "rig": "r", "rate": "2.5"}
+    given |= {"autostart": "false", "use_sim_time": "true"}
+    for executable, node in nodes(launch_file, **given).items():
+        table = {row.name: row for row in PARAMETERS[executable]}
+        values = parameters(node)
+        assert values.pop("use_sim_time") is True
+        for name, value in values.items():
+            assert table[name].allows(value), f"{executable}: {name} = {value!r}"
+
+
+def test_the_executables_are_those_that_are_installed_under_their_node_names(launch_file):
+    started = nodes(launch_file, recording="bags/x", namespace="cell", log_level="debug")
+    names = {"predict_server": "push_predictor", "push_validator": "push_validator", "push_replay": "push_replay"}
+    assert {executable: node["name"] for executable, node in started.items()} == names
+    for executable, node in started.items():
+        assert (REPOSITORY / "scripts" / "run" / executable).exists()
+        assert (node["package"], node["namespace"]) == ("push_predictor", "cell")
+        assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
+
+
+def test_every_node_runs_in_its_enclave_of_the_policy_if_that_is_wanted(launch_file):
+    policy = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
+    enclaves = {enclave.attrib["path"] for enclave in policy.iter("enclave")}
+    started = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
+    assert {node["arguments"][-1] for node in started.values()} == enclaves
+    for executable, node in started.items():
+        assert node["arguments"][-2:] == ["--enclave", f"/push_predictor/{executable}"]
+
+
+def test_without_a_recording_nothing_is_replayed_and_bag_is_another_word_for_it(launch_file):
+    assert "push_replay" not in nodes(launch_file, model="m")
+    assert parameters(nodes(launch_file, bag="/b")["push_replay"])["recording"] == "/b"
+
+
+def test_a_parameter_file_holds_where_no_argument_is_given(launch_file):
+    """The later of two sources wins in ROS, so what was not asked for must not be passed at all."""
+    for node in nodes(launch_file, params_file="/p.yaml", bag="/b").values():
+        assert node["parameters"][0] == "/p.yaml"
+        assert not {"autostart", "use_sim_time", "play.rate"} & parameters(node).keys()
+    assert parameters(nodes(launch_file, autostart="false")["predict_server"]) == {"autostart": False}
+
+
+def test_rviz_is_opened_only_if_wanted_with_the_configuration_beside_the_launch_file(launch_file):
+    assert "rviz2" not in nodes(launch_file, bag="/b")
+    started = nodes(launch_file, bag="/b", rviz="true", namespace="cell", use_sim_time="true")
+    assert {"predict_server", "push_validator", "push_replay", "rviz2"} == started.keys()
+    rviz = started["rviz2"]
+    assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
+    flag, config = rviz["arguments"]
+    assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()
+    own = nodes(launch_file, rviz="1", rviz_config="own.rviz")["rviz2"]
+    assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
+
+
+def test_the_launch_file_is_installed():
+    assert 'glob("launch/*.launch.py")' in (REPOSITORY / "setup.py").read_text()
+    assert 'glob("config/*")' in (REPOSITORY / "setup.py").read_text()

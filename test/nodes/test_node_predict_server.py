@@ -1,0 +1,630 @@
+"""predict_server as a process: what it answers, what it refuses, how it starts and ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from array import array
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+import ros_harness as harness
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from service_msgs.msg import ServiceEventInfo
+from synthetic import square_pushes
+
+from msg_adapters.predictions import (
+    PushQuery,
+    prediction_from_response,
+    query_to_batch_request,
+    query_to_request,
+)
+from push_predictor.errors import RequestError
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.train import train_model
+from push_predictor.nodes import predict_server
+from push_predictor.nodes.runtime import Stop
+from push_predictor.nodes.server import answers
+from push_predictor.nodes.server.answers import MOST_PUSHES, answer_batch
+from push_predictor.nodes.server.parameters import PARAMETERS
+from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
+
+SERVICES = {
+    "predict_push": PredictPush,
+    "predict_push_batch": PredictPushBatch,
+    "list_models": ListModels,
+    "load_model": LoadModel,
+    "push_predictor/change_state": ChangeState,
+    "push_predictor/set_parameters": SetParameters,
+    "push_predictor/get_parameters": GetParameters,
+    "push_predictor/describe_parameters": DescribeParameters,
+    "push_predictor/get_state": GetState,  # last: the node has found all the others when this one is answered
+}
+CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
+GOOD = np.array([0.02, 0.1, 0.2])
+MANY = np.column_stack([np.full(20, 0.02), np.linspace(0.01, 0.99, 20), np.linspace(-0.9, 0.9, 20)])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Three good model files and a damaged one."""
+    place = tmp_path_factory.mktemp("models")
+    table, rig = square_pushes(60)
+    for kind in ("analytical", "gp", "vhgp"):
+        save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
+    whole = (place / "gp.model").read_bytes()
+    (place / "damaged.model").write_bytes(whole[: len(whole) // 2])
+    return place
+
+
+class Server:
+    """A running predict_server and a client for it."""
+
+    def __init__(self, process, node) -> None:
+        self.process, self.node = process, node
+        self._clients = {
+            name: node.create_client(kind, name, qos_profile=QoSProfile(depth=100)) for name, kind in SERVICES.items()
+        }
+        self.statuses: list = []
+        node.create_subscription(DiagnosticArray, "/diagnostics", lambda m: self.statuses.extend(m.status), 10)
+
+    def call(self, name, request):
+        return harness.call(self._clients[name], request)
+
+    def push(self, push=GOOD, duration=0.2, model="", covariates=None):
+        return self.call("predict_push", query_to_request(model, np.asarray(push), duration, covariates))
+
+    def batch(self, inputs, duration=0.2, model="", covariates=None):
+        query = PushQuery(model, np.asarray(inputs, dtype=float).reshape(-1, 3), duration, covariates or {})
+        return self.call("predict_push_batch", query_to_batch_request(query))
+
+    def load(self, path, name="", make_default=False):
+        return self.call("load_model", LoadModel.Request(path=str(path), name=name, make_default=make_default))
+
+    def list(self):
+        return self.call("list_models", ListModels.Request())
+
+    def state(self):
+        return self.call("push_predictor/get_state", GetState.Request()).current_state.label
+
+    def change(self, transition):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return self.call("push_predictor/change_state", request).success
+
+    def set(self, name, value):
+        kinds = {
+            str: (ParameterType.PARAMETER_STRING, "string_value"),
+            float: (ParameterType.PARAMETER_DOUBLE, "double_value"),
+        }
+        if isinstance(value, list):
+            kind, field = ParameterType.PARAMETER_STRING_ARRAY, "string_array_value"
+        else:
+            kind, field = kinds[type(value)]
+        parameter = Parameter(name=name, value=ParameterValue(**{"type": kind, field: value}))
+        return self.call("push_predictor/set_parameters", SetParameters.Request(parameters=[parameter])).results[0]
+
+    def next_status(self, ready=lambda status: True):
+        """The first status from now on that is ready."""
+        self.statuses.clear()
+        found = []
+
+        def seen() -> bool:
+            found[:] = [s for s in list(self.statuses) if ready(s)]
+            return bool(found)
+
+        assert harness.wait_until(seen, 60.0), f"no such diagnostics among {self.statuses}\n{self.process.text()}"
+        return found[0], {pair.key: pair.value for pair in found[0].values}
+
+
+@contextlib.contextmanager
+def server_of(models, **params):
+    domain = harness.free_domain()
+    params = {"models": [str(path) for path in models], "diagnostics_period": 0.2, **params}
+    running = harness.node_process("predict_server", domain=domain, params=params)
+    with running as process, harness.ros_context(domain) as node:
+        server = Server(process, node)
+        server.state()  # the node answers
+        yield server
+
+
+@pytest.fixture(scope="module")
+def server(folder):
+    """One server for the tests that leave it as it was: the three models, gp the default."""
+    models = [folder / f"{kind}.model" for kind in ("analytical", "gp", "vhgp")]
+    with server_of(models, default_model="gp") as running:
+        assert running.state() == "active"
+        yield running
+
+
+# --- predictions ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
+def test_it_answers_what_the_model_says(server, folder, kind):
+    model = serve(load_model(folder / f"{kind}.model"))
+    expected = model.predict(MANY, np.full(len(MANY), 0.2))
+    answered = prediction_from_response(server.batch(MANY, model=kind))
+    for k, push in enumerate(MANY):
+        single = prediction_from_response(server.push(push, model=kind))
+        for name in ("mean", "covariance", "process_covariance", "in_domain"):
+            np.testing.assert_allclose(getattr(answered, name), getattr(expected, name), rtol=1e-12, atol=1e-18)
+            np.testing.assert_allclose(getattr(single, name)[0], getattr(expected, name)[k], rtol=1e-8, atol=1e-14)
+
+
+def test_an_empty_name_means_the_default_model(server):
+    assert list(server.push().mean) == list(server.push(model="gp").mean)
+    assert list(server.push().mean) != list(server.push(model="analytical").mean)
+
+
+def test_a_push_unlike_the_training_pushes_is_answered_and_marked(server):
+    assert server.push().in_domain
+    far = server.push([0.2, 0.1, 0.2])
+    assert far.success
+    assert not far.in_domain
+
+
+def test_a_batch_of_none_is_answered_with_empty_arrays(server):
+    response = server.batch(np.empty((0, 3)))
+    assert response.success, response.message
+    assert [len(response.mean), len(response.covariance), len(response.in_domain)] == [0, 0, 0]
+
+
+def test_a_long_batch_equals_its_parts(server):
+    long = np.tile(MANY, (500, 1))
+    means = np.array(server.batch(long).mean).reshape(-1, 3)
+    np.testing.assert_allclose(means, np.tile(means[: len(MANY)], (500, 1)), rtol=1e-9, atol=1e-12)
+
+
+BAD = [
+    ("velocity", np.nan),
+    ("velocity", np.inf),
+    ("velocity", 0.0),
+    ("velocity", -0.02),
+    ("contact", np.nan),
+    ("contact", 1.0),
+    ("contact", -1e-9),
+    ("angle", np.pi / 2),
+    ("angle", -2.0),
+    ("angle", -np.inf),
+]
+
+
+@pytest.mark.parametrize(("field", "value"), BAD)
+def test_a_bad_push_is_refused_by_field_and_value_and_gets_no_number(server, field, value):
+    push = GOOD.copy()
+    push[["velocity", "contact", "angle"].index(field)] = value
+    response = server.push(push)
+    assert not response.success
+    assert response.message.startswith(f"{field}: {float(value)!r} is not accepted, give ")
+    assert not np.any(response.mean)
+    assert not np.any(response.covariance)
+    assert not np.any(response.process_covariance)
+
+
+@pytest.mark.parametrize(("field", "value"), BAD)
+def test_one_bad_push_refuses_the_batch_and_is_named_by_index(server, field, value):
+    pushes = MANY.copy()
+    pushes[7, ["velocity", "contact", "angle"].index(field)] = value
+    response = server.batch(pushes)
+    assert not response.success
+    assert response.message.startswith(f"{field}[7]: {float(value)!r} is not accepted")
+    assert not len(response.mean)
+
+
+@pytest.mark.parametrize("duration", [np.nan, np.inf, 0.0, -0.2, 5.0])
+def test_a_bad_duration_is_refused(server, duration):
+    for response in (
+        server.push(duration=duration),
+        server.batch(MANY, duration),
+        server.batch([], duration),
+    ):
+        assert not response.success
+        assert response.message.startswith(f"duration: {duration!r} is not accepted")
+
+
+def test_the_analytical_model_answers_for_long_pushes(server):
+    short, long = (np.array(server.push([0.02, 0.125, 0.0], t, "analytical").mean) for t in (0.2, 2.0))
+    assert long[0] == pytest.approx(10.0 * short[0], rel=1e-6)  # through the centre: straight on
+
+
+def test_an_unknown_model_is_refused_with_the_names_there_are(server):
+    for response in (server.push(model="nobody"), server.batch(MANY, model="nobody")):
+        assert not response.success
+        assert response.message == "model: 'nobody' is not accepted, give one of analytical, gp, vhgp"
+
+
+def test_arrays_of_unequal_length_are_refused(server):
+    request = query_to_batch_request(PushQuery("", MANY, 0.2, {}))
+    request.angle = [0.1]
+    response = server.call("predict_push_batch", request)
+    assert not response.success
+    assert response.message == "angle length: 1 is not accepted, give 20 values, as many as velocity has"
+
+
+def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
+    request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MOST_PUSHES + 1))))
+    with pytest.raises(RequestError) as caught:
+        answer_batch(lambda: None, ModelShelf(), request, PredictPushBatch.Response())
+    assert str(caught.value) == "velocity length: 1000001 is not accepted, give at most 1000000 pushes a call"
+
+
+def test_one_push_is_answered_while_a_long_batch_is_computed(server):
+    many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (2500, 1)), 0.2, {}))
+    batch = server._clients["predict_push_batch"].call_async(many)
+    answered = 0
+    while not batch.done() and answered < 100_000:
+        assert server.push().success
+        answered += 1
+    assert batch.done() and answered > 5  # behind the batch there would be one, or two
+    assert len(batch.result().in_domain) == 50_000
+
+
+def test_covariates_that_no_model_needs_change_nothing(server):
+    assert list(server.push(covariates={"temperature": 300.0}).mean) == list(server.push().mean)
+    response = server.push(covariates={"temperature": np.nan})
+    assert not response.success
+    assert response.message.startswith("covariate temperature: nan")
+
+
+def test_what_nobody_foresaw_is_answered_and_logged_and_the_node_lives(folder, monkeypatch, capfd):
+    def broken(shelf, request, response):
+        response.mean[0] = 1.0
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(predict_server, "answer_push", broken)
+    arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']"]
+    rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = predict_server.started_server(Stop())
+        response = node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response())
+        assert not response.success
+        assert not np.any(response.mean)
+        assert "internal error" in response.message
+        assert "a bug" in response.message
+        assert 'in broken\n    raise ZeroDivisionError("a bug")' in capfd.readouterr().err
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def test_thirty_requests_in_flight_are_all_answered(server):
+    client = server._clients["predict_push"]
+    futures = [client.call_async(query_to_request("", push, 0.2)) for push in np.resize(MANY, (30, 3))]
+    assert harness.wait_until(lambda: all(future.done() for future in futures), 60.0)
+    assert all(future.result().success for future in futures)
+
+
+def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
+    """By a prediction, not by the word that the node is inactive.
+
+    On a busy machine `call` may have to ask again, a limit of the middleware: it waits 0.1 s for a client to be known.
+    """
+    domain = harness.free_domain()
+    with harness.ros_context(domain) as node:
+        client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=100))
+        params = {"models": [str(folder / "gp.model")]}
+        with harness.node_process("predict_server", domain=domain, params=params):
+            end = time.monotonic() + harness.START_TIMEOUT
+            while not client.service_is_ready() and time.monotonic() < end:
+                time.sleep(0.0002)
+            response = harness.call(client, query_to_request("", GOOD, 0.2))
+        assert response.success, response.message
+
+
+def test_a_long_batch_stops_when_the_node_ends(folder):
+    shelf = ModelShelf()
+    shelf.load(folder / "analytical.model")
+    inputs = np.tile(GOOD, (3 * answers.ROWS_AT_ONCE, 1))
+    asked = []
+
+    def go_on():
+        asked.append(len(asked))
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+
+    request = query_to_batch_request(PushQuery("", inputs, 0.2, {}))
+    with pytest.raises(KeyboardInterrupt):
+        answers.answer_batch(go_on, shelf, request, PredictPushBatch.Response())
+    assert len(asked) == 2
+
+
+def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folder):
+    shelf = ModelShelf()
+    shelf.load(folder / "analytical.model")
+    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (answers.MOST_EXACT + 1, 1)), 0.2, {}))
+    with pytest.raises(RequestError, match="50001 pushes without a table"):
+        answers.answer_batch(lambda: None, shelf, request, PredictPushBatch.Response())
+
+
+# --- models -----------------------------------------------------------------------------------------------------
+
+
+def test_models_are_listed_with_what_they_were_made_from(server, folder):
+    models = server.list()
+    assert list(models.names) == ["analytical", "gp", "vhgp"]
+    assert models.default_model == "gp"
+    described = dict(pair.split("=", 1) for pair in models.descriptions[2].split("; "))
+    assert described == {
+        "kind": "vhgp",
+        "outline": "rect1",
+        "surface": "abs",
+        "pushes": "20",
+        "windows": "60",
+        "covariates": "-",
+        "duration": "0.2",
+        "file": str(folder / "vhgp.model"),
+    }
+
+
+def test_a_folder_is_loaded_and_a_damaged_file_in_it_is_reported(folder, tmp_path):
+    absent = tmp_path / "absent.model"
+    with server_of([folder, absent, folder / "damaged.model"]) as server:
+        assert list(server.list().names) == ["analytical", "gp", "vhgp"]
+        status, values = server.next_status()
+        assert status.level == b"\1"
+        for problem in (str(absent), str(folder / "damaged.model")):
+            assert problem in values["problems"]
+            assert problem in server.process.text()
+        assert server.push().success
+
+
+def test_a_node_without_a_model_says_so_and_takes_one_later(folder):
+    with server_of([folder / "damaged.model"]) as server:
+        assert server.state() == "inactive"
+        refusal = server.push()
+        assert not refusal.success
+        assert "no model is loaded" in refusal.message
+        status, _ = server.next_status()
+        assert status.level == b"\2"
+        assert "no model is loaded" in status.message
+        assert server.load(folder / "vhgp.model").success
+        assert server.state() == "active"
+        assert server.push().success
+
+
+def test_loading_replaces_by_name_only_when_the_file_is_good(folder, tmp_path):
+    table, rig = square_pushes(40, seed=1)
+    save_model(train_model(table, rig, "analytical", name="gp"), tmp_path / "other.model")
+    foreign = tmp_path / "notes.txt"
+    foreign.write_text("not a model\n")
+    with server_of([folder / "gp.model"]) as server:
+        before = list(server.push().mean)
+        for bad in (folder / "damaged.model", foreign, tmp_path / "absent", tmp_path, ""):
+            response = server.load(bad, name="gp")
+            assert not response.success
+            assert (str(bad) or "path") in response.message
+            assert list(server.push().mean) == before
+        assert server.load(tmp_path / "other.model").name == "gp"
+        assert list(server.push().mean) != before
+        assert "kind=analytical" in server.list().descriptions[0]
+        assert list(server.list().names) == ["gp"]
+
+
+def test_pushes_are_answered_while_their_model_is_replaced(folder):
+    with server_of([folder / "vhgp.model"]) as server:
+        client = server._clients["load_model"]
+        expected = list(server.push().mean)
+        for _ in range(5):
+            loading = client.call_async(LoadModel.Request(path=str(folder / "vhgp.model")))
+            while not loading.done():
+                response = server.push()
+                assert response.success, response.message
+                assert list(response.mean) == expected
+            assert loading.result().success
+
+
+def test_a_loaded_model_can_become_the_default(folder):
+    with server_of([folder / "gp.model"]) as server:
+        first = list(server.push().mean)
+        assert server.load(folder / "vhgp.model", name="new").name == "new"
+        assert server.list().default_model == "gp"
+        assert list(server.push().mean) == first
+        assert server.load(folder / "vhgp.model", name="newer", make_default=True).success
+        assert server.list().default_model == "newer"
+        assert list(server.push().mean) == list(server.push(model="new").mean) != first
+        assert server.set("default_model", "gp").successful
+        assert list(server.push().mean) == first
+
+
+def test_a_default_that_is_not_loaded_is_not_silently_another(folder):
+    with server_of([folder / "gp.model"], default_model="vhgp") as server:
+        response = server.push()
+        assert not response.success
+        assert response.message == "default_model: 'vhgp' is not accepted, give one of gp"
+        assert server.push(model="gp").success
+        assert server.next_status()[0].level == b"\1"
+        assert server.load(folder / "vhgp.model").success
+        assert server.push().success
+
+
+# --- life cycle, parameters, diagnostics ------------------------------------------------------------------------
+
+
+def test_requests_are_refused_while_it_is_not_active(folder):
+    with server_of([folder / "gp.model"], autostart=False) as server:
+        assert server.state() == "unconfigured"
+        assert server.change(Transition.TRANSITION_CONFIGURE)
+        for step in (None, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE):
+            if step is not None:
+                assert server.change(step)
+            active = step == Transition.TRANSITION_ACTIVATE
+            assert server.push().success == server.batch(MANY).success == active
+            assert list(server.list().names) == ["gp"]
+        assert server.push().message == "the node is inactive: activate it"
+        assert "the node is inactive" in server.process.text()
+        assert server.change(Transition.TRANSITION_CLEANUP)
+        assert server.change(Transition.TRANSITION_CONFIGURE)
+        assert server.change(Transition.TRANSITION_ACTIVATE)
+        assert server.push().success
+        assert server.change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+        assert server.state() == "finalized"
+
+
+def test_activation_fails_without_a_model():
+    with server_of([""], autostart=False) as server:
+        assert server.change(Transition.TRANSITION_CONFIGURE)
+        assert not server.change(Transition.TRANSITION_ACTIVATE)
+        assert server.state() == "inactive"
+
+
+def test_the_word_default_stands_for_the_shipped_model_and_it_says_that_it_is_simulated():
+    with server_of(["default"]) as server:
+        assert list(server.list().names) == ["simulated_square_abs"]
+        assert server.push().success
+        assert "simulated square" in server.process.text()
+
+
+def test_parameters_are_described_and_bad_values_refused_with_a_reason(server):
+    names = ["models", "default_model", "autostart", "introspection", "diagnostics_period"]
+    described = server.call("push_predictor/describe_parameters", DescribeParameters.Request(names=names)).descriptors
+    assert all(descriptor.description for descriptor in described)
+    assert [descriptor.name for descriptor in described if descriptor.read_only] == [
+        "models",
+        "autostart",
+        "diagnostics_period",
+    ]
+    refused = {
+        "models": ["elsewhere"],
+        "diagnostics_period": 5.0,
+        "default_model": "nobody",
+        "introspection": "everything",
+    }
+    for name, value in refused.items():
+        result = server.set(name, value)
+        assert not result.successful
+        assert name in result.reason, result.reason
+    assert "'nobody' is not accepted, give one of analytical, gp, vhgp" in server.set("default_model", "nobody").reason
+    assert server.list().default_model == "gp"
+
+
+@pytest.mark.parametrize("period", [0.0, 1e6])
+def test_a_period_out_of_range_ends_the_start_with_one_line(folder, period):
+    domain = harness.free_domain()
+    params = {"models": [str(folder)], "diagnostics_period": period}
+    with harness.node_process("predict_server", domain=domain, params=params) as process:
+        assert harness.wait_until(lambda: process.poll() is not None)
+        assert process.returncode == 1
+        assert "diagnostics_period" in process.text()
+        assert "Traceback" not in process.text()
+
+
+def test_diagnostics_count_what_was_served_and_refused(server):
+    _, before = server.next_status()
+    server.push()
+    server.push([np.nan, 0.1, 0.1])
+    served, refused = int(before["requests_served"]) + 1, int(before["requests_refused"]) + 1
+    status, values = server.next_status(
+        lambda s: {p.key: p.value for p in s.values}["requests_refused"] == str(refused)
+    )
+    assert status.level == b"\0"
+    assert "push_predictor" in status.name
+    assert values["requests_served"] == str(served)
+    assert values["last_refusal"].startswith("velocity: nan")
+    assert values["models"] == "analytical, gp, vhgp"
+    assert values["default_model"] == "gp"
+    assert 0.0 < float(values["callback_p50_us"]) <= float(values["callback_p99_us"])
+
+
+def test_introspection_shows_requests_when_it_is_asked_for(server):
+    events = []
+    server.node.create_subscription(
+        PredictPush.Event, "predict_push/_service_event", lambda m: events.append(m), QoSProfile(depth=100)
+    )
+    assert server.set("introspection", "contents").successful
+    harness.wait_for_publisher(server.node, "/predict_push/_service_event")
+    push = np.array([0.0201, 0.1, 0.2])
+
+    def shown() -> bool:
+        server.push(push)
+        return any(e.info.event_type == ServiceEventInfo.REQUEST_RECEIVED and e.request for e in events)
+
+    assert harness.wait_until(shown, 60.0)
+    assert any(e.request and e.request[0].velocity == push[0] for e in events)
+    assert server.set("introspection", "disabled").successful
+
+    def quiet() -> bool:
+        before = len(events)
+        time.sleep(0.5)
+        return len(events) == before
+
+    assert harness.wait_until(quiet)  # those of the last requests come after their answers
+    events.clear()
+    server.push(push)
+    time.sleep(1.0)
+    assert not events
+
+
+def test_the_shipped_configuration_states_the_defaults():
+    (rows,) = yaml.safe_load(CONFIG.read_text()).values()
+    assert rows["ros__parameters"] == {param.name: param.default for param in PARAMETERS}
+
+
+def test_names_follow_the_namespace_with_the_shipped_configuration(folder):
+    domain = harness.free_domain()
+    arguments = ("--params-file", str(CONFIG), "-p", f"models:=['{folder / 'gp.model'}']")
+    running = harness.node_process("predict_server", *arguments, domain=domain, namespace="/cell1")
+    with running, harness.ros_context(domain) as node:
+        client = node.create_client(PredictPush, "/cell1/predict_push")
+        assert harness.call(client, query_to_request("", GOOD, 0.2)).success
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly(folder, number):
+    with server_of([folder / "gp.model"]) as server:
+        assert server.push().success
+        assert server.process.stop(number) == 0
+        assert "Traceback" not in server.process.text()
+
+
+def time_of_its_libraries() -> float:
+    """The processor time that their import takes at present, in s: 0.4 where the limit below was set."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-c", "import rclpy, scipy.linalg"]
+    subprocess.run(command, env=harness.node_environment(harness.free_domain()), check=True, timeout=60.0)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def test_it_is_ready_within_two_seconds_of_processor_time(folder):
+    """Or in as many times what its libraries take, on a machine that is slow by itself."""
+    with server_of([folder / "gp.model"]) as server:
+        assert server.push().success
+        ticks = Path(f"/proc/{server.process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+        assert sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") < max(2.0, 5.0 * time_of_its_libraries())
+
+
+def memory_kb(process) -> int:
+    lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+
+
+def test_memory_stays_flat(folder):
+    with server_of([folder / "analytical.model"]) as server:
+        bad = np.full(3, np.nan)
+
+        def calls(count: int) -> None:
+            for k in range(count):
+                assert server.push(GOOD if k % 10 else bad).success == bool(k % 10)
+
+        calls(2500)  # the log of requests is full by then
+        start = memory_kb(server.process)
+        calls(2000)
+        grown = memory_kb(server.process) - start
+        assert grown < 1024, f"{grown} kB"

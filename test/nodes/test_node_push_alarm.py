@@ -1,0 +1,183 @@
+"""The alarm as others meet it: a replay with a change in it, a replay without, and what is left on disk."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_harness import acquaint, free_domain, node_process, ros_context, wait_until
+from synthetic import square_rig
+from validator_bench import WRITTEN, Status, replaying
+
+from push_predictor.evaluation.alarm.evidence import alarm_json
+from push_predictor.evaluation.alarm.scores import calibrate, judged
+from push_predictor.evaluation.offline import validate_recording
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.online.alarm_process import PushAlarm as ProcessOfAlarm
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import rig_beside
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.write import write_recording
+from push_predictor.simulation.changes import PLAIN, Changes, Moment
+from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
+from push_predictor.types import Array
+from push_predictor_interfaces.msg import PushAlarm
+
+PUSHES = 60
+CHANGE_AT = 25
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def rubbed(moment: Moment) -> Array:
+    """The contact friction is doubled from one push on."""
+    return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.25, 0.0)
+
+
+def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES) -> Path:
+    plan = random_pushes(pushes, [0.05], 0.05, np.random.default_rng([seed, 0]))
+    write_recording(path, simulate(SimulationSpec("rect1", "abs", plan, seed=seed, name=path.name, changes=changes)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A model, a recording like those it was trained on, and one in which something changes."""
+    folder = tmp_path_factory.mktemp("alarm")
+    training = [record(folder / "training", seed=1, pushes=120)]
+    model = train_model(load_data(training), load_rig_for(training), "gp", name="gp")
+    save_model(model, folder / "gp.pushmodel")
+    changed = record(folder / "changed", seed=2, changes=Changes(contact_friction=rubbed))
+    return {"model": folder / "gp.pushmodel", "clean": record(folder / "clean", seed=3), "changed": changed}
+
+
+class Outcome:
+    """What a replay through real nodes brings: alarms, diagnostics, files."""
+
+    def __init__(self, bench: dict[str, Path], recording: str, output: Path) -> None:
+        domain = free_domain()
+        self.output, self.alarms = output, []
+        params: dict[str, Any] = {"model": bench["model"], "output": output, "report": False, "diagnostics_period": 0.2}
+        params["last_answers"] = 120.0  # the alarm is of low priority
+        with (
+            ros_context(domain) as node,
+            node_process("predict_server", domain=domain, params={"models": [str(bench["model"])]}),
+            node_process("push_validator", domain=domain, params=params) as process,
+        ):
+            self.status = Status(node)
+            node.create_subscription(PushAlarm, "push_alarm", self.alarms.append, 10)
+            self.status.wait_for_first()
+            with replaying(domain, recording=bench[recording], rate=15.0):
+                process.wait_for_text(WRITTEN, 240.0)
+            self.status.wait_for("state", "waiting for samples")
+            late: list[PushAlarm] = []
+            node.create_subscription(PushAlarm, "push_alarm", late.append, LATCHED)
+            acquaint(node, "push_validator")  # so that half a second without an alarm means that there is none
+            self.result = json.loads((output / "validation.json").read_text())
+            wait_until(lambda: bool(self.alarms and late), 30.0 if self.result["alarm"]["fired"] else 0.5)
+            self.late = late
+            assert process.stop() == 0, process.text()
+
+
+@pytest.fixture(scope="module")
+def changed(bench: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    return Outcome(bench, "changed", tmp_path_factory.mktemp("changed"))
+
+
+@pytest.fixture(scope="module")
+def clean(bench: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    return Outcome(bench, "clean", tmp_path_factory.mktemp("clean"))
+
+
+def offline(bench: dict[str, Path], recording: str) -> dict[str, object]:
+    model = load_model(bench["model"])
+    windows, comparison = validate_recording(model, bench[recording])
+    table = windows_to_table(windows)
+    return alarm_json(judged(calibrate(model), table, comparison.mean, comparison.covariance))
+
+
+def test_a_change_in_the_middle_of_a_replay_is_told_once(changed: Outcome, bench: dict[str, Path]):
+    (alarm,) = changed.alarms
+    windows, _ = validate_recording(load_model(bench["model"]), bench["changed"])
+    order = list(dict.fromkeys(window.push_id for window in windows))
+    assert order.index(alarm.push_id) >= CHANGE_AT - 1 and alarm.pushes == order.index(alarm.push_id) + 1
+    assert alarm.log10_evidence >= 2.0 and alarm.false_alarm_rate == 0.01
+    stamp = alarm.header.stamp.sec * 10**9 + alarm.header.stamp.nanosec
+    assert stamp == max(window.end for window in windows if window.push_id == alarm.push_id)
+    assert [late.push_id for late in changed.late] == [alarm.push_id], "one who comes later hears of it too"
+
+
+def test_the_diagnostics_warn_with_push_and_evidence(changed: Outcome):
+    (alarm,) = changed.alarms
+    level, message, values = changed.status.all[-1]
+    assert level == DiagnosticStatus.WARN
+    assert "no longer fits" in message and alarm.push_id in message
+    assert values["alarm"] == "fired" and values["alarm push"] == alarm.push_id
+    assert float(values["alarm fired log10 evidence"]) == pytest.approx(alarm.log10_evidence, rel=1e-5)
+
+
+@pytest.mark.parametrize("recording", ["changed", "clean"])
+def test_the_result_says_what_is_found_offline(recording: str, bench: dict[str, Path], request):
+    found, expected = request.getfixturevalue(recording).result["alarm"], offline(bench, recording)
+    assert found.pop("log10_evidence") == pytest.approx(expected.pop("log10_evidence"), abs=1e-6)
+    assert found == expected
+
+
+def test_a_recording_like_those_trained_on_gives_no_alarm(clean: Outcome):
+    assert clean.alarms == clean.late == []
+    assert clean.result["alarm"]["fired"] is False and clean.result["alarm"]["pushes"] == PUSHES
+    assert clean.status.values["alarm"] == "quiet"
+
+
+def test_the_windows_are_on_disk_with_covariates_and_rig(changed: Outcome, bench: dict[str, Path]):
+    table = load_data([changed.output / "pushes.csv"])
+    windows, _ = validate_recording(load_model(bench["model"]), bench["changed"])
+    expected = windows_to_table(windows)
+    assert table.push_id.tolist() == expected.push_id.tolist()
+    assert np.array_equal(table.inputs, expected.inputs) and np.array_equal(table.outcomes, expected.outcomes)
+    for name in ("slider_heading", "slid_distance", "dwell_time", "normal_force"):
+        assert np.array_equal(table.covariates[name], expected.covariates[name])
+    assert rig_beside(changed.output / "pushes.csv") is not None
+
+
+@pytest.mark.parametrize("rate", [0.0, 1.0, -0.5])
+def test_a_rate_that_is_none_is_refused_by_name(rate: float):
+    with node_process("push_validator", domain=free_domain(), params={"false_alarm_rate": rate}) as process:
+        assert process.wait(30.0) == 1
+        assert "false_alarm_rate" in process.text() and "above 0 and below 1" in process.text()
+
+
+# --- an alarm that cannot be -----------------------------------------------------------------------------------------
+
+
+def analytical(pushes: int) -> PushModel:
+    rng, rig = np.random.default_rng(0), square_rig()
+    inputs = np.column_stack([np.full(40, 0.05), rng.random(40), rng.uniform(-1.0, 1.0, 40)])
+    push_id = np.array([f"push-{k % pushes}" for k in range(40)])
+    table = PushTable(inputs, np.full(40, 0.2), rng.standard_normal((40, 3)) * 1e-3, push_id)
+    return train_model(table, rig, "analytical", name="analytical")
+
+
+def test_a_model_of_too_few_pushes_gets_no_alarm_and_the_reason_is_told():
+    alarm = ProcessOfAlarm(0.01, lambda state, end: pytest.fail("it must not fire"))
+    alarm.prepare(analytical(pushes=5))
+    assert alarm.busy and wait_until(lambda: (alarm.work(), not alarm.busy)[1], 60.0)
+    alarm.begin()
+    alarm.work()
+    assert not alarm.busy and alarm.json == {"fired": False, "off": alarm.off} and "at least 10" in alarm.off
+
+
+def test_a_process_that_is_killed_ends_the_alarm_not_the_node():
+    alarm = ProcessOfAlarm(0.01, lambda state, end: pytest.fail("it must not fire"))
+    alarm.prepare(analytical(pushes=20))
+    assert alarm._process is not None
+    alarm._process.kill()
+    assert wait_until(lambda: (alarm.work(), not alarm.busy)[1], 30.0)
+    assert "ended" in alarm.off and alarm.json["fired"] is False

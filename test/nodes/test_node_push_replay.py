@@ -1,0 +1,442 @@
+"""push_replay as others meet it: a process, topics, services, signals."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import pickle
+import signal
+import statistics
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from replay_bags import POSE, RIG, START, push_messages, stamped, write_bag
+from ros_harness import REPOSITORY, call, free_domain, node_environment, node_process, ros_context, wait_until
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+
+from push_predictor.nodes.replay.options import PARAMETERS
+from push_predictor_interfaces.srv import (
+    Burst,
+    GetRate,
+    IsPaused,
+    Pause,
+    Play,
+    PlayNext,
+    Resume,
+    Seek,
+    SetRate,
+    Stop,
+    TogglePaused,
+)
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KINDS = {"slider/pose": PoseStamped, "pusher/pose": PoseStamped, "pusher/wrench": WrenchStamped}
+CONTROLS = {
+    Burst: "burst",
+    GetRate: "get_rate",
+    Pause: "pause",
+    Play: "play",
+    PlayNext: "play_next",
+    Resume: "resume",
+    Seek: "seek",
+    SetRate: "set_rate",
+    Stop: "stop",
+    TogglePaused: "toggle_paused",
+    IsPaused: "is_paused",
+}
+
+
+class Ears:
+    """What a node in the test's process hears of a replay."""
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.raw: dict[str, list[bytes]] = {topic: [] for topic in KINDS}
+        self.rig: list[str] = []
+        self.states: list[str] = []
+        self.clock: list[int] = []
+        self.reports: list[dict[str, str]] = []
+        # All at once: when the last is answered, the node has found the others too, and loses none of their answers.
+        self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in CONTROLS.items()}
+        for topic, kind in KINDS.items():
+            node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
+        node.create_subscription(String, "rig", lambda m: self.rig.append(m.data), LATCHED)
+        node.create_subscription(String, "replay_status", lambda m: self.states.append(m.data), LATCHED)
+        node.create_subscription(Clock, "/clock", lambda m: self.clock.append(nanoseconds(m.clock)), 1000)
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._report, 100)
+
+    def _report(self, message: DiagnosticArray) -> None:
+        self.reports.append({pair.key: pair.value for pair in message.status[0].values})
+
+    @property
+    def heard(self) -> int:
+        return sum(map(len, self.raw.values()))
+
+    def wait_for(self, state: str) -> None:
+        assert wait_until(lambda: self.states[-1:] == [state]), f"heard {self.states}, not {state}"
+
+    def report(self, state: str) -> dict[str, str]:
+        """What a replay in `state` says about itself."""
+        assert wait_until(lambda: bool(self.reports) and self.reports[-1]["state"] == state, 120.0), self.states
+        return self.reports[-1]
+
+    def hear_all(self, state: str) -> int:
+        """Wait for all that a replay in `state` has published, and count it: states overtake a backlog of messages."""
+        published = int(self.report(state)["published"])
+        assert wait_until(lambda: self.heard >= published), f"heard {self.heard} of {published}"
+        return published
+
+
+@contextmanager
+def replay(bag: Path, *ros_args: str, namespace: str | None = None, **params: Any) -> Iterator[tuple[Any, Ears]]:
+    """A replay that begins once the test listens; parameters with `__` for a dot."""
+    domain = free_domain()
+    names = {name.replace("__", "."): value for name, value in params.items()}
+    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60, **names}
+    with ros_context(domain, namespace) as node:
+        ears = Ears(node)
+        with node_process("push_replay", *ros_args, domain=domain, namespace=namespace, params=given) as process:
+            yield process, ears
+
+
+@contextmanager
+def listener(output: Path, depth: int, domain: int) -> Iterator[Callable[[], dict[str, list[bytes]]]]:
+    """A subscriber in its own process; calling the value ends it and answers what it heard."""
+    topics = [f"/{topic}=geometry_msgs/msg/{kind.__name__}" for topic, kind in KINDS.items()]
+    command = [sys.executable, str(REPOSITORY / "test/support/replay_listener.py"), str(output), str(depth), *topics]
+    process = subprocess.Popen(command, cwd=REPOSITORY, env=node_environment(domain))
+
+    def heard() -> dict[str, list[bytes]]:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == 0
+        found: dict[str, list[bytes]] = pickle.loads(output.read_bytes())
+        return found
+
+    try:
+        yield heard
+    finally:
+        process.kill()
+        process.wait()
+
+
+def nanoseconds(time: Time) -> int:
+    return int(time.sec) * 10**9 + int(time.nanosec)
+
+
+def stamp(data: bytes) -> int:
+    seconds, rest = struct.unpack_from("<iI", data, 4)
+    return int(seconds) * 10**9 + int(rest)
+
+
+def recorded(messages: list[tuple[str, str, int, bytes]], topic: str) -> list[bytes]:
+    return [data for name, _, _, data in messages if name == f"/{topic}"]
+
+
+@pytest.fixture(scope="module")
+def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_bag(tmp_path_factory.mktemp("bags") / "second.mcap", push_messages(1.0))
+
+
+def service(ears: Ears, kind: Any, **request: Any) -> Any:
+    call(ears.controls[IsPaused], IsPaused.Request())
+    return call(ears.controls[kind], kind.Request(**request))
+
+
+@pytest.mark.parametrize(("duration", "rate", "depth"), [(6.0, 1.0, 1000), (40.0, 100.0, 0)])
+def test_another_process_receives_every_message_once_in_order_and_unchanged(
+    tmp_path: Path, duration: float, rate: float, depth: int
+) -> None:
+    messages = push_messages(duration)
+    bag = write_bag(tmp_path / "pushes.mcap", messages)
+    domain = free_domain()
+    waiting = {"wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60}
+    params = {"recording": bag, "play.rate": rate, "exit_when_finished": True, **waiting}
+    with (
+        listener(tmp_path / "heard", depth, domain) as heard,
+        node_process("push_replay", domain=domain, params=params) as process,
+    ):
+        assert process.wait(180.0) == 0, process.text()
+        printed, found = process.text(), heard()
+    assert f"published {len(messages)} messages" in printed
+    assert "lost 0, acknowledged yes" in printed
+    for topic in KINDS:
+        assert found[f"/{topic}"] == recorded(messages, topic), printed
+
+
+def test_a_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
+    with replay(second, play__start_paused=True) as (_, ears):
+        ears.wait_for("paused")
+        begin = time.monotonic()
+        service(ears, Resume)
+        assert wait_until(lambda: ears.heard == len(push_messages(1.0)))
+        assert time.monotonic() - begin > 0.99  # from before the first to after the last: a busy machine adds to it
+        report = ears.report("finished")
+    assert report["published"] == str(len(push_messages(1.0)))
+    assert report["lost"] == "0"
+    assert 0.0 < float(report["late_p50_us"]) <= float(report["late_p99_us"]) <= float(report["late_max_us"])
+
+
+def test_a_rate_beyond_the_machine_says_how_far_it_is_behind(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "long.mcap", push_messages(100.0))
+    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, ears):
+        ears.wait_for("paused")
+        service(ears, Resume)
+        report = ears.report("finished")
+    assert float(report["late_max_us"]) > 1.0e5  # 62 500 messages in 100 us of wall time cannot be
+    assert report["published"] == str(len(push_messages(100.0)))
+
+
+def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
+    end = START + 4 * 10**9
+    with replay(write_bag(tmp_path / "four.mcap", push_messages(4.0))) as (_, ears):
+        ears.wait_for("finished")
+        assert [json.loads(text) for text in ears.rig] == [RIG]
+        assert ears.states in (["playing", "finished"], ["finished"])
+        assert ears.clock == sorted(ears.clock)
+        during = sorted(t for t in set(ears.clock) if START <= t < end)
+        gaps = [after - before for before, after in itertools.pairwise(during)]
+        assert statistics.median(gaps) == pytest.approx(25e6, rel=0.2)  # 40 Hz; a busy machine leaves some out
+        assert len(during) < 170
+        assert max(ears.clock) <= end
+
+
+def test_a_late_subscriber_still_gets_the_rig(second: Path) -> None:
+    with replay(second) as (_, ears):
+        ears.wait_for("finished")
+        late: list[str] = []
+        ears.node.create_subscription(String, "rig", lambda m: late.append(m.data), LATCHED)
+        assert wait_until(lambda: len(late) == 1)
+
+
+def test_a_rig_file_takes_the_place_of_the_record(second: Path, tmp_path: Path) -> None:
+    (tmp_path / "other.yaml").write_text(yaml.safe_dump({**RIG, "surface": "delrin"}))
+    with replay(second, rig=tmp_path / "other.yaml", play__start_paused=True) as (_, ears):
+        assert wait_until(lambda: bool(ears.rig))
+        assert json.loads(ears.rig[0])["surface"] == "delrin"
+
+
+def test_a_recording_without_a_rig_plays_and_says_how_to_give_one(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "norig.mcap", push_messages(0.1), rig=None)
+    with replay(bag) as (process, ears):
+        ears.wait_for("finished")
+        assert ears.rig == []
+        assert "push_rig lacks shape" in process.text()
+        assert "node parameter 'rig'" in process.text()
+
+
+def test_the_controls_of_a_paused_player(second: Path) -> None:
+    with replay(second, play__start_paused=True) as (_, ears):
+        ears.wait_for("paused")
+        assert service(ears, IsPaused).paused
+        assert service(ears, PlayNext).success
+        assert service(ears, Burst, num_messages=9).actually_burst == 9
+        assert wait_until(lambda: ears.heard == 10)
+        assert not service(ears, Play).success
+        assert service(ears, Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
+        assert service(ears, Burst, num_messages=0).actually_burst == 62
+        ears.wait_for("finished")
+        assert ears.report("finished")["acknowledged"] == "yes"
+
+
+def test_pause_rate_stop_and_play_again(second: Path) -> None:
+    with replay(second, play__rate=0.1) as (_, ears):
+        ears.wait_for("playing")
+        assert service(ears, GetRate).rate == pytest.approx(0.1)
+        assert not service(ears, SetRate, rate=0.0).success
+        service(ears, Pause)
+        ears.wait_for("paused")
+        published = ears.hear_all("paused")
+        time.sleep(0.5)
+        assert (ears.heard, ears.states[-1]) == (published, "paused")
+        service(ears, TogglePaused)
+        assert not service(ears, IsPaused).paused
+        service(ears, Stop)
+        ears.wait_for("finished")
+        assert ears.hear_all("finished") < len(push_messages(1.0))
+        assert service(ears, SetRate, rate=5.0).success
+        for messages in ears.raw.values():
+            messages.clear()
+        assert service(ears, Play, start_offset=Time(nanosec=500_000_000)).success
+        assert wait_until(lambda: ears.heard == len(push_messages(1.0)) - 313)
+
+
+def test_restamping_adds_one_offset_and_keeps_rate_1(second: Path) -> None:
+    messages = push_messages(1.0)
+    begin = time.time_ns()
+    with replay(second, restamp=True) as (_, ears):
+        assert wait_until(lambda: bool(ears.states))
+        assert not service(ears, SetRate, rate=2.0).success
+        assert service(ears, GetRate).rate == 1.0
+        assert ears.hear_all("finished") == len(messages)
+    offsets = {
+        stamp(new) - stamp(old) for t in KINDS for new, old in zip(ears.raw[t], recorded(messages, t), strict=True)
+    }
+    assert len(offsets) == 1
+    assert begin <= START + offsets.pop() <= time.time_ns()
+    assert all(
+        new[12:] == old[12:]
+        for new, old in zip(ears.raw["slider/pose"], recorded(messages, "slider/pose"), strict=True)
+    )
+    assert all(begin <= t <= time.time_ns() for t in ears.clock)
+
+
+def test_namespace_and_remapping_move_the_topics(second: Path) -> None:
+    with replay(second, "-r", "slider/pose:=/vicon/pose", namespace="/rig1") as (_, ears):
+        moved: list[bytes] = []
+        ears.node.create_subscription(PoseStamped, "/vicon/pose", moved.append, 1000, raw=True)
+        ears.node.create_subscription(PoseStamped, "slider/pose", lambda m: None, 10)
+        assert wait_until(lambda: len(moved) + len(ears.raw["pusher/pose"]) == 500), ears.heard
+        assert ears.raw["slider/pose"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "played"),
+    [
+        ({"play__topics_to_filter": ["slider/pose"]}, {"slider/pose"}),
+        ({"play__regex_to_filter": "/pusher/.*"}, {"pusher/pose", "pusher/wrench"}),
+        ({"play__exclude_regex_to_filter": ".*pose"}, {"pusher/wrench"}),
+        (
+            {"play__topics_to_filter": ["/slider/pose"], "play__regex_to_filter": ".*wrench"},
+            {"slider/pose", "pusher/wrench"},
+        ),
+    ],
+)
+def test_topics_are_filtered_as_rosbag2_does(second: Path, options: dict[str, Any], played: set[str]) -> None:
+    with replay(second, play__rate=10.0, play__wait_acked_timeout=-1.0, **options) as (_, ears):
+        ears.hear_all("finished")
+        assert {topic for topic, heard in ears.raw.items() if heard} == played
+
+
+def test_offset_and_duration_choose_a_part(second: Path) -> None:
+    options = {"play__start_offset__nsec": 500_000_000, "play__playback_duration": 0.1}
+    with replay(second, **options) as (_, ears):
+        ears.hear_all("finished")
+        stamps = [stamp(data) for data in ears.raw["pusher/wrench"]]
+    assert stamps == [START + 10**6 * (504 + 8 * k) for k in range(12)]
+
+
+def test_a_damaged_recording_plays_up_to_the_damage_and_names_it(tmp_path: Path) -> None:
+    messages = push_messages(8.0)
+    whole = write_bag(tmp_path / "whole.mcap", messages).read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    with replay(cut, play__rate=20.0) as (process, ears):
+        ears.hear_all("finished")
+        report = ears.report("finished")
+        heard = ears.raw["slider/pose"]
+        assert 100 < len(heard) < 2000
+        assert heard == recorded(messages, "slider/pose")[: len(heard)]
+        assert str(cut) in report["damage"]
+        assert wait_until(lambda: "damaged: " in process.text())
+
+
+def test_an_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
+    alien = [("/alien", "alien_msgs/msg/Saucer", START, b"\0\1\0\0\0\0\0\0")]
+    bag = write_bag(tmp_path / "alien.mcap", alien + push_messages(0.2))
+    with replay(bag) as (_, ears):
+        report = ears.report("finished")
+    assert "alien_msgs" in json.loads(report["not_published"])["/alien"]
+    assert report["published"] == str(len(push_messages(0.2)))
+
+
+def test_qos_follows_the_file_of_overrides_and_the_parameters(second: Path, tmp_path: Path) -> None:
+    (tmp_path / "qos.yaml").write_text("/slider/pose: {reliability: best_effort, depth: 7}\n")
+    options = {"play__qos_profile_overrides_path": tmp_path / "qos.yaml", "play__start_paused": True}
+    options["wait_for_subscribers"] = 0.0  # a reliable subscriber never meets a best-effort publisher
+    with replay(second, "-p", "qos_overrides./pusher/pose.publisher.reliability:=best_effort", **options) as (_, ears):
+        ears.wait_for("paused")
+        (slider,) = ears.node.get_publishers_info_by_topic("/slider/pose")
+        (pusher,) = ears.node.get_publishers_info_by_topic("/pusher/pose")
+        (wrench,) = ears.node.get_publishers_info_by_topic("/pusher/wrench")
+    assert slider.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert pusher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    assert wrench.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("state", ["playing", "paused", "delayed", "finished"])
+def test_signals_end_every_state_with_status_0(second: Path, state: str, number: int) -> None:
+    options: dict[str, Any] = {
+        "playing": {"play__rate": 0.01},
+        "paused": {"play__start_paused": True},
+        "delayed": {"play__delay": 60.0},
+        "finished": {"play__rate": 1000.0},
+    }[state]
+    with replay(second, **options) as (process, ears):
+        if state == "delayed":
+            assert wait_until(lambda: bool(ears.reports))
+        else:
+            ears.wait_for(state)
+        assert process.stop(number, timeout=20.0) == 0  # it would be delayed or play for longer
+        assert "Traceback" not in process.text()
+        assert "late p50" in process.text()
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({}, "recording: '' is not accepted"),
+        ({"recording": "/nowhere.mcap"}, "/nowhere.mcap: cannot be read"),
+        ({"play.rate": -1.0}, "play.rate: -1.0 is not accepted, give a number from 1e-06 up to 1e+06"),
+        ({"play.rate": "fast"}, "play.rate: 'fast' is not accepted"),
+        ({"play.delay": -1.0}, "play.delay: -1.0 is not accepted, give 0 s or more"),
+        ({"play.read_ahead_queue_size": 0}, "play.read_ahead_queue_size: 0 is not accepted"),
+        ({"play.regex_to_filter": "("}, "play.regex_to_filter: '(' is not accepted"),
+        ({"restamp": True, "play.rate": 2.0}, "play.rate: 2.0 is not accepted"),
+        ({"rig": "/nowhere.yaml"}, "/nowhere.yaml: the rig cannot be read"),
+        ({"play.qos_profile_overrides_path": "/nowhere.yaml"}, "play.qos_profile_overrides_path: '/nowhere.yaml'"),
+        ({"qos_overrides./slider/pose.publisher.reliability": "perhaps"}, "reliability"),
+    ],
+)
+def test_a_bad_parameter_is_one_line_and_status_1(second: Path, params: dict[str, Any], said: str) -> None:
+    given = {"recording": second, **params} if params else {}
+    with node_process("push_replay", domain=free_domain(), params=given) as process:
+        assert process.wait(60.0) == 1
+        lines = process.text().splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("push_replay: ")
+    assert said in lines[0]
+
+
+def test_a_big_endian_stamp_is_restamped_too() -> None:
+    from push_predictor.nodes.replay.topics import Restamper
+
+    restamper = Restamper(lambda: START + 5 * 10**9)
+    restamper.settle(START)
+    little = restamper.restamped(stamped(START, [0.0] * 7))
+    big = restamper.restamped(b"\0\0\0\0" + struct.pack(">iI", START // 10**9, 0) + b"rest")
+    assert stamp(little) == START + 5 * 10**9
+    assert struct.unpack_from(">iI", big, 4) == (START // 10**9 + 5, 0)
+
+
+def test_the_configuration_file_lists_every_parameter_with_its_default() -> None:
+    listed = yaml.safe_load((REPOSITORY / "config/push_replay.yaml").read_text())["/**/push_replay"]["ros__parameters"]
+    assert flat(listed) == {param.name: param.default for param in PARAMETERS}
+
+
+def flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        found.update(flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value})
+    return found
+
+
+def test_bags_of_the_test_hold_messages_that_ros_understands() -> None:
+    from rclpy.serialization import deserialize_message
+
+    pose = deserialize_message(stamped(START, [1, 2, 3, 0, 0, 0, 1]), PoseStamped)
+    assert (pose.pose.position.y, pose.header.frame_id, POSE) == (2.0, "world", "geometry_msgs/msg/PoseStamped")

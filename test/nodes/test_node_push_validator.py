@@ -1,0 +1,556 @@
+"""push_validator as others meet it: a process that watches topics, asks a server, writes a score."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack
+from operator import attrgetter
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from replay_bags import RIG
+from ros_harness import REPOSITORY, NodeProcess, acquaint, call, free_domain, node_process, ros_context, wait_until
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import String
+from synthetic import rows, wrench_rows
+from validator_bench import (
+    CIRCLE,
+    HEXAGON,
+    WRITTEN,
+    Status,
+    assert_same_as_offline,
+    finish,
+    replaying,
+    windows_of,
+)
+from visualization_msgs.msg import Marker, MarkerArray
+
+from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
+from msg_adapters.stamps import ns_to_stamp
+from push_predictor.evaluation.offline import validate_recording
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.nodes import push_validator
+from push_predictor.nodes.validator.sensor_subscriber import Samples
+from push_predictor.nodes.validator.validation_run import ValidationRun
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor_interfaces.msg import PushResidual
+from push_predictor_interfaces.srv import LoadModel, Pause, PredictPush, Resume, Seek, SetRate
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Files of two models of the hexagon. That they are tried on their own training pushes does not matter here."""
+    folder, data = tmp_path_factory.mktemp("models"), [HEXAGON]
+    table, rig = load_data(data), load_rig_for(data)
+    for kind in ("gp", "analytical"):
+        save_model(train_model(table, rig, kind, name=kind, n_train=30), folder / f"{kind}.pushmodel")
+    return {kind: folder / f"{kind}.pushmodel" for kind in ("gp", "analytical")}
+
+
+@pytest.fixture
+def domain() -> int:
+    return free_domain()
+
+
+@pytest.fixture
+def server(domain: int, models: dict[str, Path]) -> Iterator[NodeProcess]:
+    with node_process("predict_server", domain=domain, params={"models": list(map(str, models.values()))}) as process:
+        yield process
+
+
+def validator(domain: int, *ros_args: str, namespace: str | None = None, **params: Any) -> Any:
+    params = {"report": False, "diagnostics_period": 0.2, **params}
+    return node_process("push_validator", *ros_args, domain=domain, namespace=namespace, params=params)
+
+
+def count_of_windows(model: Path, recording: Path = HEXAGON) -> str:
+    return str(len(validate_recording(load_model(model), recording)[0]))
+
+
+# --- online is offline -----------------------------------------------------------------------------------------------
+
+
+class Listener:
+    """What is published while a recording is validated."""
+
+    def __init__(self, node: Any) -> None:
+        self.residuals: list[PushResidual] = []
+        self.markers: list[MarkerArray] = []
+        node.create_subscription(PushResidual, "push_residual", self.residuals.append, 1000)
+        node.create_subscription(MarkerArray, "push_markers", self.markers.append, 1000)
+        self.status = Status(node)
+
+
+@pytest.fixture(scope="module")
+def watched(models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Listener]:
+    """One recording at rate 10, judged for two models, with all that was published meanwhile."""
+    domain, out = free_domain(), tmp_path_factory.mktemp("watched")
+    gp, analytical = models.values()
+    served = {"models": [str(gp), str(analytical)]}
+    with ros_context(domain) as node, node_process("predict_server", domain=domain, params=served):
+        heard = Listener(node)
+        with validator(domain, model=gp, compare=[str(analytical)], output=out) as process:
+            heard.status.wait_for_first()
+            with replaying(domain, rate=10.0):
+                process.wait_for_text(WRITTEN, 60.0)
+            judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
+            assert wait_until(lambda: len(heard.residuals) >= sum(judged) and len(heard.markers) >= judged[0])
+            heard.status.wait_for("state", "waiting for samples")
+            assert process.stop() == 0, process.text()
+    return out, heard
+
+
+def test_a_replay_at_rate_10_gives_what_reading_the_recording_gives(watched, models: dict[str, Path]):
+    out, _ = watched
+    assert_same_as_offline(out, models["gp"])
+    assert_same_as_offline(out, models["analytical"], suffix="_analytical")
+
+
+def test_every_residual_is_published_with_the_numbers_of_the_log(watched):
+    out, heard = watched
+    logged = [
+        (name, w) for name, suffix in (("gp", ""), ("analytical", "_analytical")) for w in windows_of(out, suffix)
+    ]
+    published = {(m.model, m.push_id, m.window): m for m in heard.residuals}
+    assert len(heard.residuals) == len(published) == len(logged)
+    for name, entry in logged:
+        message = published[name, entry["push_id"], entry["window"]]
+        for field in ("velocity", "contact", "angle", "duration"):
+            assert getattr(message, field) == entry[field]
+        for field in ("predicted", "covariance", "observed"):
+            assert list(getattr(message, field)) == entry[field]
+        assert list(message.standardised) == pytest.approx(entry["standardised"], rel=1e-9)
+        assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == entry["end"]
+
+
+def test_the_running_figures_end_at_those_of_the_result(watched):
+    out, heard = watched
+    for name, suffix in (("gp", ""), ("analytical", "_analytical")):
+        result, values = json.loads((out / f"validation{suffix}.json").read_text()), heard.status.values
+        assert values[f"{name} windows"] == str(result["n_test"])
+        assert values[f"{name} pushes"] == str(result["n_pushes"])
+        assert float(values[f"{name} nmse"]) == pytest.approx(result["nmse"]["total"], rel=1e-5)
+        assert float(values[f"{name} nlpd"]) == pytest.approx(result["nlpd"]["total"], rel=1e-5)
+        for level, shares in result["coverage"].items():
+            for output, share in shares.items():
+                assert float(values[f"{name} coverage {level} {output}"]) == pytest.approx(share, abs=1e-5)
+    running = [int(values["gp windows"]) for _, _, values in heard.status.all if "gp windows" in values]
+    assert running == sorted(running)
+
+
+def test_the_ellipse_of_a_window_lies_around_its_predicted_centre(watched, models: dict[str, Path]):
+    _, heard = watched
+    windows, comparison = validate_recording(load_model(models["gp"]), HEXAGON)
+    by_end = {window.end: k for k, window in enumerate(windows)}
+    assert len(heard.markers) == len(windows)
+    for array in heard.markers:
+        markers = {marker.ns: marker for marker in array.markers}
+        assert len(markers) == len(array.markers) == 12
+        stamp = array.markers[0].header.stamp
+        k = by_end[stamp.sec * 10**9 + stamp.nanosec]
+        for marker in array.markers:
+            assert (marker.header.frame_id, marker.action, marker.color.a > 0.0) == ("world", Marker.ADD, True)
+            assert marker.pose.orientation.w == 1.0
+        centre = np.mean([(p.x, p.y) for p in markers["predicted_ellipse"].points[:-1]], axis=0)
+        c, s, mean = math.cos(windows[k].push_heading), math.sin(windows[k].push_heading), comparison.mean[k]
+        expected = windows[k].slider_start[:2] + [c * mean[0] - s * mean[1], s * mean[0] + c * mean[1]]
+        assert np.allclose(centre, expected, rtol=0.0, atol=1e-9)
+        observed = markers["observed_centre"].pose.position
+        assert np.allclose([observed.x, observed.y], windows[k].slider_end[:2], rtol=0.0, atol=1e-9)
+
+
+def test_the_recording_of_residuals_is_read_by_our_reader_and_by_rosbags(watched):
+    out, heard = watched
+    bag = open_bag(out / "residuals")
+    assert bag.topics == {"/push_residual": RESIDUAL_TYPE}
+    ours = [deserialize_message(message.data, PushResidual) for message in bag.messages()]
+    key = attrgetter("model", "push_id", "window")
+    assert sorted(ours, key=key) == sorted(heard.residuals, key=key)
+    ends = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in ours]
+    assert ends == sorted(ends)
+    with AnyReader([out / "residuals"], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        theirs = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    assert [(m.model, m.push_id, m.window) for m in theirs] == [key(m) for m in ours]
+    assert [m.predicted.tolist() for m in theirs] == [list(m.predicted) for m in ours]
+
+
+def test_the_schema_in_the_recording_is_the_installed_message():
+    own = RESIDUAL_DEFINITION.split("=" * 80)[0].split("\n")
+    written = {name: kind for kind, name in map(str.split, filter(None, own))}
+    installed = {
+        name: kind.replace("double", "float64") for name, kind in PushResidual.get_fields_and_field_types().items()
+    }
+    assert list(written.items()) == list(installed.items())
+
+
+def test_a_stream_that_is_late_by_a_minute_of_the_recording_is_waited_for(models: dict[str, Path]):
+    """At rate 100 a minute passes in 0.6 s, which the middleware may take on a busy machine."""
+    recording = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    assert recording.rig is not None and recording.wrench is not None
+    asked: list[PredictPush.Request] = []
+    client = SimpleNamespace(ask=lambda request, on_answer: asked.append(request))
+    run = ValidationRun(recording.rig, {"analytical": load_model(models["analytical"])}, client, lambda *shown: None)
+    stamps = [stream.stamp for stream in (recording.slider, recording.pusher, recording.wrench)]
+    early, late = stamps[0][0] + 100 * 10**9, stamps[0][0] + 40 * 10**9
+
+    def portion(start: int, wrench_start: int, end: int, wrench_end: int) -> Samples:
+        inside = [(s >= begin) & (s < stop) for s, begin, stop in zip(
+            stamps, (start, start, wrench_start), (end, end, wrench_end), strict=True)]  # fmt: skip
+        return Samples(
+            rows(recording.slider, inside[0]),
+            rows(recording.pusher, inside[1]),
+            wrench_rows(recording.wrench, inside[2]),
+        )
+
+    for samples in (
+        portion(0, 0, early, late),
+        portion(early, late, early + 1, early),
+        portion(early + 1, early, 2**62, 2**62),
+    ):
+        run.feed(samples)
+    run.finish()
+    expected = find_windows(recording, recording.rig)
+    assert [(w.push_id, w.index) for w in run.validation.windows] == [(w.push_id, w.index) for w in expected]
+    assert [r.velocity for r in asked] == pytest.approx([w.velocity for w in expected], rel=1e-9)
+
+
+@pytest.mark.parametrize("given", ["gp", ""])
+def test_a_model_may_be_named_as_the_server_names_it_or_not_at_all(given: str, domain, server, models, tmp_path: Path):
+    """The first model is the server's default."""
+    with validator(domain, model=given, output=tmp_path) as process, replaying(domain, rate=20.0):
+        process.wait_for_text(WRITTEN, 60.0)
+    assert_same_as_offline(tmp_path, models["gp"])
+
+
+# --- a server that is not there, or will not answer ------------------------------------------------------------------
+
+
+def test_a_server_that_starts_after_the_replay_has_ended_costs_no_window(domain: int, models, tmp_path: Path):
+    params = {"model": models["gp"], "output": tmp_path, "last_answers": 120.0}
+    with ros_context(domain) as node, validator(domain, **params) as process:
+        status = Status(node)
+        with replaying(domain) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+        status.wait_for_message("nobody offers predict_push")
+        status.wait_for("state", "waiting for the last answers")
+        with node_process("predict_server", domain=domain, params={"models": [str(models["gp"])]}):
+            process.wait_for_text(WRITTEN, 120.0)
+    assert_same_as_offline(tmp_path, models["gp"])
+
+
+def test_a_server_that_is_killed_and_started_again_costs_no_window(domain: int, models, tmp_path: Path, monkeypatch):
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
+    served = {"models": [str(models["gp"])]}
+    params = {"model": models["gp"], "output": tmp_path, "request_timeout": 0.5, "last_answers": 120.0}
+    with (
+        ros_context(domain) as node,
+        validator(domain, **params) as process,
+        node_process("predict_server", domain=domain, params=served) as first,
+    ):
+        heard = Listener(node)
+        heard.status.wait_for_server()
+        with replaying(domain, rate=2.0):
+            assert wait_until(lambda: len(heard.residuals) >= 10, 60.0)
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+            answered = len(heard.residuals)
+            with node_process("predict_server", domain=domain, params=served):
+                process.wait_for_text(WRITTEN, 120.0)
+    assert_same_as_offline(tmp_path, models["gp"])
+    assert answered < len(windows_of(tmp_path))
+
+
+def test_a_model_that_the_server_does_not_know_yet_is_waited_for(domain: int, models, tmp_path: Path):
+    with (
+        ros_context(domain) as node,
+        node_process("predict_server", domain=domain, params={"models": [str(models["analytical"])]}),
+        validator(domain, model="hexagon", output=tmp_path) as process,
+    ):
+        status = Status(node)
+        with replaying(domain) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+        said = status.wait_for_message("hexagon")
+        assert "not known to predict_server, which has analytical" in said
+        answer = finish(node)
+        assert not answer.success and "hexagon" in answer.message
+        assert not (tmp_path / "validation.json").exists()
+        request = LoadModel.Request(path=str(models["gp"]), name="hexagon")
+        assert call(node.create_client(LoadModel, "load_model"), request).success
+        process.wait_for_text(WRITTEN, 60.0)
+    assert_same_as_offline(tmp_path, models["gp"])
+
+
+class StubServer:
+    """predict_push with answers of the test's making, by the number of the request."""
+
+    def __init__(self, node: Any) -> None:
+        self.asked = 0
+        node.create_service(PredictPush, "predict_push", self._answer)
+
+    def _answer(self, request: PredictPush.Request, response: PredictPush.Response) -> PredictPush.Response:
+        self.asked += 1
+        if self.asked <= 3:
+            response.message = "the node is inactive: activate it"  # about the server: to be asked again
+            return response
+        response.success, response.mean = True, [0.004, 0.0, 0.0]
+        response.covariance = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-3]
+        kind = self.asked % 10
+        if kind == 0:
+            response.mean = [math.nan, 0.0, 0.0]
+        elif kind == 1:
+            response.covariance = [0.0] * 9
+        elif kind == 2:
+            response = PredictPush.Response(success=False, message="angle: 1.6 is not accepted, give less")
+        return response
+
+
+def test_refused_windows_and_answers_that_are_no_gaussian_are_left_out_and_listed(domain: int, models, tmp_path: Path):
+    """The stub offers no list_models: a validator with a model file does not depend on that."""
+    with ros_context(domain) as node:
+        status, _ = Status(node), StubServer(node)
+        with validator(domain, model=models["gp"], output=tmp_path) as process, replaying(domain):
+            process.wait_for_text(WRITTEN, 60.0)
+            log, result = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("windows", "validation"))
+            reasons = [entry["reason"] for entry in log["refused"]]
+            status.wait_for("refused", str(len(reasons)))
+            assert f"{len(reasons)} predictions refused" in status.message
+            assert process.stop() == 0, process.text()
+    total = int(count_of_windows(models["gp"]))
+    assert result["n_test"] == len(log["windows"]) == total - len(reasons) and log["unanswered"] == 0
+    assert {reason.split(":")[0] for reason in reasons} == {"response mean", "covariance", "angle"}
+    known = {(w["push_id"], w["window"]) for w in log["windows"]}
+    assert not known & {(entry["push_id"], entry["window"]) for entry in log["refused"]}
+
+
+def test_windows_that_nobody_answers_are_missed_not_guessed(domain: int, models, tmp_path: Path):
+    params = {"model": models["gp"], "output": tmp_path, "last_answers": 0.2}
+    with ros_context(domain) as node, validator(domain, **params) as process, replaying(domain):
+        status = Status(node)
+        process.wait_for_text(WRITTEN, 60.0)
+        status.wait_for_news()
+        assert (status.values["gp windows"], status.values["open requests"]) == ("0", "0")
+        total = count_of_windows(models["gp"])
+        assert f"{total} windows were never answered" in process.text()
+    assert json.loads((tmp_path / "windows.json").read_text())["unanswered"] == int(total)
+    assert json.loads((tmp_path / "validation.json").read_text())["n_test"] == 0
+
+
+# --- the end of a score ----------------------------------------------------------------------------------------------
+
+
+def test_finish_writes_everything_and_what_comes_then_is_a_new_score(domain: int, server, models, tmp_path: Path):
+    """The replay's status is not heard, as if another program played."""
+    deaf = ("-r", "replay_status:=nowhere")
+    with (
+        ros_context(domain) as node,
+        validator(domain, *deaf, model=models["gp"], output=tmp_path, report=True) as process,
+    ):
+        status, stray = Status(node), node.create_publisher(PoseStamped, "slider/pose", 100)
+        answer = finish(node)
+        assert not answer.success and "rig" in answer.message
+        status.wait_for_server()  # a caller of ~/finish waits 5 s for answers
+        with replaying(domain) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+        answer = finish(node, timeout=60.0)
+        assert answer.success and answer.message == str(tmp_path)
+        assert_same_as_offline(tmp_path, models["gp"])
+        assert (tmp_path / "report.html").stat().st_size > 10_000
+        first = (tmp_path / "validation.json").read_text()
+        assert finish(node).success, "once more does no harm"
+
+        stray.publish(pose())
+        status.wait_for("state", "validating")
+        assert finish(node).success
+        assert (tmp_path / "validation.json").read_text() == first, "no push was found, so there is nothing to tell"
+
+        with replaying(domain, rate=10.0) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+            status.wait_for_news()
+            status.wait_for("open requests", "0")  # the end of the process waits 2 s for those that come
+            (tmp_path / "validation.json").unlink()
+            assert process.stop(signal.SIGTERM) == 0
+        assert_same_as_offline(tmp_path, models["gp"])
+
+
+def test_an_interrupt_in_the_middle_has_what_was_measured_written(domain: int, server, models, tmp_path: Path):
+    with ros_context(domain) as node, validator(domain, model=models["gp"], output=tmp_path, report=True) as process:
+        heard = Listener(node)
+        heard.status.wait_for_server()
+        with replaying(domain, rate=2.0):
+            assert wait_until(lambda: len(heard.residuals) >= 8, 60.0)
+            assert wait_until(lambda: int(heard.status.values.get("gp windows", "0")) >= 8), "the figures run along"
+            assert process.stop(signal.SIGINT, timeout=20.0) == 0  # not the 30 s of last_answers
+    windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
+    found = [(w["push_id"], w["window"]) for w in windows_of(tmp_path)]
+    assert 8 <= len(found) < len(windows)
+    assert found == [(w.push_id, w.index) for w in windows[: len(found)]]
+    assert len(list(open_bag(tmp_path / "residuals").messages())) == len(found)
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_paused_sought_and_looped_replays_are_one_score_that_counts_the_jumps(
+    domain: int, server, models, tmp_path: Path
+):
+    windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
+    begin, middle = (Seek.Request(time=ns_to_stamp(windows[k].start)) for k in (0, len(windows) // 2))
+    with ros_context(domain) as node, validator(domain, model=models["gp"], output=tmp_path):
+        status = Status(node)
+
+        def figure(key: str) -> int:
+            return int(status.values.get(key, "0"))
+
+        pause, resume, set_rate, seek = (
+            node.create_client(kind, f"push_replay/{name}")
+            for kind, name in ((Pause, "pause"), (Resume, "resume"), (SetRate, "set_rate"), (Seek, "seek"))
+        )
+        with replaying(domain, rate=20.0, **{"play.loop": True}):
+            acquaint(node, "push_replay")
+            assert wait_until(lambda: figure("streams clock_set_back") >= 1), "looped"
+            call(pause, Pause.Request())
+            status.wait_for_news()
+            samples = figure("slider samples")
+            # From the middle at this rate the replay loops in 20 s only: what jumps before that is the seek.
+            assert call(set_rate, SetRate.Request(rate=0.5)).success and call(seek, middle).success
+            call(resume, Resume.Request())
+            assert wait_until(lambda: figure("slider samples") >= samples + 100)
+            before = figure("streams clock_set_back")
+            assert call(seek, begin).success
+            assert wait_until(lambda: figure("streams clock_set_back") > before)
+        assert finish(node).success
+    offline = {window.push_id for window in windows}
+    assert len(offline & {entry["push_id"] for entry in windows_of(tmp_path)}) >= len(offline) - 1
+
+
+# --- rigs ------------------------------------------------------------------------------------------------------------
+
+
+def test_in_a_namespace_with_other_topics_and_the_rig_from_a_file(domain: int, models, tmp_path: Path):
+    rig = tmp_path / "hexagon.rig.yaml"
+    save_rig(load_rig_for([HEXAGON]), rig)
+    remaps = ("-r", "slider/pose:=/vicon/butter/butter", "-r", "pusher/wrench:=ft/wrench")
+    served = {"models": [str(models["gp"])]}
+    with (
+        node_process("predict_server", domain=domain, namespace="/cell", params=served),
+        validator(
+            domain, *remaps, "-r", "rig:=nowhere", namespace="/cell", model=models["gp"], output=tmp_path, rig=rig
+        ) as process,
+        replaying(domain, *remaps, "-r", "__ns:=/cell"),
+    ):
+        process.wait_for_text(WRITTEN, 60.0)
+    assert_same_as_offline(tmp_path, models["gp"])
+
+
+def test_another_rig_ends_the_score_and_a_model_of_another_slider_is_warned_about(
+    domain: int, server, models, tmp_path: Path
+):
+    deaf = ("-r", "replay_status:=nowhere")
+    with (
+        ros_context(domain) as node,
+        validator(domain, *deaf, model=models["analytical"], output=tmp_path) as process,
+    ):
+        status = Status(node)
+        status.wait_for_server()  # a change of the rig waits 5 s for answers
+        with replaying(domain) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+        with replaying(domain, recording=CIRCLE) as replay:
+            process.wait_for_text(WRITTEN, 60.0)
+            assert_same_as_offline(tmp_path, models["analytical"])
+            replay.wait_for_text("finished: published", 60.0)
+        said = status.wait_for_message("was trained with the outline")
+        assert "'hex'" in said and "'ellip1'" in said and status.all[-1][0] == DiagnosticStatus.WARN
+        assert finish(node).success
+    assert_same_as_offline(tmp_path, models["analytical"], CIRCLE)
+
+
+# --- messages that no sensor should send -----------------------------------------------------------------------------
+
+
+def pose(frame: str = "world", x: float = 0.0, w: float = 1.0) -> PoseStamped:
+    message = PoseStamped()
+    message.header.frame_id, message.header.stamp.sec = frame, 1_700_000_000
+    message.pose.position.x, message.pose.orientation.w = x, w
+    return message
+
+
+def test_useless_messages_are_counted_by_kind_and_do_no_harm(domain: int, models):
+    overrides = ("-p", "qos_overrides./slider/pose.subscription.reliability:=best_effort")
+    with ros_context(domain) as node, validator(domain, *overrides, model=models["gp"]) as process:
+        status = Status(node)
+        slider, pusher = (node.create_publisher(PoseStamped, f"{name}/pose", 100) for name in ("slider", "pusher"))
+        wrench = node.create_publisher(WrenchStamped, "pusher/wrench", 100)
+        rig = node.create_publisher(String, "rig", LATCHED)  # the last: who has heard it knows the others too
+        for publisher in (slider, pusher, wrench):
+            assert wait_until(lambda publisher=publisher: publisher.get_subscription_count() > 0)
+        (info,) = node.get_subscriptions_info_by_topic("/slider/pose")
+        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        (info,) = node.get_subscriptions_info_by_topic("/pusher/pose")
+        assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+
+        rig.publish(String(data='{"shape": "rect1"}'))
+        assert "outline" in status.wait_for_message("push_rig lacks")
+        rig.publish(String(data=json.dumps(RIG)))
+        for message in (pose(), pose(x=math.nan), pose("map"), pose("map"), pose(w=0.0)):
+            slider.publish(message)
+        for message in (pose(w=0.0), pose(x=-math.inf)):
+            pusher.publish(message)
+        status.wait_for("slider rejected", "4")
+        status.wait_for("pusher rejected", "1")
+        values = status.values
+        assert (values["slider samples"], values["pusher samples"]) == ("5", "2")
+        assert values["slider rejected not finite"] == "1"
+        assert values["slider rejected frame_id"] == "2"
+        assert values["slider rejected no orientation"] == "1"
+        assert values["pusher rejected not finite"] == "1"
+        assert "/slider/pose: 4 of 5 samples rejected" in status.message
+        assert finish(node).success
+        assert process.stop() == 0, process.text()
+
+
+def test_no_markers_are_made_while_nobody_watches(monkeypatch: pytest.MonkeyPatch):
+    """Seen from inside: what is published to nobody cannot be heard."""
+    made: list[Any] = []
+    monkeypatch.setattr(push_validator, "window_markers", lambda *of_what: made.append(of_what))
+    for watchers in (0, 1):
+        publisher = SimpleNamespace(get_subscription_count=lambda count=watchers: count, publish=lambda message: None)
+        node = SimpleNamespace(_residuals=publisher, _markers=publisher, _rig="rig", _values={"frame_id": "world"})
+        push_validator.PushValidator._show(node, 0, "window", "prediction", "residual")
+        assert len(made) == watchers
+
+
+# --- starting --------------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_work_is_said_in_one_line_at_the_start(domain: int, models, tmp_path: Path):
+    blocked, twin = tmp_path / "file", tmp_path / "twin.pushmodel"
+    blocked.write_text("no folder")
+    twin.write_bytes(models["gp"].read_bytes())
+    cases: list[tuple[dict[str, Any], tuple[str, ...]]] = [
+        ({"output": blocked / "in"}, ("output", str(blocked), "folder")),
+        ({"model": blocked}, (str(blocked), "not a model file")),
+        ({"rig": tmp_path / "absent.yaml"}, ("absent.yaml", "cannot be read")),
+        ({"model": models["gp"], "compare": [str(twin)]}, ("compare", "gp", "different")),
+    ]
+    with ExitStack() as running:
+        processes = [running.enter_context(validator(domain, **params)) for params, _ in cases]
+        for process, (_, words) in zip(processes, cases, strict=True):
+            assert process.wait(60.0) == 1
+            (line,) = process.text().strip().splitlines()
+            assert line.startswith("push_validator: ") and all(word in line for word in words), line

@@ -1,0 +1,198 @@
+"""rollout_pushes of predict_server over DDS, and the frame that its poses and samples are in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness as harness
+from geometry_msgs.msg import PoseWithCovariance
+from synthetic import square_pushes
+
+from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
+from push_predictor.errors import RequestError
+from push_predictor.geometry.frames import quaternion_of_yaw, yaw_of_quaternion
+from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.train import train_model
+from push_predictor.planning.rollout import PARTICLES, rollout
+from push_predictor.types import Array
+from push_predictor_interfaces.msg import PushStep
+from push_predictor_interfaces.srv import RolloutPushes
+
+SLIDER = np.array([0.3, -0.1, 2.5])
+COVARIANCE = np.array([[4e-6, 1e-6, 2e-6], [1e-6, 2e-6, 0.0], [2e-6, 0.0, 4e-4]])
+STEPS = [[0.02, 0.1, 0.1, 1.0], [0.02, 0.6, -0.2, 0.4]]
+PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
+Ask = Callable[..., RolloutPushes.Response]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A GP of the square."""
+    place = tmp_path_factory.mktemp("models")
+    save_model(train_model(*square_pushes(60), "gp", name="gp"), place / "gp.model")
+    return place
+
+
+@pytest.fixture(scope="module")
+def ask(folder: Path) -> Iterator[Ask]:
+    """From what differs from the usual request to the response."""
+    domain = harness.free_domain()
+    running = harness.node_process("predict_server", domain=domain, params={"models": [str(folder)]})
+    with running, harness.ros_context(domain) as node:
+        client = node.create_client(RolloutPushes, "rollout_pushes")
+        yield lambda **change: harness.call(client, request(**change))
+
+
+def request(
+    slider: Array = SLIDER,
+    covariance: Array = COVARIANCE,
+    steps: list[list[float]] = STEPS,
+    frame: str = "world",
+    **others: Any,
+) -> RolloutPushes.Request:
+    message = RolloutPushes.Request(slider=pose_with_covariance(slider, covariance), **others)
+    message.header.frame_id = frame
+    names = ("velocity", "contact", "angle", "duration")
+    message.steps = [PushStep(**dict(zip(names, map(float, step), strict=True))) for step in steps]
+    return message
+
+
+def pose_with_covariance(slider: Array, covariance: Array) -> PoseWithCovariance:
+    message, matrix = PoseWithCovariance(), np.zeros((6, 6))
+    matrix[PLANAR] = covariance
+    message.covariance = matrix.ravel()
+    message.pose.position.x, message.pose.position.y, message.pose.position.z = *slider[:2], 0.03
+    z, w = quaternion_of_yaw(slider[2])
+    message.pose.orientation.z, message.pose.orientation.w = float(z), float(w)
+    return message
+
+
+def planar(pose: PoseWithCovariance) -> tuple[Array, Array]:
+    """x, y, heading (3,) and their covariance (3, 3)."""
+    place, turn = pose.pose.position, pose.pose.orientation
+    matrix = np.array(pose.covariance).reshape(6, 6)[PLANAR]
+    return np.array([place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w)]), matrix
+
+
+def test_it_answers_what_the_library_says(ask: Ask, folder: Path) -> None:
+    response = ask(particles=7, seed=11)
+    assert response.success, response.message
+    expected = rollout(serve(load_model(folder / "gp.model")), SLIDER, COVARIANCE, STEPS, PARTICLES, 11)
+    for pose, mean, covariance in zip(response.poses, expected.mean, expected.covariance, strict=True):
+        found, matrix = planar(pose)
+        np.testing.assert_allclose(found, mean, atol=1e-9)
+        np.testing.assert_allclose(matrix, covariance, rtol=1e-6, atol=1e-12)
+        assert pose.pose.position.z == pytest.approx(0.03)
+    np.testing.assert_allclose(np.reshape(response.samples, (7, 3)), expected.samples[:7], atol=1e-9)
+
+
+def test_the_poses_do_not_depend_on_how_many_samples_are_wanted(ask: Ask) -> None:
+    none, some = ask(seed=3), ask(particles=200, seed=3)
+    assert len(none.samples) == 0 and len(some.samples) == 600
+    assert none.poses == some.poses
+    many = ask(particles=3000, seed=3)
+    assert len(many.samples) == 9000
+    samples = np.reshape(many.samples, (-1, 3))
+    np.testing.assert_allclose(samples[:, :2].mean(axis=0), planar(many.poses[-1])[0][:2], atol=1e-12)
+
+
+def test_the_same_seed_gets_the_same_answer(ask: Ask) -> None:
+    one, again, other = (ask(particles=5, seed=seed) for seed in (2**63, 2**63, 1))
+    assert one == again and one.samples != other.samples
+
+
+def test_no_steps_are_answered_with_no_poses(ask: Ask) -> None:
+    response = ask(steps=[], particles=4)
+    assert response.success and response.poses == [] and len(response.samples) == 12
+
+
+def test_it_says_when_samples_leave_what_the_model_has_learnt(ask: Ask) -> None:
+    assert ask(covariance=np.zeros((3, 3)), steps=[[0.02, 0.1, 0.1, 0.2]]).message == ""
+    response = ask(steps=[STEPS[0], [0.5, 0.1, 0.1, 0.2]])
+    assert response.success
+    assert response.message.startswith("100 % of the samples leave the domain of the training data, from steps[1] on")
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"steps": [STEPS[0], STEPS[0], [0.02, 0.1, 2.0, 1.0]]}, "steps[2].angle: 2.0 is not accepted, give an angle"),
+        ({"steps": [[0.02, 0.1, 0.1, 0.5]]}, "steps[0].duration: 0.5 is not accepted, give 0.18 to 0.22 s"),
+        ({"slider": np.array([0.0, np.nan, 0.0])}, "slider.pose.position.y: nan"),
+        ({"covariance": np.diag([1.0, 1.0, np.nan])}, "slider.covariance[35]: nan"),
+        ({"covariance": np.diag([1.0, -1.0, 1.0])}, "slider.covariance: "),
+        ({"particles": 100_001}, "particles: 100001 is not accepted, give at most 100000"),
+        ({"model": "other"}, "model: 'other' is not accepted, give one of gp"),
+        ({"frame": ""}, "header.frame_id: ''"),
+        ({"frame": "camera"}, "header.frame_id: 'camera'"),
+    ],
+)
+def test_what_cannot_be_answered_is_refused_in_words(ask: Ask, change: dict[str, Any], message: str) -> None:
+    response = ask(**change)
+    assert not response.success and message in response.message
+    assert response.poses == [] and len(response.samples) == 0
+
+
+def test_a_quaternion_that_is_none_is_refused(ask: Ask) -> None:
+    wrong = request()
+    wrong.slider.pose.orientation.w = 3.0
+    with pytest.raises(RequestError, match=r"slider\.pose\.orientation norm"):
+        query_from_rollout_request(wrong)
+
+
+@pytest.mark.parametrize("quaternion", [vertical_turn(0.7), np.array([0.6, 0.8, 0.0, 0.0])], ids=["turned", "below"])
+def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quaternion: Array) -> None:
+    """The same slider told in another frame, such as that of a camera below the table: the same outcome there."""
+    model, frame = load_model(folder / "gp.model"), SpatialPose(np.array([1.0, -2.0, 0.5]), quaternion)
+    in_world = answered(model, request(particles=3), SAME_FRAME)
+    in_frame = answered(model, told_in(frame, request(particles=3)), frame)
+    for one, other in zip(in_world.poses, in_frame.poses, strict=True):
+        back, expected = frame @ pose_in_space(other), pose_in_space(one)
+        np.testing.assert_allclose(back.position, expected.position, atol=1e-9)
+        np.testing.assert_allclose(back.rotation, expected.rotation, atol=1e-9)
+        covariance = frame.covariance(np.array(other.covariance).reshape(6, 6))
+        np.testing.assert_allclose(covariance, np.array(one.covariance).reshape(6, 6), atol=1e-12)
+    height = in_frame.poses[0].pose.position.z
+    samples = zip(np.reshape(in_world.samples, (-1, 3)), np.reshape(in_frame.samples, (-1, 3)), strict=True)
+    for (x, y, heading), (u, v, turned) in samples:
+        np.testing.assert_allclose(frame.point(np.array([u, v, height])), [x, y, 0.03], atol=1e-9)
+        ahead = frame.vector(np.array([np.cos(turned), np.sin(turned), 0.0]))
+        np.testing.assert_allclose(ahead, [np.cos(heading), np.sin(heading), 0.0], atol=1e-9)
+
+
+def test_a_slider_that_does_not_lie_flat_is_refused() -> None:
+    tilted = SpatialPose(np.zeros(3), np.array([np.sin(0.1), 0.0, 0.0, np.cos(0.1)]))
+    with pytest.raises(RequestError, match=r"orientation tilt: 0\.2 .*flat within 0\.1 rad"):
+        world_slider(query_from_rollout_request(request()), tilted)
+
+
+def answered(model: PushModel, message: RolloutPushes.Request, frame: SpatialPose) -> RolloutPushes.Response:
+    """What the server answers to a request whose frame lies in the world as `frame`."""
+    response, query = RolloutPushes.Response(), query_from_rollout_request(message)
+    slider = world_slider(query, frame)
+    rolled = rollout(model, slider.planar, slider.covariance, query.steps, 200, query.seed)
+    fill_rollout_response(response, frame, slider, rolled, query.samples)
+    return response
+
+
+def told_in(frame: SpatialPose, message: RolloutPushes.Request) -> RolloutPushes.Request:
+    """The request of the world, told in another frame."""
+    there = frame.inverse @ pose_in_space(message.slider)
+    position, turn = message.slider.pose.position, message.slider.pose.orientation
+    position.x, position.y, position.z = there.position.tolist()
+    turn.x, turn.y, turn.z, turn.w = there.quaternion.tolist()
+    matrix = np.array(message.slider.covariance).reshape(6, 6)
+    message.slider.covariance = frame.inverse.covariance(matrix).ravel()
+    return message
+
+
+def pose_in_space(message: PoseWithCovariance) -> SpatialPose:
+    place, turn = message.pose.position, message.pose.orientation
+    return SpatialPose(np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w]))

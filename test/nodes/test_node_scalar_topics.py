@@ -1,0 +1,301 @@
+"""Scalar topics through real nodes: what a replay brings beside the sensors counts online as it does offline."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from replay_bags import stamped, write_bag
+from ros_harness import free_domain, node_process, ros_context, wait_until
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Temperature
+from std_msgs.msg import Float32, Float64, String
+from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
+
+from msg_adapters.residual_schema import RESIDUAL_TYPE
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.nodes.validator.scalar_subscriber import ScalarInlet
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.write import write_recording
+from push_predictor.residuals.evidence.loading import load_evidence
+from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
+
+WARMTH, ROD, HUMIDITY, NAME = "/surface/warmth", "/rod/temperature", "/room/humidity", "/rod/name"
+OURS = (WARMTH, ROD, HUMIDITY)
+ASKED = ["surface/warmth", "/rod/temperature", "room/humidity", "rod/name", "nowhere"]
+SECOND = 10**9
+
+
+def float32(value: float) -> bytes:
+    return b"\0\1\0\0" + struct.pack("<f", value)
+
+
+def float64(value: float) -> bytes:
+    return b"\0\1\0\0" + struct.pack("<d", value)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Pushes with a scalar that jumps ten times a second, one that comes late and bears its time, and a rare one."""
+    folder, rng = tmp_path_factory.mktemp("scalars"), np.random.default_rng(0)
+    plan = random_pushes(10, [0.03], 0.02, rng)
+    write_recording(folder / "pushes", simulate(SimulationSpec("rect1", "abs", plan, name="pushes")))
+    bag = open_bag(folder / "pushes")
+    messages = [
+        (m.topic, m.type, m.log_time, m.data) for m in bag.messages() if "pusher" in m.topic or "slider" in m.topic
+    ]
+    begin, end = messages[0][2], messages[-1][2]
+    lasts = (end - begin) / SECOND
+    for at in np.arange(0.01, lasts, 0.1):
+        messages.append((WARMTH, "std_msgs/msg/Float64", begin + int(at * SECOND), float64(rng.normal())))
+    for at in np.arange(0.4 * lasts, lasts, 1.0):
+        time = begin + int(at * SECOND)
+        messages.append((ROD, "sensor_msgs/msg/Temperature", time + 10**6, stamped(time, [20.0 + rng.normal(), 0.0])))
+    for at in np.arange(0.3, lasts, 7.0):
+        messages.append((HUMIDITY, "std_msgs/msg/Float32", begin + int(at * SECOND), float32(rng.normal())))
+    name = b"\0\1\0\0" + struct.pack("<I", 4) + b"rod\0"
+    messages.append((NAME, "std_msgs/msg/String", begin + SECOND, name))
+    messages.sort(key=lambda message: message[2])
+    return write_bag(folder / "scalars.mcap", messages, {k: str(v) for k, v in bag.metadata["push_rig"].items()})
+
+
+@pytest.fixture(scope="module")
+def model(recording: Path) -> Path:
+    """A model that lacks nothing but the warmth, which changes the contact friction."""
+    rig = load_rig_for([recording])
+    base = train_model(load_data([recording]), rig, "analytical", name="warm")
+    form = Form("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
+    effect = Effect("contact_friction", f"topic:{WARMTH}", form, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
+    assert isinstance(base.body, AnalyticalBody)
+    body = ExtendedBody(base.body, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3))
+    path = recording.parent / "warm.pushmodel"
+    save_model(replace(base, body=body), path)
+    return path
+
+
+class Watched:
+    """A replay at rate 8 through a validator that was told of scalar topics."""
+
+    def __init__(self, recording: Path, model: Path, output: Path) -> None:
+        domain = free_domain()
+        params = {"model": model, "output": output, "report": False, "diagnostics_period": 0.2, "scalar_topics": ASKED}
+        with (
+            ros_context(domain) as node,
+            node_process("predict_server", domain=domain, params={"models": [str(model)]}),
+            node_process("push_validator", domain=domain, params=params) as process,
+        ):
+            status = Status(node)
+            status.wait_for_first()
+            self.before = status.message
+            with replaying(domain, recording=recording, rate=8.0):
+                process.wait_for_text(WRITTEN, 90.0)
+            status.wait_for("state", "waiting for samples")
+            assert process.stop() == 0, process.text()
+        self.output, self.message, self.values = output, status.message, status.values
+        self.said = [message for _, message, _ in status.all]
+
+
+@pytest.fixture(scope="module")
+def watched(recording: Path, model: Path, tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    return Watched(recording, model, tmp_path_factory.mktemp("watched"))
+
+
+def test_the_windows_have_the_values_that_reading_the_recording_gives(watched: Watched, recording: Path) -> None:
+    online, offline = load_data([watched.output / "pushes.csv"]), load_data([recording])
+    assert online.push_id.tolist() == offline.push_id.tolist()
+    for topic in OURS:
+        found, expected = online.covariates[f"topic:{topic}"], offline.covariates[f"topic:{topic}"]
+        assert np.ptp(expected) > 0.1
+        assert np.max(np.abs(found - expected)) < 1e-9, topic
+
+
+def test_what_a_trace_is_given_has_them_too(watched: Watched, recording: Path) -> None:
+    online, offline = load_evidence([watched.output / "pushes.csv"]), load_evidence([recording])
+    assert not online.left_out and set(offline.table.covariates) <= {*online.table.covariates}
+    for name, column in offline.table.covariates.items():
+        assert np.allclose(online.table.covariates[name], column, rtol=0.0, atol=1e-9), name
+
+
+def test_a_model_that_needs_a_topic_is_judged_as_offline(watched: Watched, model: Path, recording: Path) -> None:
+    assert_same_as_offline(watched.output, model, recording)
+    log = json.loads((watched.output / "windows.json").read_text())
+    assert log["refused"] == [] and log["unanswered"] == 0
+
+
+def test_the_bag_of_residuals_has_them_at_the_windows_starts(watched: Watched, recording: Path) -> None:
+    windows = find_windows(read_recording(recording), load_rig_for([recording]))
+    topics = open_bag(watched.output / "residuals").topics
+    assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys(OURS, "std_msgs/msg/Float64")}
+    for topic in (WARMTH, HUMIDITY):
+        written = [m for m in open_bag(watched.output / "residuals").messages() if m.topic == topic]
+        assert [m.log_time for m in written] == [window.start for window in windows]
+        values = [struct.unpack_from("<d", m.data, 4)[0] for m in written]
+        assert values == pytest.approx([window.covariates[f"topic:{topic}"] for window in windows], abs=1e-9)
+
+
+def test_topics_that_bring_nothing_are_named(watched: Watched) -> None:
+    for topic in (*OURS, "/nowhere"):
+        assert f"scalar topic {topic}: nobody publishes it" in watched.before
+    assert "scalar topic /nowhere: nobody publishes it" in watched.message
+    wrong = f"scalar topic {NAME}: of type std_msgs/msg/String, one of std_msgs/msg/Float64"
+    assert any(wrong in message for message in watched.said), "while it was published"
+    assert not any(f"scalar topic {topic}" in watched.message for topic in OURS)
+    counts = [int(watched.values[f"topic:{topic} samples"]) for topic in OURS]
+    assert counts[0] > 100 > counts[1] > counts[2] > 1
+    assert not any("rejected" in key and key.startswith("topic:") for key in watched.values)
+
+
+@pytest.mark.parametrize("names", [["warmth", "/warmth"], ["~/warmth"], ["1 warmth"]])
+def test_names_that_are_none_are_refused(names: list[str]) -> None:
+    with node_process("push_validator", domain=free_domain(), params={"scalar_topics": names}) as process:
+        assert process.wait(30.0) == 1
+        assert f"scalar_topics: {names[0]!r} is not accepted" in process.text()
+
+
+# --- the inlet alone -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def domain() -> int:
+    return free_domain()
+
+
+@pytest.fixture
+def hearing(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
+
+
+@pytest.fixture
+def speaking(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
+
+
+class Gathered:
+    """What an inlet has taken of one topic."""
+
+    def __init__(self, inlet: ScalarInlet, name: str, near: int | None = None) -> None:
+        self._inlet, self._name, self._near = inlet, name, near
+        self.stamp: list[int] = []
+        self.value: list[float] = []
+
+    def has(self, condition: Callable[[Gathered], bool], timeout: float = 60.0) -> bool:
+        def found() -> bool:
+            self._inlet.look()
+            self._inlet.drain()
+            self._add(self._inlet.take(self._near))
+            return condition(self)
+
+        return wait_until(found, timeout)
+
+    def _add(self, taken: dict[str, ScalarStream]) -> None:
+        if self._name in taken:
+            self.stamp += taken[self._name].stamp.tolist()
+            self.value += taken[self._name].value.tolist()
+
+
+def best_effort() -> QoSProfile:
+    return QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def kept() -> QoSProfile:
+    return QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.mark.parametrize("profile", [best_effort(), kept(), QoSProfile(depth=10)], ids=["lossy", "kept", "reliable"])
+def test_a_topic_that_appears_later_is_heard_as_its_publisher_offers_it(
+    hearing: Node, speaking: Node, profile: QoSProfile
+) -> None:
+    inlet = ScalarInlet(hearing, ["warmth"])
+    assert inlet.names == ["/warmth"] and "nobody publishes" in inlet.problems()[0]
+    gathered = Gathered(inlet, "/warmth")
+    with offered(speaking, String, QoSProfile(depth=10)):
+        assert gathered.has(lambda _: "std_msgs/msg/String" in inlet.problems()[0])
+    message = Temperature(temperature=21.5)
+    message.header.stamp.sec = 7
+    with offered(speaking, Temperature, profile) as publisher:
+        assert gathered.has(speaks(publisher, message, 21.5))
+        assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not inlet.problems()
+    with offered(speaking, Float32, profile) as publisher:
+        assert gathered.has(speaks(publisher, Float32(data=0.5), 0.5)), "another type from now on"
+
+
+@contextmanager
+def offered(node: Node, kind: type, profile: QoSProfile) -> Iterator[Publisher]:
+    """A publisher of the topic that is gone at once when left, which one whose events an executor awaits is not."""
+    silent = PublisherEventCallbacks(use_default_callbacks=False)
+    publisher = node.create_publisher(kind, "warmth", profile, event_callbacks=silent)
+    yield publisher
+    node.destroy_publisher(publisher)
+
+
+def speaks(publisher: Any, message: Any, value: float) -> Callable[[Gathered], bool]:
+    """Publishes until it is heard; where messages are kept, only once, before anybody has subscribed."""
+    once = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    publisher.publish(message)
+
+    def heard(so_far: Gathered) -> bool:
+        if not once:
+            publisher.publish(message)
+        return value in so_far.value
+
+    return heard
+
+
+def test_without_a_clock_the_time_is_when_it_was_sent(hearing: Node, speaking: Node) -> None:
+    inlet, publisher = ScalarInlet(hearing, ["/cell/warmth"]), speaking.create_publisher(Float64, "warmth", kept())
+    begin = speaking.get_clock().now().nanoseconds
+    publisher.publish(Float64(data=1.0))
+    end = speaking.get_clock().now().nanoseconds
+    gathered = Gathered(inlet, "/cell/warmth")
+    assert gathered.has(lambda so_far: bool(so_far.value))
+    assert gathered.value == [1.0] and begin <= gathered.stamp[0] <= end
+
+
+def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Node) -> None:
+    inlet = ScalarInlet(hearing, ["warmth"])
+    clock = speaking.create_publisher(Clock, "/clock", kept())
+    publisher = speaking.create_publisher(Float32, "warmth", kept())
+    for second in range(5):
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = second, 5
+        clock.publish(message)
+        publisher.publish(Float32(data=second + 0.5))
+    gathered = Gathered(inlet, "/warmth")
+    assert gathered.has(lambda so_far: len(so_far.value) == 4)
+    assert gathered.stamp == [second * SECOND + 5 for second in range(4)]
+    assert inlet.take(None, last=True)["/warmth"].value.tolist() == [4.5], "no later tick came"
+
+
+def test_what_another_clock_has_stamped_or_is_no_number_is_counted_not_used(hearing: Node, speaking: Node) -> None:
+    inlet = ScalarInlet(hearing, ["warmth"])
+    publisher = speaking.create_publisher(Temperature, "warmth", kept())
+    for sec, value in ((100, 1.0), (100_000, 2.0), (101, float("nan"))):
+        message: Any = Temperature(temperature=value)
+        message.header.stamp.sec = sec
+        publisher.publish(message)
+    gathered = Gathered(inlet, "/warmth", near=90 * SECOND)
+    assert gathered.has(lambda _: inlet.figures().get("topic:/warmth samples") == 3)
+    assert gathered.value == [1.0]
+    assert "/warmth: 2 samples not used (not finite 1, another clock 1)" in inlet.problems()

@@ -1,0 +1,132 @@
+"""predict_slider_pose of predict_server over DDS: the slider after a push, in the frame of the request."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness as harness
+import yaml
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from synthetic import square_pushes
+
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.train import train_model
+from push_predictor.planning.slider_pose import WorldPush, slider_after
+from push_predictor_interfaces.srv import PredictSliderPose
+
+EXAMPLE = """{header: {frame_id: world}, slider: {position: {x: 0.3, y: 0.1}, orientation: {w: 1.0}},
+  pusher: {x: 0.25025, y: 0.11}, pusher_velocity: {x: 0.02, y: 0.002}, duration: 0.2}"""
+PUSH = WorldPush(np.array([0.3, 0.1, 0.0]), np.array([0.25025, 0.11]), np.array([0.02, 0.002]), 0.2)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A learnt and an analytical model of the square."""
+    place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
+    table, rig = square_pushes(60)
+    shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs go together
+    table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
+    for kind in ("gp", "analytical"):
+        save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
+    return place
+
+
+@contextlib.contextmanager
+def server_of(folder: Path, **params: Any) -> Iterator[Any]:
+    """Runs the server; gives a function from a change of EXAMPLE to the response."""
+    domain = harness.free_domain()
+    params = {"models": [str(folder)], "default_model": "gp", **params}
+    running = harness.node_process("predict_server", domain=domain, params=params)
+    with running, harness.ros_context(domain) as node:
+        client = node.create_client(PredictSliderPose, "predict_slider_pose")
+
+        def ask(**change: Any) -> PredictSliderPose.Response:
+            return harness.call(client, filled(PredictSliderPose.Request(), {**yaml.safe_load(EXAMPLE), **change}))
+
+        yield ask
+
+
+@pytest.fixture(scope="module")
+def ask(folder: Path) -> Iterator[Any]:
+    with server_of(folder) as asked:
+        yield asked
+
+
+def filled(message: Any, values: dict[str, Any]) -> Any:
+    """A message from nested values, as `ros2 service call` fills it."""
+    for name, value in values.items():
+        setattr(message, name, filled(getattr(message, name), value) if isinstance(value, dict) else value)
+    return message
+
+
+@pytest.mark.parametrize("kind", ["gp", "analytical"])
+def test_it_answers_what_the_library_says(ask: Any, folder: Path, kind: str) -> None:
+    response = ask(model=kind)
+    expected = slider_after(serve(load_model(folder / f"{kind}.model")), PUSH)
+    assert response.success, response.message
+    assert response.in_domain == expected.in_domain
+    pose = response.slider_after.pose
+    np.testing.assert_allclose([pose.pose.position.x, pose.pose.position.y], expected.pose[:2], rtol=1e-12)
+    turn = pose.pose.orientation
+    assert 2.0 * np.arctan2(turn.z, turn.w) == pytest.approx(expected.pose[2], rel=1e-9)
+    planar = np.ix_([0, 1, 5], [0, 1, 5])
+    np.testing.assert_allclose(np.array(pose.covariance).reshape(6, 6)[planar], expected.covariance, rtol=1e-9)
+    assert response.slider_after.header.frame_id == "world"
+
+
+def test_the_example_is_in_the_domain_and_moves_the_slider(ask: Any) -> None:
+    response = ask()
+    assert response.in_domain
+    assert 0.002 < response.slider_after.pose.pose.position.x - 0.3 < 0.006
+
+
+def test_the_answer_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
+    header = {"frame_id": "world", "stamp": {"sec": 7, "nanosec": 900_000_000}}
+    stamp = ask(header=header).slider_after.header.stamp
+    assert (stamp.sec, stamp.nanosec) == (8, 100_000_000)
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"pusher": {"x": 0.23025, "y": 0.11}}, ("pusher: (0.23025, 0.11)", "the gap to the outline is 0.02 m")),
+        ({"pusher": {"x": 0.27, "y": 0.11}}, ("pusher", "0.015 m inside the outline")),
+        ({"pusher_velocity": {"x": -0.02}}, ("pusher_velocity: (-0.02, 0.0)", "180.0 degrees off")),
+        ({"pusher_velocity": {}}, ("pusher_velocity: (0.0, 0.0)", "above 0")),
+        ({"pusher_velocity": {"x": float("nan")}}, ("pusher_velocity.x: nan", "a finite number")),
+        ({"slider": {"position": {"x": 0.3, "y": 0.1}, "orientation": {"w": 0.0}}}, ("slider.orientation norm: 0.0",)),
+        ({"duration": 2.0}, ("duration: 2.0", "near what gp was trained on")),
+        ({"model": "nobody"}, ("model: 'nobody'", "one of analytical, gp")),
+        ({"covariate_names": ["slider_heading"], "covariate_values": [1.0]}, ("covariate slider_heading: 1.0",)),
+        ({"header": {}}, ("header.frame_id: ''", "'world'")),
+        ({"header": {"frame_id": "map"}}, ("header.frame_id: 'map' is not accepted, give 'world'",)),
+    ],
+)
+def test_a_bad_request_gets_a_reason_and_no_number(ask: Any, change: dict[str, Any], names: tuple[str, ...]) -> None:
+    response = ask(**change)
+    assert not response.success
+    for name in names:
+        assert name in response.message
+    assert response.slider_after == PoseWithCovarianceStamped()
+    assert not response.in_domain
+    assert ask().success  # and the server goes on
+
+
+@pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2_ros is installed here")
+def test_without_tf_the_refusal_says_so(ask: Any) -> None:
+    expected = "header.frame_id: 'map' is not accepted, give 'world'; tf2_ros is not installed"
+    assert ask(header={"frame_id": "map"}).message == expected
+
+
+def test_the_world_has_the_name_that_a_parameter_gives_it(folder: Path) -> None:
+    with server_of(folder, world_frame="table") as ask:
+        assert ask(header={"frame_id": "table"}).slider_after.header.frame_id == "table"
+        assert "give 'table'" in ask(header={"frame_id": "world"}).message

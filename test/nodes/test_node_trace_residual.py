@@ -1,0 +1,291 @@
+"""The action trace_residual over the graph: a goal, its feedback and result, and everything that can come between."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness as harness
+from action_msgs.msg import GoalStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from made_up_traces import pushes, slippery
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from synthetic import square_rig
+from validator_bench import Status
+
+from msg_adapters.predictions import query_to_request
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.nodes.server.trace_worker import EXTENDED, REPORT, VERDICT, evidence_in
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import write_table
+from push_predictor_interfaces.action import TraceResidual
+from push_predictor_interfaces.srv import LoadModel, PredictPush
+
+STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
+PATIENCE = 60.0  # s, for a trace on a busy machine; alone it takes 3
+DRIVERS = ["elapsed_time", "slider_x"]
+RIG = "pushes.rig.yaml"
+
+
+def recorded(folder: Path, table: PushTable) -> Path:
+    """A folder as push_validator leaves it."""
+    folder.mkdir(parents=True)
+    write_table(folder / "pushes.csv", table)
+    save_rig(square_rig(), folder / RIG)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model, and a folder of pushes whose contact friction drifts."""
+    folder = tmp_path_factory.mktemp("trace")
+    save_model(train_model(pushes(60, 1), square_rig(), "analytical", name="deployed"), folder / "deployed.pushmodel")
+    recorded(folder / "drifting", pushes(60, 2, slippery(0.1)))
+    return folder
+
+
+@pytest.fixture
+def drifting(place: Path, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(place / "drifting", tmp_path / "result"))
+
+
+class Server:
+    """A running predict_server, and a client of its action."""
+
+    def __init__(self, process: harness.NodeProcess, node: Node, domain: int) -> None:
+        self.process, self.node, self.domain = process, node, domain
+        self.load = node.create_client(LoadModel, "load_model")
+        self.change = node.create_client(ChangeState, "push_predictor/change_state")
+        self._action = ActionClient(
+            node, TraceResidual, "trace_residual", feedback_sub_qos_profile=QoSProfile(depth=100)
+        )
+        self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
+
+    def trace(self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "") -> Goal:
+        return Goal(self._action, TraceResidual.Goal(model=model, covariates=covariates, output=str(output)))
+
+    def push(self, covariates: dict[str, float] | None = None, model: str = "") -> PredictPush.Response:
+        """A push that slides along the side, so that contact friction matters."""
+        return harness.call(self.predict, query_to_request(model, np.array([0.02, 0.1, 0.8]), 0.2, covariates))
+
+    def workers(self) -> list[int]:
+        """The processes of traces: children of the node that run what multiprocessing starts."""
+        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        children = [int(pid) for task in tasks for pid in task.read_text().split()]
+        return [pid for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
+
+    def held(self, goal: Goal) -> int:
+        """The process of a trace at work, stopped: it does not end by itself, however long the test takes."""
+        assert goal.reached("motion")
+        (worker,) = self.workers()
+        os.kill(worker, signal.SIGSTOP)
+        return worker
+
+
+class Goal:
+    """A goal that was accepted: its feedback so far, its status and result."""
+
+    def __init__(self, action: ActionClient, goal: TraceResidual.Goal) -> None:
+        assert action.wait_for_server(harness.START_TIMEOUT)
+        self.stages: list[tuple[str, float]] = []
+        sent = action.send_goal_async(goal, lambda m: self.stages.append((m.feedback.stage, m.feedback.progress)))
+        assert harness.wait_until(sent.done, PATIENCE)
+        self.handle: Any = sent.result()
+        assert self.handle.accepted
+        self._result = self.handle.get_result_async()
+
+    @property
+    def ended(self) -> bool:
+        return bool(self._result.done())
+
+    def reached(self, stage: str) -> bool:
+        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), PATIENCE)
+
+    def end(self) -> tuple[int, TraceResidual.Result]:
+        assert harness.wait_until(self._result.done, PATIENCE), self.stages
+        return self._result.result().status, self._result.result().result
+
+
+@contextlib.contextmanager
+def server_of(model: Path, **params: Any) -> Iterator[Server]:
+    domain = harness.free_domain()
+    params = {"models": [str(model)], **params}
+    running = harness.node_process("predict_server", domain=domain, params=params)
+    with running as process, harness.ros_context(domain) as node:
+        server = Server(process, node, domain)
+        assert server.push().success
+        yield server
+
+
+@pytest.fixture(scope="module")
+def server(place: Path) -> Iterator[Server]:
+    """One server for the tests that leave it as it was."""
+    with server_of(place / "deployed.pushmodel") as running:
+        yield running
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
+    place: Path, server: Server, drifting: Path
+) -> None:
+    goal, answered = server.trace(drifting), 0
+    while not goal.ended:
+        assert server.push().success
+        answered += 1
+        time.sleep(0.02)
+    status, result = goal.end()
+    assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True), result.message
+    assert answered > 20  # behind the trace there would be one, or two
+    # Feedback and result are taken apart from each other, in either order.
+    assert harness.wait_until(lambda: goal.stages[-1:] == [("done", 1.0)]), goal.stages
+    shares = [share for _, share in goal.stages]
+    assert {"measurement", "motion", "report", "done"} <= dict(goal.stages).keys()
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+    verdict = json.loads(result.verdict)
+    assert verdict["effects"][0]["covariate"] == "elapsed_time" and verdict["motion_model_changed"]
+    assert json.loads((drifting / VERDICT).read_text()) == verdict and verdict["alpha"] == 0.01
+    assert names(drifting) == sorted(["pushes.csv", RIG, EXTENDED, REPORT, VERDICT])
+    assert result.extended_model == str(drifting / EXTENDED) and "elapsed_time" in result.message
+
+    loaded = harness.call(server.load, LoadModel.Request(path=result.extended_model, name="extended"))
+    assert loaded.success, loaded.message
+    refused = server.push(model="extended")
+    assert not refused.success and "covariate elapsed_time" in refused.message
+    early, late = (server.push({"elapsed_time": at}, "extended") for at in (0.0, 1000.0))
+    assert early.success and late.success and list(early.mean) != list(late.mean)
+    assert server.push().success  # the deployed model is served as before
+
+
+def test_a_cancelled_trace_leaves_nothing(server: Server, drifting: Path) -> None:
+    before = names(drifting)
+    goal = server.trace(drifting, covariates=[])
+    worker = server.held(goal)
+    goal.handle.cancel_goal_async()
+    status, result = goal.end()
+    assert status == GoalStatus.STATUS_CANCELED and not result.success and "cancelled" in result.message
+    assert names(drifting) == before and worker not in server.workers()
+    assert server.push().success
+
+
+def test_a_second_goal_is_refused_with_the_reason(server: Server, drifting: Path, tmp_path: Path) -> None:
+    first = server.trace(drifting, covariates=[])
+    server.held(first)
+    status, result = server.trace(tmp_path / "other").end()
+    assert status == GoalStatus.STATUS_ABORTED and not result.success
+    assert "one at a time" in result.message and "deployed" in result.message
+    assert not (tmp_path / "other").exists() and not first.ended
+    first.handle.cancel_goal_async()
+    assert first.end()[0] == GoalStatus.STATUS_CANCELED
+
+
+def test_a_worker_that_dies_is_told_and_the_server_lives_on(server: Server, drifting: Path) -> None:
+    before = names(drifting)
+    goal = server.trace(drifting, covariates=[])
+    os.kill(server.held(goal), signal.SIGKILL)
+    status, result = goal.end()
+    assert status == GoalStatus.STATUS_ABORTED and "signal 9" in result.message
+    assert names(drifting) == before and server.push().success
+
+
+def cut(folder: Path) -> None:
+    text = (folder / "pushes.csv").read_text().replace("velocity", "speed", 1)
+    (folder / "pushes.csv").write_text(text)
+
+
+BAD = {
+    "no output": ({"output": ""}, ["output: ''"]),
+    "no folder": ({"output": "absent"}, ["absent", "nothing to trace", "no push_validator", "pushes.csv"]),
+    "unknown model": ({"model": "other"}, ["model: 'other'", "deployed"]),
+    "unknown covariate": ({"covariates": ["topic:/warmth"]}, ["topic:/warmth", "elapsed_time"]),
+    "no rig": ({"change": lambda folder: (folder / RIG).unlink()}, [RIG]),
+    "not a table": ({"change": cut}, ["pushes.csv line 1", "velocity"]),
+    "few pushes": ({"change": lambda folder: write_table(folder / "pushes.csv", pushes(5, 3))}, ["pushes: 5", "12"]),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_goal_is_told_what_is_wrong_with_it(case: str, server: Server, drifting: Path) -> None:
+    given, words = BAD[case]
+    request: dict[str, Any] = {"output": drifting, **given}
+    change = request.pop("change", lambda folder: None)
+    if request["output"] == "absent":
+        request["output"] = drifting / "absent"
+    change(drifting)
+    before = names(drifting)
+    status, result = server.trace(**request).end()
+    assert status == GoalStatus.STATUS_ABORTED and not result.success and result.verdict == ""
+    assert all(word in result.message for word in words), result.message
+    assert ".trace-" not in result.message and names(drifting) == before
+
+
+def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
+    server: Server, drifting: Path, tmp_path: Path
+) -> None:
+    last = (drifting / "pushes.csv").read_text().splitlines()[-1]
+    with (drifting / "pushes.csv").open("a") as stream:
+        stream.write(last[: len(last) // 2])  # the validator is writing
+    model = drifting.parent / "absent.pushmodel"
+    save_model(train_model(pushes(20, 4), square_rig(), "analytical", name="deployed"), model)
+    params, status = {"model": model, "output": drifting}, Status(server.node)
+    with harness.node_process("push_validator", domain=server.domain, params=params):
+        # A validator that sees predict_push has found the server's other services and clients, made earlier, as well.
+        assert harness.wait_until(lambda: bool(status.all) and "nobody offers" not in status.message), status.message
+        ended, result = server.trace(tmp_path / "elsewhere").end()
+        assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
+        assert names(tmp_path / "elsewhere") == sorted([EXTENDED, REPORT, VERDICT])
+        assert load_model(tmp_path / "elsewhere" / EXTENDED).needs == ("elapsed_time",)
+
+
+def test_a_node_that_ends_tells_its_client_and_takes_the_trace_with_it(place: Path, drifting: Path) -> None:
+    before = names(drifting)
+    with server_of(place / "deployed.pushmodel", trace_alpha=0.05) as server:
+        harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE)))
+        status, result = server.trace(drifting).end()
+        assert status == GoalStatus.STATUS_ABORTED and "the node is inactive" in result.message
+        harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE)))
+        goal = server.trace(drifting, covariates=[])
+        worker = server.held(goal)
+        assert server.process.stop(signal.SIGINT) == 0
+        assert harness.wait_until(lambda: not Path(f"/proc/{worker}").exists(), 30.0)
+        status, result = goal.end()
+        assert status == GoalStatus.STATUS_ABORTED and "the node ends" in result.message
+    assert names(drifting) == before
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -1.0])
+def test_a_level_out_of_range_is_refused_at_start(alpha: float) -> None:
+    with harness.node_process("predict_server", domain=harness.free_domain(), params={"trace_alpha": alpha}) as node:
+        assert node.wait(harness.START_TIMEOUT) == 1
+        assert f"trace_alpha: {alpha} is not accepted" in node.text()
+
+
+def test_what_can_be_traced_in_a_folder(tmp_path: Path) -> None:
+    assert evidence_in(tmp_path / "absent") == () == evidence_in(tmp_path)
+    for bag in ("second", "first", "residuals"):
+        (tmp_path / bag).mkdir()
+        (tmp_path / bag / "metadata.yaml").touch()
+    (tmp_path / "windows.json").touch()
+    (tmp_path / "more.csv.gz").touch()
+    assert [path.name for path in evidence_in(tmp_path)] == ["first", "more.csv.gz", "second"]
+    assert evidence_in(tmp_path / "first") == (tmp_path / "first",)
+    (tmp_path / "pushes.csv").touch()
+    assert evidence_in(tmp_path) == (tmp_path / "pushes.csv",)

@@ -1,0 +1,262 @@
+"""Keeping the score while windows and answers arrive: the same figures as reading all at once, in little memory."""
+
+from __future__ import annotations
+
+import json
+import random
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import square_rig
+
+from push_predictor.evaluation.metrics import gaussian_nlpd
+from push_predictor.evaluation.offline import rig_difference
+from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.evaluation.validation import Comparison, compare, metrics_json
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.train import train_model
+from push_predictor.online.live_validation import LiveValidation
+from push_predictor.online.running_score import RunningScore
+from push_predictor.online.window_log import write_window_log
+from push_predictor.online.window_rows import WindowRows
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
+
+BEGIN = 1_700_000_000_000_000_000
+
+
+def made_up_windows(count: int, seed: int = 0, per_push: int = 4) -> list[PushWindow]:
+    """Windows of pushes that move the slider about as far as the pusher, with scatter."""
+    rng = np.random.default_rng(seed)
+    return [
+        PushWindow(
+            push_id=f"push-{k // per_push}",
+            index=k % per_push,
+            start=BEGIN + k * 200_000_000,
+            end=BEGIN + (k + 1) * 200_000_000,
+            velocity=float(rng.uniform(0.01, 0.05)),
+            contact=float(rng.uniform(0.0, 1.0)),
+            angle=float(rng.uniform(-1.0, 1.0)),
+            duration=0.2,
+            displacement=rng.normal([0.004, 0.0, 0.0], [0.001, 0.001, 0.03]),
+            slider_start=rng.normal(size=3),
+            slider_end=rng.normal(size=3),
+            push_heading=float(rng.uniform(-3.0, 3.0)),
+            covariates={"elapsed_time": 0.2 * k, "edge": float(k % 4), **({"normal_force": 1.5} if k % 3 else {})},
+        )
+        for k in range(count)
+    ]
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, PushModel]:
+    table = windows_to_table(made_up_windows(40, seed=1))
+    return {kind: train_model(table, square_rig(), kind, name=kind) for kind in ("gp", "analytical")}
+
+
+def predict(model: PushModel, window: PushWindow) -> Prediction:
+    inputs = np.array([[window.velocity, window.contact, window.angle]])
+    return model.predict(inputs, np.array([window.duration]))
+
+
+def answered(models: dict[str, PushModel], windows: list[PushWindow], shuffle: int = 0) -> LiveValidation:
+    """All windows, and every model's prediction of each in an order of its own."""
+    live = LiveValidation(models)
+    numbers = [live.add(window) for window in windows]
+    jobs = [(k, number) for number in numbers for k in range(len(models))]
+    random.Random(shuffle).shuffle(jobs)
+    for k, number in jobs:
+        live.record(k, number, predict(live.models[k], windows[number]))
+    return live
+
+
+def same_window(a: PushWindow, b: PushWindow) -> bool:
+    arrays = ("displacement", "slider_start", "slider_end")
+    others = {key: value for key, value in vars(a).items() if key not in arrays}
+    return others == {key: vars(b)[key] for key in others} and all(
+        np.array_equal(getattr(a, name), getattr(b, name)) for name in arrays
+    )
+
+
+# --- windows in little memory ----------------------------------------------------------------------------------------
+
+
+def test_windows_come_back_from_the_rows_as_they_went_in():
+    windows, rows = made_up_windows(20), WindowRows()
+    for window in windows:
+        rows.append(window)
+    assert len(rows) == 20 and all(map(same_window, rows, windows))
+    assert same_window(rows[-1], windows[-1])
+    assert [w.start for w in rows.take([5, 2])] == [windows[5].start, windows[2].start]
+    assert [w.start for w in rows[3:6]] == [w.start for w in windows[3:6]]
+    with pytest.raises(IndexError):
+        rows[20]
+
+
+def test_a_predicted_window_takes_less_than_700_bytes(models: dict[str, PushModel]):
+    """So a day of pushing without a break, 432 000 windows, takes less than 300 MB."""
+    windows = made_up_windows(2000)
+    prediction = predict(models["gp"], windows[0])
+    live = LiveValidation({"gp": models["gp"]})
+    tracemalloc.start()
+    for window in windows:
+        live.record(0, live.add(window), prediction)
+    taken = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert taken / len(windows) < 700
+
+
+# --- the running score -----------------------------------------------------------------------------------------------
+
+
+@given(seed=st.integers(0, 1000), count=st.integers(1, 30))
+@settings(max_examples=30, deadline=None)
+def test_running_sums_give_the_totals_of_the_final_metrics(seed: int, count: int):
+    rng = np.random.default_rng(seed)
+    mean, observed, training_mean = rng.normal(size=(count, 3)), rng.normal(size=(count, 3)), rng.normal(size=3)
+    root = rng.normal(size=(count, 3, 3))
+    covariance = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(3)
+    push_id = np.array([f"p{k // 3}" for k in range(count)])
+    score = RunningScore(training_mean)
+    for row in zip(push_id.tolist(), mean, covariance, observed, strict=True):
+        score.add(*row)
+    final = metrics_json(Comparison("m", 1, push_id, mean, covariance, observed, None, training_mean))
+    running = score.values()
+    assert (running["windows"], running["pushes"]) == (final["n_test"], final["n_pushes"])
+    assert running["nmse"] == pytest.approx(final["nmse"]["total"], rel=1e-12)
+    assert running["nlpd"] == pytest.approx(final["nlpd"]["total"], rel=1e-12)
+    for level, shares in final["coverage"].items():
+        for output, share in shares.items():
+            assert running[f"coverage {level} {output}"] == pytest.approx(share, abs=1e-12)
+
+
+def test_before_the_first_window_nothing_is_claimed():
+    values = RunningScore(np.zeros(3)).values()
+    assert values.pop("windows") == values.pop("pushes") == 0
+    assert set(values.values()) == {None}
+
+
+def test_intervals_from_sums_by_push_are_those_of_resampled_rows(models: dict[str, PushModel]):
+    comparison = compare(models["gp"], windows_to_table(made_up_windows(37)))
+    weights = push_bootstrap(comparison.push_id)
+    error, spread = ((comparison.observed - other) ** 2 for other in (comparison.mean, comparison.training_mean))
+    nmse = np.sum((weights @ error) / (weights @ spread), axis=1)
+    nlpd = gaussian_nlpd(comparison.mean, comparison.variance, comparison.observed).sum(axis=1)
+    interval = metrics_json(comparison)["interval"]
+    for name, draws in (("nmse", nmse), ("nlpd", weights @ nlpd / weights.sum(axis=1))):
+        low, high = np.quantile(draws, [0.025, 0.975])
+        assert interval[name] == pytest.approx({"low": low, "high": high}, rel=1e-9)
+
+
+# --- online as offline -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shuffle", [0, 1])
+def test_answers_in_any_order_give_the_comparison_of_the_whole_table(models: dict[str, PushModel], shuffle: int):
+    windows = made_up_windows(12)
+    live = answered(models, windows, shuffle)
+    for k, model in enumerate(models.values()):
+        offline, online = compare(model, windows_to_table(windows)), live.comparison(k)
+        assert np.array_equal(online.push_id, offline.push_id)
+        assert np.array_equal(online.observed, offline.observed)
+        assert np.allclose(online.mean, offline.mean, rtol=0.0, atol=1e-12)
+        assert np.allclose(online.covariance, offline.covariance, rtol=1e-9, atol=0.0)
+
+
+def test_residuals_come_in_the_order_of_windows_and_models(models: dict[str, PushModel]):
+    windows = made_up_windows(5)
+    found = [(name, window.start) for name, window, _, _ in answered(models, windows, shuffle=3).residuals()]
+    assert found == [(name, window.start) for window in windows for name in models]
+
+
+def test_windows_without_a_prediction_are_in_no_figure_but_are_counted(models: dict[str, PushModel]):
+    windows = made_up_windows(9)
+    live = LiveValidation(models)
+    for window in windows:
+        live.add(window)
+    for number in (8, 0, 4):
+        live.record(0, number, predict(live.models[0], windows[number]))
+    live.refuse(0, 3, "angle: 2.0 is not accepted")
+    assert [w.start for w in live.predicted()] == [windows[k].start for k in (0, 4, 8)]
+    assert metrics_json(live.comparison())["n_test"] == live.scores[0].windows == 3
+    assert live.unanswered() == 5 and live.unanswered(1) == 9
+    (refusal,) = live.refused()
+    assert (refusal.push_id, refusal.window, refusal.reason) == ("push-0", 3, "angle: 2.0 is not accepted")
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_main_model_and_the_others_get_their_files(models: dict[str, PushModel], tmp_path: Path):
+    windows = made_up_windows(8)
+    live = answered(models, windows)
+    written = live.write(tmp_path / "new" / "folder")
+    assert [path.name for path in written] == ["validation.json", "validation_analytical.json"]
+    for k, path in enumerate(written):
+        assert json.loads(path.read_text()) == json.loads(json.dumps(metrics_json(live.comparison(k))))
+    log = json.loads((tmp_path / "new" / "folder" / "windows_analytical.json").read_text())
+    assert log["model"] == "analytical" and log["refused"] == [] and log["unanswered"] == 0
+    assert [(w["push_id"], w["window"]) for w in log["windows"]] == [(w.push_id, w.index) for w in windows]
+    first, comparison = log["windows"][0], live.comparison(1)
+    assert first["predicted"] == comparison.mean[0].tolist()
+    assert first["observed"] == windows[0].displacement.tolist()
+    assert (first["start"], first["end"]) == (windows[0].start, windows[0].end)
+    difference = comparison.observed[0] - comparison.mean[0]
+    root = np.linalg.cholesky(np.reshape(first["covariance"], (3, 3)))
+    assert np.allclose(root @ first["standardised"], difference)
+    assert not [path for path in (tmp_path / "new" / "folder").iterdir() if path.name.startswith(".")]
+
+
+def test_a_score_without_windows_is_written_as_that(models: dict[str, PushModel], tmp_path: Path):
+    (path, _) = LiveValidation(models).write(tmp_path)
+    result = json.loads(path.read_text())
+    assert (result["n_test"], result["n_pushes"], result["nmse"]["total"], result["nlpd"]["dx"]) == (0, 0, None, None)
+    assert json.loads((tmp_path / "windows.json").read_text())["windows"] == []
+
+
+def test_refusals_are_in_the_log_with_their_reason(models: dict[str, PushModel], tmp_path: Path):
+    live = LiveValidation({"gp": models["gp"]})
+    for window in made_up_windows(2):
+        live.add(window)
+    live.refuse(0, 1, "duration: 0.2 is not accepted")
+    live.write(tmp_path)
+    log = json.loads((tmp_path / "windows.json").read_text())
+    assert log["refused"] == [{"push_id": "push-0", "window": 1, "reason": "duration: 0.2 is not accepted"}]
+    assert log["unanswered"] == 1 and log["windows"] == []
+
+
+def test_a_server_cannot_choose_where_files_go(models: dict[str, PushModel], tmp_path: Path):
+    named = {"main": models["gp"], "../../etc/x y": models["analytical"]}
+    written = LiveValidation(named).write(tmp_path / "out")
+    assert written[1].parent == tmp_path / "out" and written[1].name == "validation_.._.._etc_x_y.json"
+    assert {path.parent for path in tmp_path.rglob("*.json")} == {tmp_path / "out"}
+
+
+def test_a_log_that_fails_leaves_the_older_one(models: dict[str, PushModel], tmp_path: Path):
+    windows = made_up_windows(3)
+    comparison = compare(models["gp"], windows_to_table(windows))
+    write_window_log(tmp_path / "log.json", windows, comparison)
+    older = (tmp_path / "log.json").read_text()
+    comparison.observed[1, 0] = np.nan
+    with pytest.raises(ValueError, match="JSON"):
+        write_window_log(tmp_path / "log.json", windows, comparison)
+    assert (tmp_path / "log.json").read_text() == older
+    assert [path.name for path in tmp_path.iterdir()] == ["log.json"]
+
+
+# --- whose model is it? ----------------------------------------------------------------------------------------------
+
+
+def test_a_model_of_another_slider_or_pusher_is_told_from_the_rig(models: dict[str, PushModel]):
+    own = square_rig()
+    assert rig_difference(models["gp"], own) == ""
+    assert rig_difference(models["gp"], Rig("rect1", own.outline, own.pusher_radius, "abs", 2.0)) == ""
+    circle = Rig("ellip1", shape_outline("ellip1"), own.pusher_radius, "abs", 0.8)
+    assert "'rect1'" in rig_difference(models["gp"], circle) and "'ellip1'" in rig_difference(models["gp"], circle)
+    thick = rig_difference(models["gp"], Rig("rect1", own.outline, 0.01, "abs", 0.8))
+    assert "0.00475" in thick and "0.01" in thick

@@ -1,0 +1,150 @@
+"""Sensor messages on their way into the streams: taken and refused by the rules of reading a recording."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.serialization import serialize_message
+from replay_bags import POSE, START, WRENCH, stamped, write_bag
+
+from msg_adapters import streams
+from msg_adapters.streams import SLIDER, TIP, Inbox, slider_stream, tip_stream, wrench_stream
+from push_predictor.nodes.validator import sensor_subscriber as sensor_inlet
+from push_predictor.recordings.read import read_recording
+
+GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
+
+
+def pose(*numbers: float, frame: str = "world", nanosec: int = 5) -> bytes:
+    message = PoseStamped()
+    message.header.frame_id, message.header.stamp.sec, message.header.stamp.nanosec = frame, 7, nanosec
+    position, turn = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w = numbers
+    return serialize_message(message)
+
+
+def wrench(*numbers: float) -> bytes:
+    message = WrenchStamped()
+    message.header.frame_id = "world"
+    force, torque = message.wrench.force, message.wrench.torque
+    force.x, force.y, force.z, torque.x, torque.y, torque.z = numbers
+    return serialize_message(message)
+
+
+def filled(inbox: Inbox, *messages: bytes) -> Inbox:
+    for message in messages:
+        inbox.put(message)
+    return inbox
+
+
+def test_good_messages_become_a_stream_in_order():
+    inbox = filled(Inbox(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
+    stream = slider_stream(*inbox.take())
+    assert stream.stamp.tolist() == [7_000_000_005, 7_000_000_009]
+    assert (stream.x[0], stream.y[0], stream.z[0]) == (0.1, -0.2, 0.03)
+    assert stream.heading == pytest.approx([0.6, 0.6])
+    assert inbox.received == 2 and not inbox.rejected
+    assert len(slider_stream(*inbox.take())) == 0
+
+
+@pytest.mark.parametrize(
+    ("message", "kind"),
+    [
+        (pose(math.nan, *GOOD[1:]), "not finite"),
+        (pose(*GOOD[:3], 0.0, 0.0, math.inf, 1.0), "not finite"),
+        (pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0), "no orientation"),
+        (pose(*GOOD, frame="map"), "frame_id"),
+        (pose(*GOOD, frame=""), "frame_id"),
+        (pose(*GOOD, nanosec=1_000_000_000), "unreadable"),
+        (pose(*GOOD)[:40], "unreadable"),
+    ],
+    ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
+)
+def test_a_useless_slider_pose_is_counted_by_kind_and_the_others_are_taken(message: bytes, kind: str):
+    inbox = filled(Inbox(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
+    assert len(inbox.take()[0]) == 2
+    assert dict(inbox.rejected) == {kind: 1}
+
+
+def test_a_message_with_two_faults_is_counted_once():
+    inbox = filled(Inbox(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
+    inbox.take()
+    assert inbox.rejected.total() == 1
+
+
+def test_an_empty_frame_id_accepts_any_frame():
+    assert len(filled(Inbox(SLIDER, ""), pose(*GOOD, frame="map"), pose(*GOOD)).take()[0]) == 2
+
+
+def test_the_tip_is_a_point_its_orientation_does_not_matter():
+    stream = tip_stream(*filled(Inbox(TIP, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
+    assert stream.x.tolist() == [0.1]
+    assert len(filled(Inbox(TIP, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
+
+
+def test_of_a_wrench_the_planar_part_must_be_finite():
+    inbox = filled(
+        Inbox(streams.WRENCH, "world"),
+        wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
+        wrench(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
+    )
+    stream = wrench_stream(*inbox.take())
+    assert (stream.fx.tolist(), stream.fy.tolist(), stream.torque.tolist()) == ([1.0], [2.0], [3.0])
+    assert dict(inbox.rejected) == {"not finite": 1}
+
+
+def test_a_full_inbox_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(streams, "LIMIT", 100)
+    inbox = Inbox(SLIDER, "world")
+    for k in range(305):
+        inbox.put(pose(*GOOD, nanosec=k))
+    assert len(inbox) <= 100 and len(inbox) + inbox.dropped == 305
+    stamp, _ = inbox.take()
+    assert stamp[-1] == 7_000_000_304 and np.all(np.diff(stamp) == 1)
+
+
+def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(40, 7))
+    rows[3, 0], rows[7, 3:], rows[11, 5] = np.nan, 0.0, np.inf
+    poses = [stamped(START + 1000 * k, row) for k, row in enumerate(rows)]
+    forces = [stamped(START + 1000 * k, row[:6]) for k, row in enumerate(rows)]
+    messages = [("/slider/pose", POSE, START + k, data) for k, data in enumerate(poses)]
+    messages += [("/pusher/pose", POSE, START + k, data) for k, data in enumerate(poses)]
+    messages += [("/pusher/wrench", WRENCH, START + k, data) for k, data in enumerate(forces)]
+    read = read_recording(write_bag(tmp_path / "some.mcap", messages))
+    slider = slider_stream(*filled(Inbox(SLIDER, "world"), *poses).take())
+    tip = tip_stream(*filled(Inbox(TIP, "world"), *poses).take())
+    force = wrench_stream(*filled(Inbox(streams.WRENCH, "world"), *forces).take())
+    for name in ("stamp", "x", "y", "z", "heading"):
+        assert np.array_equal(getattr(slider, name), getattr(read.slider, name)), name
+    for name in ("stamp", "x", "y", "z"):
+        assert np.array_equal(getattr(tip, name), getattr(read.pusher, name)), name
+    assert read.wrench is not None
+    for name in ("stamp", "fx", "fy", "torque"):
+        assert np.array_equal(getattr(force, name), getattr(read.wrench, name)), name
+
+
+def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_second(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(sensor_inlet, "monotonic", lambda: now[0])
+    slider: list[bytes] = []
+    wrench: list[bytes] = []
+    inlet: Any = SimpleNamespace(_inboxes={"slider": slider, "wrench": wrench}, _empty=0.0)
+    inlet._scalars = SimpleNamespace(waiting=lambda: True)
+    complete = sensor_inlet.SensorInlet.complete
+    assert not complete(inlet), "nothing has come"
+    slider.append(b"pose")
+    now[0] += 0.9
+    assert not complete(inlet)
+    now[0] += 0.2
+    assert complete(inlet), "there is no wrench"
+    wrench.append(b"force")
+    inlet._empty = now[0]
+    assert complete(inlet), "all are there"

@@ -1,0 +1,251 @@
+"""The comparison of models, the crossing point and the gain in the mean: made-up tallies whose truth is known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from paper_studies import made_up_corpus, made_up_study
+from push_predictor_paper.claims.comparison import comparison, mean_gain
+from push_predictor_paper.claims.comparison.comparison_findings import (
+    better_density,
+    crossings_of,
+    early,
+    in_the_end,
+    similar_mean,
+)
+from push_predictor_paper.claims.comparison.mean_gain import improves, where_it_counts
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.fits.crossing import Crossing, below_zero_from, crossing
+from push_predictor_paper.fits.curves import Curves
+from push_predictor_paper.fits.fits import SPLITS, Fit, Score
+from push_predictor_paper.fits.held_out import HeldOut
+
+from push_predictor.evaluation.push_scores import Tally
+
+CORPUS = made_up_corpus()
+SIZES = (10, 100, 1000)
+
+
+def tally(nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: float = 0.01, fold: int = 0) -> Tally:
+    """40 pushes of about these totals."""
+    rng = np.random.default_rng(fold)
+    one = np.ones((40, 3))
+    error = one * nmse / 3 * (1.0 + noise * rng.standard_normal((40, 1)))
+    nats, precise = (one * v / 3 for v in (nlpd, nlpd if exact is None else exact))
+    names = np.array([f"{fold}-{k}" for k in range(40)])
+    return Tally(names, np.ones(40), error, one, nats, precise, np.ones((40, 3, 3)))
+
+
+def curves_of(**kinds) -> Curves:
+    """Curves on the reference pair: by kind, the arguments of `tally` at each size, in five folds."""
+    return Curves(
+        {
+            (CORPUS.reference, kind, split, n): tuple(
+                Score(Fit(kind, n, split, k), tally(**arguments, fold=k), 1.0) for k in range(5)
+            )
+            for kind, by_size in kinds.items()
+            for n, arguments in zip(SIZES, by_size, strict=True)
+            for split in SPLITS
+        }
+    )
+
+
+def levels(*nmse: float) -> list[dict[str, float]]:
+    return [{"nmse": value} for value in nmse]
+
+
+def test_a_crossing_lies_on_the_straight_line_in_log_n():
+    sizes = below_zero_from((10, 100, 1000), np.array([[1.0, 1.0, -1.0], [-0.5, -1.0, -1.0], [1.0, 0.5, 0.1]]))
+    assert sizes == pytest.approx([10**2.5, 10.0, np.inf])
+
+
+def test_a_gap_must_stay_below_zero_from_there_on():
+    gaps = np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 0.0], [1.0, -1.0, -1.0]])
+    assert below_zero_from((10, 100, 1000), gaps) == pytest.approx([np.inf, 10**2.5, np.inf, 10**1.5])
+
+
+def test_the_crossing_of_two_known_curves():
+    learnt, flat = (
+        [[tally(v, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)],
+        [[tally(0.9, fold=k) for k in range(5)]] * 3,
+    )
+    found = crossing(SIZES, learnt, flat)
+    assert found.value == pytest.approx(10**1.5, rel=0.01)
+    assert found.low <= found.value <= found.high and found.high < 1.1 * found.low
+
+
+def test_noise_from_push_to_push_widens_the_interval():
+    flat = [[tally(0.9, noise=0.0, fold=k) for k in range(5)]] * 3
+    wide, narrow = (
+        crossing(SIZES, [[tally(v, noise=noise, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)], flat)
+        for noise in (1.0, 0.01)
+    )
+    assert wide.high / wide.low > 1.5 * narrow.high / narrow.low
+
+
+def test_a_crossing_says_where_the_sizes_end():
+    assert Crossing(10.0, 10.0, np.inf, 10, 1000).text() == "at most 10 (at most 10 to beyond 1000)"
+    assert Crossing(np.inf, 95.0, np.inf, 10, 1000).json()["value"] is None
+
+
+@pytest.mark.parametrize(
+    ("gp", "vhgp", "verdict"),
+    [
+        ((1.0, 0.5, 0.2), (1.0, 0.5, 0.2), "holds"),
+        ((1.0, 0.9, 0.2), (1.0, 0.9, 0.8), "does not hold"),
+        ((1.0, 0.5, 0.2), (1.0, 0.9, 0.2), "holds in part"),
+    ],
+)
+def test_early_means_both_cross_with_their_intervals_before_150(gp, vhgp, verdict):
+    found = curves_of(analytical=levels(0.7, 0.7, 0.7), gp=levels(*gp), vhgp=levels(*vhgp))
+    where = crossings_of(CORPUS, found, dict.fromkeys(SPLITS, SIZES))
+    assert early(CORPUS, where["push"]).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("interval", "verdict"),
+    [((60.0, 149.0), "holds"), ((101.0, 149.0), "holds"), ((60.0, 160.0), "not decided"), ((151.0, 160.0), "does not")],
+)
+def test_about_100_means_up_to_150_with_the_whole_interval(interval, verdict):
+    at = Crossing(float(np.mean(interval)), *interval, 10, 1000)
+    finding = early(CORPUS, {"gp": at, "vhgp": at})
+    assert finding.verdict.startswith(verdict) and "means up to 150" in finding.sentence
+
+
+def test_sizes_that_end_before_150_decide_nothing():
+    at = Crossing(np.inf, np.inf, np.inf, 10, 140)
+    assert early(CORPUS, {"gp": at, "vhgp": at}).verdict == "not decided"
+
+
+@pytest.mark.parametrize(
+    ("gp", "vhgp", "verdict"),
+    [(0.4, 0.4, "holds"), (0.9, 0.9, "does not hold"), (0.4, 0.9, "holds in part"), (0.7, 0.7, "not decided")],
+)
+def test_in_the_end_both_must_have_the_smaller_error(gp, vhgp, verdict):
+    found = curves_of(analytical=levels(0.7, 0.7, 0.7), gp=levels(1, 1, gp), vhgp=levels(1, 1, vhgp))
+    assert in_the_end(CORPUS, found, 1000).verdict == verdict
+
+
+@pytest.mark.parametrize(("vhgp", "verdict"), [(0.41, "holds"), (0.6, "does not hold"), (0.2, "does not hold")])
+def test_similar_means_within_a_tenth(vhgp, verdict):
+    found = curves_of(gp=levels(1, 1, 0.4), vhgp=levels(1, 1, vhgp))
+    assert similar_mean(CORPUS, found, 1000).verdict == verdict
+
+
+def test_a_ratio_known_badly_is_no_more_than_part():
+    noisy = [{"nmse": 0.4, "noise": 0.01}, {"nmse": 0.4, "noise": 0.01}, {"nmse": 0.4, "noise": 3.0}]
+    found = curves_of(gp=levels(0.4, 0.4, 0.4), vhgp=noisy)
+    assert similar_mean(CORPUS, found, 1000).verdict in ("holds in part", "not decided")
+
+
+@pytest.mark.parametrize(
+    ("nlpd", "exact", "verdict"),
+    [(-4.0, -4.1, "holds"), (-3.0, -3.0, "not decided"), (-3.0, -3.2, "holds in part"), (-2.0, -2.0, "does not hold")],
+)
+def test_the_vhgp_is_denser_if_its_nlpd_is_smaller(nlpd, exact, verdict):
+    row = {"nmse": 0.4, "nlpd": nlpd, "exact": exact}
+    found = curves_of(gp=[{"nmse": 0.4, "nlpd": -3.0}] * 3, vhgp=[row] * 3)
+    assert better_density(CORPUS, found, 1000).verdict == verdict
+
+
+def gains(*signs: int) -> dict[int, list[Estimate]]:
+    """Better (-1), worse (1) or neither (0) at each size."""
+    return {n: [Estimate(0.1 * s, 0.1 * s - 0.05, 0.1 * s + 0.05)] for n, s in zip(SIZES, signs, strict=True)}
+
+
+@pytest.mark.parametrize(
+    ("signs", "verdict"),
+    [
+        ((0, -1, -1), "holds"),
+        ((1, 0, -1), "holds"),
+        ((-1, 0, 1), "does not hold"),
+        ((-1, 0, 0), "not decided"),
+        ((1, 1, 0), "not decided"),
+    ],
+)
+def test_the_largest_size_alone_decides_whether_the_mean_improves(signs, verdict):
+    assert improves(CORPUS, gains(*signs), 40).verdict == verdict
+
+
+def test_what_the_other_sizes_say_is_told():
+    sentence = improves(CORPUS, gains(1, -1, 0), 40).sentence
+    assert "Better with the whole interval at n = 100, worse at n = 10 " in sentence
+
+
+def two_speeds(slow: float, fast: float) -> HeldOut:
+    """Pushes at two speeds; the VHGP's error there is so many times the GP's."""
+    rng = np.random.default_rng(0)
+    speed = np.repeat([0.02, 0.4], 60)
+    observed = rng.standard_normal((120, 3)) * speed[:, None]
+    error = 0.3 * rng.standard_normal((120, 3)) * speed[:, None]
+    factor = np.repeat(np.sqrt([slow, fast]), 60)[:, None]
+    predicted = {"analytical": observed, "gp": observed - error, "vhgp": observed - factor * error}
+    names = np.array([f"p{k}" for k in range(120)])
+    group = np.repeat([0, 1], 60)
+    return HeldOut(500, names, speed, group, np.array([0.02, 0.4]), 0.2 * speed, observed, predicted, observed)
+
+
+@pytest.mark.parametrize(
+    ("slow", "fast", "verdict"),
+    [
+        (0.5, 1.5, "holds"),
+        (0.5, 0.5, "holds in part"),
+        (1.0, 0.5, "does not hold"),
+        (1.5, 1.0, "does not hold"),
+        (1.0, 1.0, "not decided"),
+    ],
+)
+def test_a_gain_lies_with_the_slow_pushes_if_they_have_it_and_the_fast_ones_have_not(slow, fast, verdict):
+    assert where_it_counts(CORPUS, two_speeds(slow, fast), [0, 1], "holds").verdict == verdict
+
+
+@pytest.mark.parametrize("improvement", ["not decided", "does not hold"])
+def test_where_there_is_no_gain_nobody_can_tell_where_it_lies(improvement):
+    assert where_it_counts(CORPUS, two_speeds(0.5, 1.5), [0, 1], improvement).verdict == "not decided"
+
+
+def test_fast_pushes_make_up_nearly_all_of_the_spread():
+    assert "faster half makes up 100%" in where_it_counts(CORPUS, two_speeds(1.0, 1.0), [0, 1], "holds").sentence
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return made_up_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture(scope="module")
+def compared(study):
+    return comparison.section(study)
+
+
+def test_the_section_compares_all_three_kinds_beside_the_paper(compared):
+    paper = next(table for table in compared.tables if "paper" in table.head[1])
+    assert paper.rows[0][1:4] == ("0.72", "0.38", "0.37")
+    assert len(compared.findings) == 4 and compared.pictures[0].path.exists()
+    json.dumps(compared.data, allow_nan=False)
+
+
+def test_the_cost_is_a_median_with_its_range_and_never_negative(compared):
+    rows = next(table for table in compared.tables if "CPU" in table.caption).rows
+    for cell in (cell for row in rows for cell in row[1:4]):
+        value, low, high = (float(part) for part in cell.replace("\n", " ").replace(" to ", " ").split())
+        assert 0.0 <= low <= value <= high
+
+
+def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
+    si = next(row for row in compared.tables[0].rows if row[0] == "NLPD, total")
+    paper = next(table for table in compared.tables if "paper" in table.head[1]).rows[1]
+
+    def first(cell: str) -> float:
+        return float(cell.split("\n")[0].replace("−", "-"))
+
+    assert first(paper[6]) - first(si[3]) == pytest.approx(13.8155, abs=0.011)  # two decimals in both cells
+
+
+def test_the_gain_of_the_mean_is_told_at_every_size_and_speed(study):
+    made = mean_gain.section(study)
+    assert {row[0] for row in made.tables[0].rows} >= {"20, by push", "20, random"}
+    assert len(made.findings) == 2 and made.pictures[0].path.exists()
+    json.dumps(made.data, allow_nan=False)

@@ -1,0 +1,145 @@
+"""The data that the paper's claims are computed from: recordings made on demand, windows cut, repetitions counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
+from push_predictor_paper.claims.data import section, speed_counts
+from push_predictor_paper.data.corpus import Corpus, PushSet, learning_set, learning_spec, pair_number, travel_for
+from push_predictor_paper.data.repetitions import FEWEST, grid_spec, repeat_push
+from push_predictor_paper.estimate import Estimate, over_seeds
+from push_predictor_paper.plan import FULL, QUICK
+
+from push_predictor.recordings.load import load_data
+from push_predictor.simulation.rig_simulator import SimulationSpec
+
+
+def test_the_full_plan_is_of_the_papers_size() -> None:
+    assert len(FULL.pairs) == 16 and FULL.pairs[0] == ("rect1", "plywood")
+    assert len(FULL.speeds) >= 8 and FULL.speeds[0] == 0.01 and FULL.speeds[-1] == 0.5
+    assert len(FULL.grid_fractions) == 11 and FULL.repetitions == 100
+    np.testing.assert_allclose(np.diff(FULL.grid_angles), 0.1)
+    assert FULL.grid_angles[0] == -1.5 and FULL.grid_angles[-1] == 1.5
+    assert FULL.sizes == (10, 20, 50, 100, 200, 500, 1000) and FULL.largest == 2000
+
+
+def test_every_speed_has_as_many_pushes_each_long_enough_for_a_window() -> None:
+    pushes = learning_spec(FULL, "ellip2", "pu").pushes
+    counts = [int(np.sum(pushes.speed == speed)) for speed in FULL.speeds]
+    assert set(counts) == {FULL.pushes // len(FULL.speeds)}
+    for speed in FULL.speeds:
+        braking = speed**2 / (2.0 * SimulationSpec.acceleration)
+        assert travel_for(np.array([speed]))[0] - braking > 0.2 * speed
+
+
+def test_sets_share_slider_or_table_and_no_two_share_their_draws() -> None:
+    one, other_surface, other_shape = (
+        learning_spec(QUICK, *pair) for pair in (("rect1", "abs"), ("rect1", "pu"), ("ellip1", "abs"))
+    )
+    repeated = grid_spec(QUICK, "rect1", "abs", 7, 0.5, 0.0, 10)
+    assert one.slider_seed == other_surface.slider_seed == repeated.slider_seed
+    assert one.surface_seed == other_shape.surface_seed == repeated.surface_seed != other_surface.surface_seed
+    assert len({s.seed for s in (one, other_surface, other_shape, repeated)}) == 4
+    assert len({pair_number(*pair) for pair in FULL.pairs}) == 16
+
+
+def test_a_recording_is_made_anew_from_its_seed_and_can_be_kept(tmp_path: Path) -> None:
+    small = replace(QUICK, pushes=6, speeds=(0.05, 0.1))
+    kept = learning_set(small, "rect1", "abs", tmp_path)
+    again = learning_set(small, "rect1", "abs")
+    np.testing.assert_array_equal(kept.table.outcomes, again.table.outcomes)
+    read = load_data([tmp_path / "rect1_abs"])
+    np.testing.assert_allclose(read.outcomes, kept.table.outcomes, atol=1e-12)
+    assert not kept.table.covariates
+
+
+def test_repetitions_of_one_push_differ_and_go_where_it_was_sent() -> None:
+    cell = repeat_push(QUICK, "rect1", "plywood", 0, 0.5, 0.0, 12, None)
+    assert len(cell.outcomes) == 12 and cell.enough
+    assert np.all(cell.sd > 0.0)
+    assert np.all(np.abs(cell.inputs.mean(axis=0) - [0.02, 0.125, 0.0]) < [5e-4, 2e-3, 2e-2])
+    np.testing.assert_allclose(cell.paths[:, 10, :2], cell.outcomes[:, :2], atol=2e-4)  # 10 steps of 20 ms are a window
+    low, high = cell.intervals[0]
+    assert np.all(low < cell.mean) and np.all(cell.mean < high)
+
+
+def test_a_push_that_was_hardly_seen_has_no_mean() -> None:
+    cell = made_up_grid().cells[0]
+    few = replace(cell, outcomes=cell.outcomes[: FEWEST - 1])
+    assert np.isnan(few.mean).all() and np.isnan(few.sd).all() and np.isnan(few.intervals[0]).all()
+
+
+def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
+    grid = made_up_grid()
+    assert grid.mean.shape == (len(grid.angles), len(grid.fractions), 3)
+    contact_and_angle = grid.commanded_inputs.reshape(*grid.mean.shape)
+    for cell in grid.cells:
+        row, column = list(grid.angles).index(cell.angle), list(grid.fractions).index(cell.fraction)
+        np.testing.assert_array_equal(grid.mean[row, column], cell.mean)
+        assert contact_and_angle[row, column, 2] == cell.angle
+
+
+def test_the_section_tells_which_speeds_lack_windows(tmp_path: Path) -> None:
+    missing = made_up_corpus()
+    slow = {pair: replace(s, table=s.table.take(s.table.inputs[:, 0] < 0.06)) for pair, s in missing.sets.items()}
+    told = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).findings[0]
+    assert told.verdict == "does not hold" and "500" in told.sentence
+    counts = speed_counts(PLAN, replace(missing, sets=slow))
+    assert [c.with_window for c in counts] == [16] * 3 + [0] * 7
+    assert [c.pushes for c in counts] == [16] * 10
+
+
+def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp_path: Path) -> None:
+    study, pushes = made_up_study(tmp_path), next(iter(made_up_corpus().sets.values()))
+    four = section(study).findings[0]
+    assert four.verdict == "holds in part" and "4 of the paper's 16 sets, shapes: 2, surfaces: 2" in four.sentence
+    every = replace(study.simulated, sets=dict.fromkeys(FULL.pairs, pushes))
+    assert section(replace(study, simulated=every)).findings[0].verdict == "holds"
+
+
+@pytest.mark.parametrize(
+    "repetitions, known, verdict",
+    [
+        (100, 55, "holds"),
+        (100, 38, "holds in part"),
+        (100, 28, "not decided"),
+        (100, 10, "does not hold"),
+        (20, 55, "does not hold"),  # 20 repetitions give a Gaussian's deviation to 31 %
+    ],
+)
+def test_the_grid_holds_when_the_deviations_of_its_pushes_are_known(
+    tmp_path: Path, repetitions: int, known: int, verdict: str
+) -> None:
+    study = made_up_study(tmp_path, replace(PLAN, contacts=11, angle_step=0.75, repetitions=repetitions))
+    grid = study.reference_grid
+    few = [replace(c, outcomes=c.outcomes[: round(0.8 * repetitions)]) for c in grid.cells[known:]]
+    changed = replace(grid, cells=(*grid.cells[:known], *few))
+    assert section(replace(study, grids={"plywood": changed})).findings[1].verdict == verdict
+
+
+def test_sets_of_several_corpora_do_not_hide_each_other(tmp_path: Path) -> None:
+    study = made_up_study(tmp_path)
+    pair = study.simulated.reference
+    table = study.simulated.sets[pair].table
+    others = PushSet(table.take(np.arange(60)), study.simulated.sets[pair].rig)
+    measured = Corpus("measured", "measured: mit_square/pushes_a, one side", {pair: others}, pair)
+    sets = section(replace(study, measured=(measured,))).data["sets"]
+    told = [sets[corpus.title]["/".join(pair)]["windows"] for corpus in (study.simulated, measured)]
+    assert told == [len(table), 60]
+
+
+def test_a_corpus_has_a_short_name() -> None:
+    assert made_up_corpus().name == "simulated"
+    title = "measured: mit_square/pushes_a, one side of a square, 900 overlapping windows"
+    assert replace(made_up_corpus(), origin="measured", title=title).name == "measured: mit_square/pushes_a"
+    assert replace(made_up_corpus(), origin="measured", title="measured: one").name == "measured: one"
+
+
+def test_an_estimate_over_seeds_is_students_interval() -> None:
+    assert over_seeds([1.0, 2.0, 3.0]).text(".3f") == "2.000 (−0.484 to 4.484)"
+    assert np.isnan(over_seeds([1.0]).low)
+    assert Estimate(0.5, np.nan, np.nan).json() == {"value": 0.5, "low": None, "high": None}

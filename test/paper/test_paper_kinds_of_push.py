@@ -1,0 +1,208 @@
+"""Three kinds of push: chosen by rule, judged by repetitions that did not choose them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import paper_studies
+import pytest
+from push_predictor_paper.claims.repeated_pushes.kinds_of_push import section
+from push_predictor_paper.claims.repeated_pushes.kinds_of_push_rules import (
+    apart,
+    draws_together_fans_out,
+    growth,
+    has_modes,
+    kinds_of,
+    relative_spread,
+    resampled,
+    to_the_end,
+    whole_paths,
+)
+from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.study import Study
+
+from push_predictor.types import Array
+
+ALONG = np.linspace(0.0, 1.0, PATH_POINTS)
+WAY = 0.006  # m
+
+
+def rays(sd: float, repetitions: int = 60, seed: int = 0, apart_by: float = 0.0, power: float = 1.0) -> Array:
+    """Paths that part across as the way to a power, by a normal sd (m) at the end, about two rays apart_by (m)."""
+    rng = np.random.default_rng(seed)
+    end = sd * rng.standard_normal(repetitions) + apart_by * rng.integers(0, 2, repetitions)
+    along = WAY * ALONG + sd * rng.standard_normal(repetitions)[:, None] * ALONG**power
+    return np.stack([along, end[:, None] * ALONG**power, 20.0 * end[:, None] * ALONG**power], axis=-1)
+
+
+def grid_of(*paths: Array, fraction: float = 0.4) -> RepeatedGrid:
+    """A grid whose pushes at one contact went these paths."""
+    cells = []
+    for k, one in enumerate(paths):
+        inputs = np.tile([0.02, 0.1, 0.1 * k], (len(one), 1))
+        cells.append(Repetitions(fraction, 0.1 * k, len(one), inputs, one[:, PATH_POINTS // 2], one))
+    angles = np.array([cell.angle for cell in cells])
+    return RepeatedGrid(
+        "rect1", "plywood", paper_studies.rig_of("rect1", "plywood"), np.array([fraction]), angles, tuple(cells)
+    )
+
+
+def study_of(folder: Path, grid: RepeatedGrid) -> Study:
+    """A study with this grid as its reference."""
+    made_up = paper_studies.made_up_study(folder)
+    return Study(made_up.plan, made_up.work, folder, made_up.simulated, (), {"plywood": grid})
+
+
+def drawn_together(sd: float, seed: int = 0) -> Array:
+    """Paths that part early and stay as far apart as they are."""
+    return rays(sd, seed=seed, power=0.1)
+
+
+def fanned_out(sd: float, seed: int = 0) -> Array:
+    """Paths that part the more, the further they go."""
+    return rays(sd, seed=seed, power=2.0)
+
+
+def test_growth_along_the_path_not_the_spread_chooses_and_the_dip_chooses_the_third() -> None:
+    """A wide push that draws together is convergent, a narrow one that fans out divergent."""
+    kinds = kinds_of(grid_of(rays(6e-4), drawn_together(1e-3), fanned_out(3e-4), rays(4e-4, apart_by=4e-3)))
+    assert kinds is not None
+    assert (kinds.convergent, kinds.divergent, kinds.modal) == (1, 2, 3)
+    assert kinds.p[3].min() <= 0.05 < kinds.p[:3].min()
+
+
+def test_pushes_that_hardly_move_the_slider_are_none_of_the_three() -> None:
+    """A grazing push has a huge spread relative to its way; it is passed over."""
+    grazing = 0.1 * rays(2e-3)
+    assert kinds_of(grid_of(rays(1e-4), grazing)) is None
+    kinds = kinds_of(grid_of(rays(1e-4), grazing, rays(3e-4)))
+    assert kinds is not None
+    assert len(kinds.cells) == 2
+    assert kinds.dropped == 1
+
+
+def test_pushes_whose_tip_slides_off_are_none_of_the_three() -> None:
+    """One repetition in sixty that stops early is let pass, one in ten is not; a slider that still turns goes on."""
+    few, many = rays(1e-4), rays(1e-4)
+    few[0, -8:] = few[0, -9]
+    many[:6, -8:] = many[:6, -9][:, None]
+    assert to_the_end(few) and not to_the_end(many)
+    many[..., 2] = 0.1 * ALONG
+    assert to_the_end(many)
+
+
+def test_pushes_that_begin_at_a_corner_are_none_of_the_three() -> None:
+    """The outermost contacts of the grid."""
+    paths = (rays(1e-4), rays(3e-4))
+    assert kinds_of(grid_of(*paths, fraction=0.9)) is not None
+    assert kinds_of(grid_of(*paths, fraction=0.9945)) is None and kinds_of(grid_of(*paths, fraction=0.0055)) is None
+
+
+def test_a_path_that_runs_into_the_reset_is_left_out() -> None:
+    """A slider that jumps further than the tip could push it was put back, not pushed."""
+    paths = rays(1e-4)
+    paths[7, -1, 0] += 0.02
+    assert len(whole_paths(paths)) == len(paths) - 1
+
+
+def test_relative_spread_and_growth_of_rays_are_what_they_were_made_with() -> None:
+    """sd across and along are equal: the spread is sqrt(2) sd; straight rays keep it, bent ones widen or narrow it."""
+    paths, half = rays(3e-4, 4000), ALONG[PATH_POINTS // 2]
+    assert relative_spread(paths) == pytest.approx(np.sqrt(2.0) * 3e-4 / WAY, rel=0.05)
+    assert growth(paths) == pytest.approx(1.0, abs=0.02)
+    assert growth(rays(3e-4, 4000, power=2.0)) == pytest.approx(1.0 / half, abs=0.05)
+    assert growth(rays(3e-4, 4000, power=0.0)) == pytest.approx(half, abs=0.05)
+
+
+def test_the_interval_of_a_spread_holds_the_truth_as_often_as_it_says() -> None:
+    """95 % intervals from 60 repetitions, 100 times over."""
+    truth, hits = np.sqrt(2.0) * 3e-4 / WAY, 0
+    for seed in range(100):
+        low, high = np.quantile(resampled(rays(3e-4, 60, seed), relative_spread)[1], [0.025, 0.975])
+        hits += low <= truth <= high
+    assert 86 <= hits <= 100
+
+
+WIDE, WIDER, LIKE, UNSURE = (
+    Estimate(4.0, 2.5, 6.0),
+    Estimate(2.5, 1.5, 4.0),
+    Estimate(1.1, 0.8, 1.5),
+    Estimate(1.5, 0.8, 3.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("absolute", "relative", "verdict"),
+    [
+        (WIDE, WIDE, "holds"),
+        (WIDE, WIDER, "holds in part"),
+        (WIDER, WIDE, "holds in part"),
+        (WIDE, LIKE, "does not hold"),
+        (LIKE, WIDE, "does not hold"),
+        (WIDE, UNSURE, "not decided"),
+        (WIDE, Estimate(np.nan, np.nan, np.nan), "not decided"),
+    ],
+)
+def test_verdict_on_ending_further_apart(absolute: Estimate, relative: Estimate, verdict: str) -> None:
+    """By the intervals of both ratios of their spreads."""
+    assert apart([absolute, relative]) == verdict
+
+
+BELOW, ABOVE, ABOUT = Estimate(0.7, 0.5, 0.9), Estimate(1.4, 1.1, 1.7), Estimate(1.0, 0.8, 1.2)
+
+
+@pytest.mark.parametrize(
+    ("convergent", "divergent", "verdict"),
+    [
+        (BELOW, ABOVE, "holds"),
+        (BELOW, ABOUT, "holds in part"),
+        (ABOUT, ABOVE, "holds in part"),
+        (ABOVE, ABOUT, "does not hold"),
+        (ABOUT, BELOW, "does not hold"),
+        (ABOUT, ABOUT, "not decided"),
+    ],
+)
+def test_verdict_on_drawing_together_and_fanning_out(convergent: Estimate, divergent: Estimate, verdict: str) -> None:
+    """By the growth of both."""
+    assert draws_together_fans_out(convergent, divergent) == verdict
+
+
+@pytest.mark.parametrize(
+    ("p", "power", "verdict"),
+    [(0.01, 0.1, "holds"), (0.4, 0.95, "does not hold"), (0.4, 0.3, "not decided")],
+)
+def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
+    """No modes found says something only where they would have been found."""
+    assert has_modes(p, power) == verdict
+
+
+def test_the_section_tells_all_three_of_a_grid_that_has_them(tmp_path: Path) -> None:
+    """Findings, one row a push, a picture, numbers that JSON can hold."""
+    grid = grid_of(rays(6e-4), drawn_together(1e-4), fanned_out(1e-3), rays(4e-4, apart_by=4e-3))
+    made = section(study_of(tmp_path, grid))
+    assert [finding.verdict for finding in made.findings] == ["holds"] * 3
+    assert [row[0] for row in made.tables[0].rows] == ["most convergent", "most divergent", "largest dip"]
+    assert made.pictures[0].path.stat().st_size > 10_000
+    assert json.loads(json.dumps(dict(made.data), allow_nan=False))["chosen"]["convergent"]["angle"] == 0.1
+
+
+def test_alike_pushes_are_not_told_apart(tmp_path: Path) -> None:
+    """Ten pushes of one spread, straight: the half that did not choose the extremes says that they are chance."""
+    made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
+    assert not {finding.verdict for finding in made.findings} & {"holds", "holds in part"}
+
+
+def test_a_wide_push_that_draws_together_does_not_end_closer(tmp_path: Path) -> None:
+    """Convergent and divergent by their growth, but the convergent one ends further apart: the second does not hold."""
+    made = section(study_of(tmp_path, grid_of(drawn_together(1e-3), fanned_out(3e-4))))
+    assert [finding.verdict for finding in made.findings[:2]] == ["holds", "does not hold"]
+
+
+def test_a_grid_that_moves_nothing_is_no_crash(tmp_path: Path) -> None:
+    """Nothing to choose from: not decided, with a note."""
+    made = section(study_of(tmp_path, grid_of(0.01 * rays(1e-4))))
+    assert [finding.verdict for finding in made.findings] == ["not decided"]
+    assert made.notes

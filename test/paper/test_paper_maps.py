@@ -1,0 +1,304 @@
+"""The paper's maps: where outputs are largest, how alike the maps of model and repetitions are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paper_studies import PLAN, made_up_corpus, made_up_study, rig_of
+from push_predictor_paper.claims.maps.map_agreement import Likeness, agreement_findings, likenesses
+from push_predictor_paper.claims.maps.map_peaks import MIRRORED, NAMED, Peaks, agreed, peak_findings, peaks_of, region
+from push_predictor_paper.claims.maps.maps import examples, section
+from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
+from push_predictor_paper.estimate import Estimate, of_draws
+from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
+from push_predictor_paper.plan import GRID_SPEED
+from push_predictor_paper.section import Verdict
+from push_predictor_paper.statistics.grid_maps import (
+    Place,
+    at_places,
+    block_weights,
+    by_blocks,
+    correlation,
+    mean_of,
+    median_of,
+    on_grid,
+    redrawn,
+    relative_error,
+    unbiased,
+)
+from push_predictor_paper.statistics.peaks import Peak, peak
+
+from push_predictor.types import Array
+
+GRID = replace(PLAN, contacts=11, angle_step=0.25, repetitions=24)
+EVERY = np.ones((1, 3))
+Formula = Callable[[Array, Array], Array]  # contact, angle -> (n, 3)
+
+
+def grid_of(mean: Formula, sd: float = 0.01, spoilt: int = 0) -> RepeatedGrid:
+    """Repetitions of a mean by formula, evenly spread about it; the first `spoilt` pushes were hardly seen."""
+    rig, spread = rig_of("rect1", "plywood"), np.linspace(-1.7, 1.7, GRID.repetitions)[:, None]
+    cells: list[Repetitions] = []
+    for fraction in GRID.grid_fractions.tolist():
+        for angle in GRID.grid_angles.tolist():
+            contact = float(contact_on_first_side(rig.outline, np.array(fraction)))
+            outcomes = mean(np.array([fraction]), np.array([angle])) + sd * spread
+            outcomes = outcomes[: 3 if len(cells) < spoilt else None]
+            inputs = np.tile([GRID_SPEED, contact, angle], (len(outcomes), 1))
+            paths = np.zeros((len(outcomes), PATH_POINTS, 3))
+            cells.append(Repetitions(fraction, angle, GRID.repetitions, inputs, outcomes, paths))
+    return RepeatedGrid("rect1", "plywood", rig, GRID.grid_fractions, GRID.grid_angles, tuple(cells))
+
+
+def bumps(places: tuple[Place, Place, Place]) -> Formula:
+    """Outputs that are 1 at one place each and fall off around it."""
+
+    def mean(contact: Array, angle: Array) -> Array:
+        return np.column_stack([np.exp(-20.0 * (contact - c) ** 2 - 4.0 * (angle - a) ** 2) for c, a in places])
+
+    return mean
+
+
+def model_of(mean: Formula) -> ModelMap:
+    """A model that knows the formula."""
+    angle, fraction = (part.ravel() for part in np.meshgrid(ANGLES, FRACTIONS, indexing="ij"))
+    maps = mean(fraction, angle).reshape(len(ANGLES), len(FRACTIONS), 3)
+    return ModelMap(maps, 0.0 * maps + 0.01, 0.0 * maps + 0.01, None)
+
+
+def as_the_paper_says() -> tuple[Place, Place, Place]:
+    """Largest where the paper has it, in our signs."""
+    return NAMED["dx"][0], NAMED["dy"][0], NAMED["dtheta"][0]
+
+
+def test_outputs_that_are_largest_where_the_paper_says_so() -> None:
+    mean = bumps(as_the_paper_says())
+    peaks = peaks_of(grid_of(mean), [model_of(mean)] * 2)
+    assert peaks.repeated[0].place == (0.5, 0.0)
+    np.testing.assert_allclose(peaks.learnt[0].place, (0.5, 0.0), atol=1e-9)
+    assert [finding.verdict for finding in peak_findings(peaks, 100)] == ["holds"] * 4
+
+
+def test_outputs_that_are_largest_elsewhere() -> None:
+    mean = bumps(((0.1, 1.0), (0.5, -1.5), MIRRORED[0]))
+    findings = peak_findings(peaks_of(grid_of(mean), [model_of(mean)] * 2), 100)
+    assert [finding.verdict for finding in findings] == ["does not hold"] * 4
+
+
+def test_a_model_that_disagrees_with_the_repetitions_makes_it_hold_in_part() -> None:
+    right, wrong = bumps(as_the_paper_says()), bumps(((0.1, 1.0), (0.5, -1.5), MIRRORED[0]))
+    findings = peak_findings(peaks_of(grid_of(right), [model_of(wrong)] * 2), 100)
+    assert [finding.verdict for finding in findings] == ["holds in part"] * 4
+
+
+def test_a_push_that_comes_close_to_the_largest_counts_in_part_and_one_that_is_not_seen_not_at_all() -> None:
+    def found(reach: float) -> Peaks:
+        return peaks_at([(0.1, 1.0)], Estimate(reach, reach, reach))
+
+    assert [f.verdict for f in peak_findings(found(0.95), 9)] == [
+        "holds in part",
+        "holds",
+        "holds in part",
+        "not decided",
+    ]
+    assert [f.verdict for f in peak_findings(found(0.8), 9)][:3] == ["does not hold", "holds in part", "does not hold"]
+    assert {f.verdict for f in peak_findings(found(np.nan), 9)} == {"not decided"}
+
+
+def peaks_at(places: list[Place], reach: Estimate) -> Peaks:
+    """The same by repetitions and by the model, no handedness."""
+    one, nothing = Peak(Estimate(1.0, 1.0, 1.0), places[0], tuple(places), reach), Estimate(np.nan, np.nan, np.nan)
+    return Peaks((one,) * 3, (one,) * 3, (nothing, nothing))
+
+
+@pytest.mark.parametrize(
+    ("places", "ends", "verdict"),
+    [
+        ([(0.5, 0.0), (0.6, 0.1)], (0.2, 0.3), "holds"),
+        ([(0.5, 0.0), (0.9, 1.0)], (0.2, 0.3), "holds in part"),
+        ([(0.9, 1.0)], (0.92, 0.99), "holds in part"),
+        ([(0.9, 1.0)], (0.85, 0.99), "not decided"),
+        ([(0.9, 1.0)], (0.6, 0.85), "does not hold"),
+    ],
+)
+def test_what_is_uncertain_about_a_peak_does_not_help_the_claim(
+    places: list[Place], ends: tuple[float, float], verdict: str
+) -> None:
+    """All places must lie near, and the whole interval of what the paper's push reaches counts."""
+    assert peak_findings(peaks_at(places, Estimate(0.95, *ends)), 9)[0].verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "verdict"),
+    [
+        ("holds", "holds", "holds"),
+        ("holds", "not decided", "holds in part"),
+        ("not decided", "holds", "holds in part"),
+        ("holds", "does not hold", "holds in part"),
+        ("holds in part", "not decided", "holds in part"),
+        ("does not hold", "not decided", "not decided"),
+        ("does not hold", "does not hold", "does not hold"),
+        ("not decided", "not decided", "not decided"),
+    ],
+)
+def test_what_one_source_cannot_decide_holds_in_part_at_most(one: Verdict, other: Verdict, verdict: str) -> None:
+    assert agreed(one, other) == verdict
+
+
+def test_a_peak_tells_as_few_places_as_hold_95_percent_of_the_draws() -> None:
+    axes, shown = (np.array([0.0, 0.5, 1.0]), np.array([-1.0, 0.0, 1.0])), np.zeros((3, 3))
+    drawn = np.zeros((100, 3, 3))
+    drawn[:90, 1, 1] = drawn[90:96, 0, 2] = drawn[96:, 2, 0] = 1.0
+    shown[1, 1] = 1.0
+    found = peak(axes[0], axes[1], shown, drawn, [(0.75, 0.0)], of_draws)
+    assert found.place == (0.5, 0.0)
+    assert found.places == ((0.5, 0.0), (1.0, -1.0))
+    assert found.reach.value == 0.5
+    assert found.near([(0.9, -0.9)], (0.1, 0.1)) == [False, True]
+    assert found.near([(0.0, 1.0)], (0.1, 0.1)) == [False, False]
+
+
+def test_pushes_that_were_hardly_seen_are_never_the_largest() -> None:
+    grid = grid_of(bumps(((0.0, -1.5), (0.5, 0.0), (0.5, 0.0))), spoilt=2)
+    assert np.isnan(grid.mean[0, 0]).all()
+    model = model_of(bumps(as_the_paper_says()))
+    assert peaks_of(grid, [model]).repeated[0].place == (0.1, -1.5)
+
+
+def test_values_of_the_pushes_seen_go_where_they_belong() -> None:
+    grid = grid_of(bumps(as_the_paper_says()), spoilt=5)
+    np.testing.assert_array_equal(on_grid(grid, np.array([cell.mean for cell in grid.seen])), grid.mean)
+    means, sds = redrawn(grid.seen)
+    assert on_grid(grid, means).shape == (len(means), *grid.mean.shape)
+    np.testing.assert_allclose(means.mean(axis=0), [cell.mean for cell in grid.seen], atol=0.003)
+    np.testing.assert_allclose(sds.mean(axis=0), [cell.sd for cell in grid.seen], rtol=0.05)
+
+
+def test_maps_are_read_between_their_points() -> None:
+    fractions, angles = np.linspace(0.0, 1.0, 5), np.linspace(-1.5, 1.5, 7)
+    plane = 2.0 * fractions[None, :] + 3.0 * angles[:, None]
+    read = at_places(fractions, angles, np.stack([plane, -plane]), [(0.3, 0.1), (0.8, -1.2)])
+    np.testing.assert_allclose(read, [[0.9, -2.0], [-0.9, 2.0]])
+
+
+def test_means_and_medians_of_weighted_pushes_are_those_of_pushes_written_out() -> None:
+    values, weights = np.array([5.0, 1.0, 9.0, 2.0]), np.array([[1.0, 1.0, 1.0, 1.0], [2.0, 0.0, 1.0, 0.0]])
+    drawn = [[5.0, 1.0, 9.0, 2.0], [5.0, 5.0, 9.0]]
+    np.testing.assert_allclose(mean_of(values, weights), [np.mean(d) for d in drawn])
+    np.testing.assert_allclose(median_of(values, weights), [np.median(d) for d in drawn])
+
+
+def test_the_map_shown_is_the_mean_of_the_draws_maps() -> None:
+    one, other = model_of(bumps(as_the_paper_says())), model_of(bumps(((0.1, 1.0), (0.5, -1.5), MIRRORED[0])))
+    np.testing.assert_allclose(averaged([one, other]).mean, 0.5 * (one.mean + other.mean))
+
+
+def test_neighbouring_pushes_are_drawn_together() -> None:
+    cells = grid_of(bumps(as_the_paper_says())).cells
+    weights = block_weights(cells)
+    names = [(round(cell.fraction, 6), round(cell.angle, 6)) for cell in cells]
+    one, near, far = (names.index((c, a)) for c, a in ((0.2, 0.0), (0.3, 0.25), (0.6, 0.0)))
+    np.testing.assert_array_equal(weights[:, one], weights[:, near])
+    assert np.any(weights[:, one] != weights[:, far])
+
+
+def test_likeness_of_two_maps() -> None:
+    one = np.array([1.0, 2.0, 4.0])
+    assert correlation(one, 3.0 * one - 7.0, EVERY) == pytest.approx(1.0)
+    assert correlation(one, -one, EVERY) == pytest.approx(-1.0)
+    assert np.isnan(correlation(np.full(3, 0.2), one, EVERY)).all()
+    assert relative_error(one, one, EVERY) == pytest.approx(0.0)
+    assert relative_error(np.full(3, one.mean()), one, EVERY) == pytest.approx(1.0)
+    repeated = np.array([[2.0, 1.0, 0.0]])  # as if the first push were there twice
+    assert correlation(one, one**2, repeated) == pytest.approx(1.0)
+    assert by_blocks(lambda w: correlation(one, one, w), np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 0.0]])).low == 1.0
+
+
+def test_what_noise_adds_to_a_maximum_is_taken_off() -> None:
+    rng = np.random.default_rng(0)
+    seen = rng.standard_normal(300)  # truth: all zero
+    found = unbiased(float(seen.max()), (seen + rng.standard_normal((500, 300))).max(axis=1))
+    assert found.value < seen.max() and found.low < found.value < found.high
+
+
+def test_a_model_that_is_the_truth_agrees_and_one_without_shape_does_not() -> None:
+    grid = grid_of(bumps(as_the_paper_says()))
+    cells = [replace(c, outcomes=c.mean + (1.0 + c.fraction) * (c.outcomes - c.mean)) for c in grid.seen]
+    mean, sd = (np.array([getattr(c, name) for c in cells]) for name in ("mean", "sd"))
+    known = np.ones(len(cells), dtype=bool)
+    flat = 0.0 * sd + 0.01
+    answers = {"VHGP": [Answer(mean, sd, sd, known)] * 2, "GP": [Answer(mean, flat, flat, known)]}
+    found = likenesses(cells, answers)
+    assert found["sd", "VHGP"][0].error.value == pytest.approx(0.0, abs=1e-12)
+    assert np.isnan(found["sd", "GP"][0].correlation.value)
+    wide = likenesses(cells, {"VHGP": [Answer(mean, sd, sd, known), Answer(mean, 3.0 * sd, sd, known)]})
+    assert wide["sd", "VHGP"][0].size == pytest.approx(2.0)  # of each draw by itself, then the mean
+    assert [finding.verdict for finding in agreement_findings(found, len(cells))] == ["holds", "holds"]
+
+
+@pytest.mark.parametrize(
+    "ends, verdict",
+    [
+        (((0.95, 0.97), (0.95, 0.97), (0.95, 0.97)), "holds"),
+        (((0.95, 0.97), (0.1, 0.2), (0.1, 0.2)), "holds in part"),
+        (((0.1, 0.2), (0.1, 0.2), (0.1, 0.2)), "does not hold"),
+        (((0.1, 0.99), (0.1, 0.2), (0.1, 0.2)), "not decided"),
+        (((np.nan, np.nan), (0.95, 0.97), (0.95, 0.97)), "not decided"),
+    ],
+)
+def test_the_verdict_on_alike_maps_follows_from_the_intervals(
+    ends: tuple[tuple[float, float], ...], verdict: str
+) -> None:
+    outputs = tuple(Likeness(Estimate(low, low, high), Estimate(0.1, 0.1, 0.1), 1.0) for low, high in ends)
+    found = {(quantity, model): outputs for quantity in ("mean", "sd") for model in ("VHGP", "GP")}
+    assert {finding.verdict for finding in agreement_findings(found, 100)} == {verdict}
+
+
+def test_the_pushes_drawn_are_those_of_the_largest_outputs() -> None:
+    grid = grid_of(bumps(as_the_paper_says()))
+    means = np.array([cell.mean for cell in grid.seen])
+    answer = Answer(means, means, means, np.ones(len(grid.seen), dtype=bool))
+    chosen = [(push.fraction, push.angle) for push, _ in examples(grid, answer, "mean")]
+    assert chosen[0] == (0.5, 0.0)
+    assert chosen[1] == pytest.approx((0.7, -0.75))
+
+
+def test_places_are_told_one_by_one_or_as_a_mirrored_box() -> None:
+    assert region([(0.5, -0.0)]) == "c = 0.50, 0°"
+    assert (
+        region([(0.9, 0.0), (0.1, 0.0), (0.8, 0.5)]) == "c = 0.80 to 0.90, 0° to 29° (3 pushes, mirrored onto c ≥ 0.5)"
+    )
+
+
+def test_the_section_has_both_figures_and_speaks_of_measured_sets_only_in_words(tmp_path: Path) -> None:
+    study = made_up_study(tmp_path)
+    slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")
+    fast = replace(made_up_corpus(speeds=(0.3,)), origin="measured", title="a fast square")
+    made = section(replace(study, measured=(slow, fast)))
+    assert len(made.findings) == 6 and len(made.tables) == 2
+    assert [picture.path.exists() for picture in made.pictures] == [True] * 3
+    assert any(note.startswith("a measured square") and "largest at" in note for note in made.notes)
+    assert any(note.startswith("a fast square") and "no maps" in note for note in made.notes)
+    assert not any("measured square" in table.caption for table in made.tables)
+    json.dumps(made.data, allow_nan=False)
+
+
+def test_a_study_that_saw_hardly_any_push_decides_nothing(tmp_path: Path) -> None:
+    study = made_up_study(tmp_path)
+    few = tuple(replace(cell, outcomes=cell.outcomes[:2]) for cell in study.reference_grid.cells)
+    made = section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))
+    assert [finding.verdict for finding in made.findings] == ["not decided"]
+
+
+def test_models_are_asked_only_within_their_training_data(tmp_path: Path) -> None:
+    study = made_up_study(tmp_path)
+    model = square_maps(study, study.simulated)[0]
+    assert np.isnan(model.mean[0, 0]).all()  # no made-up push is at 1.5 rad
+    assert np.isfinite(model.mean[30, 20]).all()
+    assert model.at_pushes is not None and len(model.at_pushes.mean) == len(study.reference_grid.seen)

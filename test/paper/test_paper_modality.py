@@ -1,0 +1,183 @@
+"""The section on modes, with repetitions that are made to have one mode or two."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
+from push_predictor_paper.claims.repeated_pushes import modality
+from push_predictor_paper.claims.repeated_pushes.modality import section
+from push_predictor_paper.claims.repeated_pushes.modality_rules import (
+    good_gaussian,
+    mean_over_pushes,
+    model_loss,
+    not_gaussian,
+    some_modes,
+)
+from push_predictor_paper.data.corpus import PushSet
+from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.figures.histograms import moments
+from push_predictor_paper.fits.fits import Fit, trained
+from push_predictor_paper.section import Section
+from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
+from push_predictor_paper.statistics.grid_maps import told
+
+from push_predictor.models.mechanisms import Push
+from push_predictor.reporting.canvas import Picture
+
+SPLIT = 4  # the push of the grid that is given two modes
+SHOWN = replace(PLAN, repetitions=60)
+
+
+def split_in_two(cell: Repetitions) -> Repetitions:
+    """The same push, every other time turned by 12 sd more."""
+    turned = 12.0 * cell.sd[2] * (np.arange(len(cell.outcomes)) % 2)
+    return replace(cell, outcomes=cell.outcomes + turned[:, None] * [0.0, 0.0, 1.0])
+
+
+def grid_with_modes(n: int = 60) -> RepeatedGrid:
+    grid = made_up_grid(replace(PLAN, repetitions=n))
+    cells = tuple(split_in_two(cell) if k == SPLIT else cell for k, cell in enumerate(grid.cells))
+    return replace(grid, cells=cells)
+
+
+def made_up_section(folder: Path, grid: RepeatedGrid) -> Section:
+    return section(replace(made_up_study(folder), grids={"plywood": grid}))
+
+
+@pytest.fixture(scope="module")
+def with_modes(tmp_path_factory: pytest.TempPathFactory) -> Section:
+    return made_up_section(tmp_path_factory.mktemp("modes"), grid_with_modes())
+
+
+def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
+    assert with_modes.findings[0].verdict == "holds"
+    assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
+    cell = grid_with_modes().cells[SPLIT]
+    assert with_modes.tables[2].rows[0][0] == f"{told((cell.fraction, cell.angle))}: rotation"
+
+
+def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modality, "_picture", lambda *_: Picture(tmp_path, "", ""))
+    made = made_up_section(tmp_path, made_up_grid(SHOWN))
+    assert made.findings[0].verdict in ("does not hold", "not decided")
+    assert made.findings[2].verdict == "not decided"
+    assert "no push has several modes" in made.findings[2].sentence
+
+
+def test_the_section_is_whole(with_modes: Section) -> None:
+    for table in with_modes.tables:
+        assert {len(row) for row in table.rows} == {len(table.head)}
+    assert with_modes.pictures[0].path.stat().st_size > 10_000
+    json.dumps(with_modes.data, allow_nan=False)
+
+
+def test_a_grid_that_was_hardly_seen_is_told_not_judged(tmp_path: Path) -> None:
+    made = made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
+    assert [finding.verdict for finding in made.findings] == ["not decided"]
+
+
+def test_tests_of_one_mode_and_of_a_gaussian() -> None:
+    rng = np.random.default_rng(0)
+    samples = rng.standard_normal((8, 100, 3))
+    samples[3, :, 1] += 8.0 * (np.arange(100) % 2)
+    samples[5, :, 0] = rng.exponential(size=100)
+    found = shape(samples.reshape(-1, 3), np.full(8, 100))
+    assert np.argwhere(found.several <= 0.05).tolist() == [[3, 1]]
+    assert found.normal[3, 1] < 1e-4 and found.normal[5, 0] < 1e-4
+    assert found.dip[5, 0] > 0.05
+    assert found.two[3, 1] > found.one[3, 1] + 0.5
+    np.testing.assert_array_equal(found.own, np.maximum(found.one, found.two))
+
+
+def test_held_out_density_of_a_gaussian_is_its_entropy_and_two_do_no_better() -> None:
+    values = np.random.default_rng(1).standard_normal((20, 500))
+    one, two = held_out(values)
+    assert one.mean() == pytest.approx(-0.5 * np.log(2.0 * np.pi * np.e), abs=0.02)
+    assert two.mean() < one.mean() + 0.005
+
+
+def test_held_out_density_of_two_gaussians_is_that_of_the_mixture() -> None:
+    rng = np.random.default_rng(2)
+    values = rng.standard_normal((5, 1000)) + 10.0 * rng.integers(0, 2, (5, 1000))
+    _, two = held_out(values)
+    assert two.mean() == pytest.approx(-0.5 * np.log(2.0 * np.pi * np.e) - np.log(2.0), abs=0.03)
+
+
+def test_what_is_given_away_is_the_difference_of_densities() -> None:
+    grid = made_up_grid(PLAN)
+    sizes = np.array([len(cell.outcomes) for cell in grid.seen])
+    of = shape(np.concatenate([cell.outcomes for cell in grid.seen]), sizes)
+    logs = [LogDensities(np.full((len(c.outcomes) + 7, 3), 2.0), np.zeros((1, 3))) for c in grid.seen]
+    np.testing.assert_allclose(model_loss(grid.seen, of, logs), of.own - 2.0)
+
+
+def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -> None:
+    pushes: PushSet = made_up_corpus().sets[("rect1", "plywood")]
+    fit, grid = Fit("vhgp", 40, "none", 0), made_up_grid()
+    rows = grid.seen[3].outcomes
+    inputs = np.tile(grid.typical_inputs[3], (len(rows), 1))
+    found = log_densities(pushes, fit, inputs, rows)
+    model = trained(pushes, fit)
+    prediction = model.predict(inputs, np.full(len(rows), 0.2))
+    variance = np.diagonal(prediction.covariance, axis1=1, axis2=2)
+    expected = -0.5 * (np.log(2.0 * np.pi * variance) + (rows - prediction.mean) ** 2 / variance)
+    np.testing.assert_allclose(found.gaussian, expected, atol=1e-9)
+    exact = model.body.exact_log_density(Push(inputs, np.full(len(rows), 0.2), {}), rows)
+    assert exact is not None
+    np.testing.assert_allclose(found.exact, exact)
+    with pytest.raises(TypeError, match="analytical"):
+        log_densities(pushes, Fit("analytical", 40, "none", 0), inputs, rows)
+
+
+def test_a_mean_over_pushes_leaves_out_what_is_not_known() -> None:
+    weights = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 2.0]])
+    found = mean_over_pushes(np.array([[1.0, np.nan], [3.0, 5.0]]), weights)
+    assert found.value == 3.0 and 1.0 <= found.low < found.high <= 4.0
+    known = mean_over_pushes(np.array([[np.nan, np.nan], [3.0, 5.0]]), weights)
+    assert (known.value, known.low, known.high) == (4.0, 4.0, 4.0)  # the draw without it tells nothing
+
+
+def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> None:
+    values = np.linspace(0.9, 1.1, 50)
+    mean, sd = moments(values, -0.5 * ((values - 3.0) / 2.0) ** 2 - np.log(2.0))
+    assert (mean, sd) == (pytest.approx(3.0), pytest.approx(2.0))
+
+
+def test_one_of_many_tests_finds_less_than_one_alone() -> None:
+    corrected, single = found_at(5.0, 60, 30, 0.05)
+    assert 0.0 < corrected < single
+
+
+@pytest.mark.parametrize(
+    ("window", "end", "power", "verdict"),
+    [(1, 0, 0.1, "holds"), (0, 2, 0.9, "holds in part"), (0, 0, 0.9, "does not hold"), (0, 0, 0.1, "not decided")],
+)
+def test_verdicts_on_modes(window: int, end: int, power: float, verdict: str) -> None:
+    assert some_modes(window, end, power) == verdict
+
+
+@pytest.mark.parametrize(
+    ("certain", "ends", "verdict"),
+    [
+        (1, (0.0, 0.2), "holds"),
+        (0, (0.06, 0.2), "holds in part"),
+        (0, (0.02, 0.2), "not decided"),
+        (0, (0.02, 0.08), "does not hold"),
+    ],
+)
+def test_verdicts_on_gaussians(certain: int, ends: tuple[float, float], verdict: str) -> None:
+    assert not_gaussian(certain, Estimate(0.05, *ends)) == verdict
+
+
+@pytest.mark.parametrize(
+    ("ends", "verdict"),
+    [((0.0, 0.1), "holds"), ((0.1, 0.3), "holds in part"), ((0.2, 0.5), "not decided"), ((0.4, 0.5), "does not hold")],
+)
+def test_verdicts_on_what_is_given_away(ends: tuple[float, float], verdict: str) -> None:
+    assert good_gaussian(Estimate(float(np.mean(ends)), *ends)) == verdict

@@ -1,0 +1,247 @@
+"""The quasi-static study: pushes of equal travel, models that are not told the speed, where they turn."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import paper_studies
+import pytest
+from push_predictor_paper.claims.quasi_static.quasi_static import section
+from push_predictor_paper.claims.quasi_static.quasi_static_rules import (
+    Judged,
+    breaks_beyond,
+    departure,
+    estimated,
+    helps_then_harms,
+    lower,
+    turn_of,
+    turning_bracket,
+    turns_there,
+)
+from push_predictor_paper.data.time_scaled import (
+    TRAVEL,
+    Bracket,
+    EqualTravel,
+    equal_travel,
+    fold_of,
+    number_of,
+    score_bracket,
+    speed_windows,
+    training_rows,
+)
+from push_predictor_paper.estimate import Estimate
+from push_predictor_paper.plan import Plan
+
+from push_predictor.evaluation.push_scores import Tally
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+SPEEDS = (0.01, 0.02, 0.05, 0.075, 0.2)
+FEW: Plan = replace(paper_studies.PLAN, speeds=(0.05, 0.075, 0.1), speed_pushes=16)
+RIG = paper_studies.rig_of("rect1", "plywood")
+
+
+def windows_at(number: int, inertia: float) -> PushTable:
+    """Windows of 5 mm at a speed whose turn falls short by a share that grows with the speed."""
+    speed, pushes, rng = SPEEDS[number], 40, np.random.default_rng([0, number])
+    contact, angle = rng.random(pushes), rng.uniform(-1.4, 1.4, pushes)
+    turn = (1.0 - inertia * speed / SPEEDS[-1]) * np.sin(8.0 * np.pi * contact)
+    outcomes = np.column_stack([TRAVEL * np.cos(angle), TRAVEL * np.sin(angle), 0.1 * turn])
+    outcomes += [1e-4, 1e-4, 0.005] * rng.standard_normal((pushes, 3))
+    names = np.array([f"{number:02d}-{k:05d}" for k in range(pushes)])
+    inputs = np.column_stack([np.full(pushes, speed), contact, angle])
+    return PushTable(inputs, np.full(pushes, TRAVEL / speed), outcomes, names)
+
+
+def tally_of(error: dict[int, float], pushes: int = 40) -> Tally:
+    """Pushes of several speeds (numbers) with squared errors about these, in units of their spread, summed over 3."""
+    names = np.array([f"{number:02d}-{k:05d}" for number in error for k in range(pushes)])
+    rng = np.random.default_rng(0)
+    scale = np.repeat(list(error.values()), pushes)[:, None] / 3.0
+    ones = np.ones((len(names), 3))
+    return Tally(
+        names, ones[:, 0], scale * rng.uniform(0.8, 1.2, ones.shape), ones, ones, ones, np.ones((len(names), 3, 3))
+    )
+
+
+def told(errors: list[dict[int, float]]) -> Judged:
+    """Brackets of these errors by speed."""
+    return Judged(SPEEDS, tuple(range(5)), {"vhgp": [tally_of(error) for error in errors]})
+
+
+def flat(level: float) -> dict[int, float]:
+    """The same error at every speed."""
+    return dict.fromkeys(range(5), level)
+
+
+# --- pushes ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_same_push_twice_as_fast_goes_the_same_way_when_slow_and_not_when_fast() -> None:
+    """The simulator's own truth: inertia is nothing at 20 mm/s and something at 200 mm/s."""
+    plan = replace(FEW, speeds=(0.01, 0.02, 0.2), speed_pushes=6)
+    slowest, slow, fast = (equal_travel(plan, "rect1", "plywood", k) for k in range(3))
+    assert slowest.outcomes.shape == (6, 3)
+    assert np.all(slowest.touching > 0.9)
+    assert departure(slowest, slow, False)[0].value < 0.01
+    assert departure(slowest, fast, False)[0].value > 0.03
+
+
+def test_windows_are_of_equal_travel_at_every_speed() -> None:
+    """Four of 5 mm a push at most; no push is made at two speeds."""
+    tables = [speed_windows(FEW, "rect1", "plywood", k) for k in range(2)]
+    for k, table in enumerate(tables):
+        assert table.inputs[:, 0] * table.duration == pytest.approx(TRAVEL)
+        assert np.unique(table.push_id, return_counts=True)[1].max() <= 4
+        assert {number_of(name)[0] for name in table.push_id.tolist()} == {k}
+        assert np.hypot(*table.outcomes[:, :2].T).max() < 1.5 * TRAVEL
+    first, second = ({round(c, 6) for c in table.inputs[:, 1].tolist()} for table in tables)
+    assert not first & second
+
+
+def test_departure_is_in_units_of_the_slowest_outcomes_variance() -> None:
+    """Outcomes that all miss by half an sd in one output depart by a quarter; lost pushes count unless left out."""
+    rng = np.random.default_rng(0)
+    outcomes, kept = rng.standard_normal((200, 3)), np.ones(200)
+    shifted = outcomes + [0.5 * outcomes[:, 0].std(), 0.0, 0.0]
+    value, count = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, kept), True)
+    assert (count, value.value) == (200, pytest.approx(0.25))
+    lost = np.where(np.arange(200) < 100, 0.2, 1.0)
+    shifted[:100] = outcomes[:100]
+    every, _ = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, lost), False)
+    only, count = departure(EqualTravel(outcomes, kept), EqualTravel(shifted, lost), True)
+    assert (every.value, only.value, count) == (pytest.approx(0.125), pytest.approx(0.25), 100)
+    assert every.low < 0.125 < every.high
+
+
+# --- models ---------------------------------------------------------------------------------------------------------
+
+
+def test_pushes_of_the_held_out_fold_are_not_learnt_from() -> None:
+    """Push k of any speed belongs to one fold; fewer rows lie within more."""
+    table = windows_at(1, 0.0)
+    some, more = (training_rows(table, Bracket("gp", 1, n, False, 2)) for n in (10, 20))
+    assert set(some) < set(more)
+    assert 2 not in fold_of(table)[more]
+    judged = score_bracket([windows_at(k, 0.0) for k in range(2)], RIG, Bracket("gp", 1, 20, False, 2))
+    assert {number_of(name)[1] % 5 for name in judged.push_id.tolist()} == {2}
+    assert {number_of(name)[0] for name in judged.push_id.tolist()} == {0, 1}
+
+
+def nmse_at(inertia: float, told_speed: bool, speeds: int, at: int) -> float:
+    """NMSE at one speed of a GP of pushes of the slowest speeds."""
+    windows = [windows_at(k, inertia) for k in range(5)]
+    found = score_bracket(windows, RIG, Bracket("gp", speeds, 32, told_speed, 0))
+    return float(Judged(SPEEDS, tuple(range(5)), {"gp": [found] * 5}).single("gp", 0, at)[0])
+
+
+def test_a_model_of_slow_pushes_knows_fast_ones_only_where_the_world_is_quasi_static() -> None:
+    """Trained at 10 mm/s, judged at 200 mm/s after scaling: all is known, or the turn has the wrong sign."""
+    assert nmse_at(0.0, False, 1, 4) < 0.05
+    assert nmse_at(2.0, False, 1, 4) > 1.0
+
+
+def test_where_inertia_matters_a_model_that_is_told_the_speed_does_better() -> None:
+    """The turn reverses with speed: without the speed there is no telling."""
+    assert nmse_at(2.0, True, 5, 4) < 0.5 * nmse_at(2.0, False, 5, 4)
+
+
+# --- verdicts -------------------------------------------------------------------------------------------------------
+
+
+def test_each_bracket_is_judged_on_its_own_speeds_the_slow_ones_or_one() -> None:
+    """Errors that differ by speed tell which pushes were counted."""
+    judged = told([{0: 0.1, 1: 0.3, 2: 0.5, 3: 0.7, 4: 0.9}] * 5)
+    assert judged.same("vhgp")[:, 0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5], rel=0.05)
+    assert judged.slow("vhgp")[:, 0] == pytest.approx([0.2] * 5, rel=0.05)
+    assert judged.single("vhgp", 0, 4)[0] == pytest.approx(0.9, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("levels", "course", "place"),
+    [
+        ((0.6, 0.5, 0.4, 0.3, 0.5), "holds", "holds"),
+        ((0.6, 0.5, 0.4, 0.3, 0.2), "holds in part", "does not hold"),
+        ((0.2, 0.3, 0.4, 0.5, 0.6), "holds in part", "does not hold"),
+        ((0.2, 0.3, 0.4, 0.5, 0.3), "does not hold", "does not hold"),
+        ((0.3, 0.3, 0.3, 0.3, 0.3), "not decided", None),
+    ],
+)
+def test_the_verdict_follows_the_curve(levels: tuple[float, ...], course: str, place: str | None) -> None:
+    """A valley at the paper's turn, a fall, a rise, a hill, nothing."""
+    curve = told([flat(level) for level in levels]).same("vhgp")
+    turn = turning_bracket(SPEEDS)
+    assert turn == 3
+    assert helps_then_harms(estimated(curve[0] - curve[turn]), estimated(curve[-1] - curve[turn])) == course
+    if place is not None:
+        assert turns_there(turn_of(SPEEDS, curve)) == place
+
+
+def test_a_turn_that_the_draws_do_not_agree_on_is_partly_or_not_decided() -> None:
+    """The interval of the turn is that of the draws' own turns."""
+    curves = np.array([[0.3, 0.3, 0.3, 0.3], [0.2, 0.1, 0.2, 0.3], [0.1, 0.2, 0.1, 0.1]])
+    turn = turn_of((0.02, 0.03, 0.06), curves)
+    assert (turn.value, turn.low < 0.05 < turn.high) == (0.06, True)
+    assert turns_there(turn) == "holds in part"
+    assert turns_there(replace(turn, value=0.03)) == "not decided"
+    assert turns_there(Estimate(np.nan, np.nan, np.nan)) == "not decided"
+
+
+def test_no_bracket_at_the_papers_turn() -> None:
+    """A plan may lack those speeds."""
+    assert turning_bracket((0.01, 0.2)) is None
+
+
+@pytest.mark.parametrize(
+    ("slow", "fast", "verdict"),
+    [
+        ((0.001, 0.002), (0.3, 0.4), "holds"),
+        ((0.01, 0.05), (0.3, 0.4), "holds in part"),
+        ((0.001, 0.002), (0.001, 0.002), "does not hold"),
+        ((0.001, 0.002), (0.01, 0.4), "not decided"),
+    ],
+)
+def test_verdict_on_outcomes_themselves(slow: tuple[float, float], fast: tuple[float, float], verdict: str) -> None:
+    """Notable is a tenth of the model's error, 0.3 here."""
+    departures = {0.05: Estimate(0.01, *slow), 0.2: Estimate(0.2, *fast)}
+    assert breaks_beyond(departures, 0.3) == verdict
+    assert breaks_beyond({0.05: departures[0.05]}, 0.3) == "not decided"
+    assert breaks_beyond(departures, np.nan) == "not decided"
+
+
+@pytest.mark.parametrize(
+    ("ends", "verdict"), [((-0.2, -0.1), "holds"), ((0.1, 0.2), "does not hold"), ((-0.1, 0.1), "not decided")]
+)
+def test_verdict_on_the_speed_as_an_input(ends: tuple[float, float], verdict: str) -> None:
+    """By the interval of the difference."""
+    assert lower(Estimate(float(np.mean(ends)), *ends)) == verdict
+
+
+def test_draws_without_any_such_push_are_passed_over() -> None:
+    """Few pushes: a draw may hold none of a speed."""
+    draws: Array = np.array([0.3, 0.2, np.nan, 0.4])
+    assert estimated(draws).high < 0.41
+    assert np.isnan(estimated(np.full(4, np.nan)).low)
+
+
+def test_the_section_of_a_small_study(tmp_path: Path) -> None:
+    """Four findings, tables of every bracket and speed, a picture, numbers that JSON can hold."""
+    study = replace(paper_studies.made_up_study(tmp_path), plan=FEW)
+    made = section(study)
+    assert len(made.findings) == 4
+    assert [len(table.rows) for table in made.tables] == [3, 3, 3]
+    assert made.pictures[0].path.stat().st_size > 10_000
+    content = json.loads(json.dumps(dict(made.data), allow_nan=False))
+    assert len(content["departure"]) == 3
+    assert content["departure"][0]["value"] == 0.0
+
+
+def test_too_few_windows_are_told_not_a_crash(tmp_path: Path) -> None:
+    """Three pushes a speed are nothing to learn from."""
+    made = section(
+        replace(paper_studies.made_up_study(tmp_path), plan=replace(FEW, speeds=(0.075, 0.1), speed_pushes=3))
+    )
+    assert [finding.verdict for finding in made.findings] == ["not decided"]

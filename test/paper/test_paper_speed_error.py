@@ -1,0 +1,160 @@
+"""Error against speed: held-out windows whose errors are known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper_studies import made_up_corpus, made_up_study
+from push_predictor_paper.claims.comparison import speed_error
+from push_predictor_paper.claims.comparison.speed_error import captured, rank_correlation, unreliable
+from push_predictor_paper.figures.speed_error import SpeedCurve
+from push_predictor_paper.fits.held_out import (
+    FEWEST_PUSHES,
+    HeldOut,
+    bias,
+    joined,
+    push_speeds,
+    speed_groups,
+    within_nmse,
+)
+
+CORPUS = made_up_corpus()
+SPEEDS = np.array([0.02, 0.1, 0.2, 0.4])
+PUSHES = 60  # at each speed
+
+
+def windows(analytical=(0.1, 0.1, 0.1, 0.1), vhgp=(0.1, 0.1, 0.1, 0.1)) -> HeldOut:
+    """One window a push; the models' NMSE within each of four speeds is about so much for each output."""
+    rng = np.random.default_rng(1)
+    group = np.repeat(np.arange(4), PUSHES)
+    speed = SPEEDS[group]
+    observed = rng.standard_normal((len(group), 3)) * speed[:, None]
+
+    noise = rng.standard_normal(observed.shape) * speed[:, None]  # the same for all kinds
+
+    def off(nmse) -> np.ndarray:
+        return observed - np.sqrt(np.asarray(nmse)[group])[:, None] * noise
+
+    names = np.array([f"p{k:04d}" for k in range(len(group))])
+    predicted = {"analytical": off(analytical), "gp": off(vhgp), "vhgp": off(vhgp)}
+    return HeldOut(500, names, speed, group, SPEEDS, 0.2 * speed, observed, predicted, observed)
+
+
+def curve(held: HeldOut) -> SpeedCurve:
+    at = [held.at(k) for k in range(4)]
+    nmse = tuple(within_nmse(w, ("analytical",)) for w in at)
+    return SpeedCurve("analytical", tuple(SPEEDS.tolist()), nmse, nmse, nmse)
+
+
+@pytest.mark.parametrize(
+    ("nmse", "verdict"),
+    [((0.01, 0.1, 0.5, 1.0), "holds"), ((1.0, 0.5, 0.1, 0.01), "does not hold")],
+)
+def test_unreliable_at_speed_means_that_error_and_speed_are_ranked_alike(nmse, verdict):
+    held = windows(nmse)
+    assert unreliable(CORPUS, held, curve(held)).verdict == verdict
+
+
+def test_too_few_pushes_decide_nothing():
+    held = windows((0.3, 0.3, 0.3, 0.3))
+    few = held.take(np.arange(len(held.group)) % PUSHES < 4)
+    assert unreliable(CORPUS, few, curve(few)).verdict == "not decided"
+
+
+def test_growth_at_high_speed_alone_holds_in_part():
+    held = windows((1.0, 0.02, 0.2, 0.8))
+    assert unreliable(CORPUS, held, curve(held)).verdict == "holds in part"
+
+
+def test_the_rank_correlation_knows_no_units_of_speed_s_spread():
+    even = rank_correlation(windows((0.3, 0.3, 0.3, 0.3)), "analytical")
+    assert even.low < 0.0 < even.high
+
+
+@pytest.mark.parametrize(
+    ("vhgp", "verdict"),
+    [
+        ((0.5, 0.1, 0.1, 0.1), "holds"),
+        ((0.5, 0.5, 0.1, 0.1), "holds in part"),
+        ((0.5, 2.0, 2.0, 2.0), "does not hold"),
+        ((0.5, 0.5, 0.5, 0.5), "not decided"),
+    ],
+)
+def test_models_told_the_speed_must_be_ahead_at_every_high_speed(vhgp, verdict):
+    assert captured(CORPUS, windows((0.5,) * 4, vhgp), [0, 1, 2, 3]).verdict == verdict
+
+
+def test_levelled_outcomes_have_the_same_spread_at_every_speed():
+    level = windows().levelled()
+    assert [level.at(k).observed.std() for k in range(4)] == pytest.approx([1.0] * 4)
+    assert within_nmse(level.at(3), ("vhgp",)).value == pytest.approx(within_nmse(windows().at(3), ("vhgp",)).value)
+
+
+def test_slow_pushes_alone_say_nothing_about_high_speed():
+    assert captured(CORPUS, windows(), [0]).verdict == "not decided"
+
+
+def test_the_nmse_within_a_speed_is_measured_by_the_spread_at_that_speed():
+    held = windows()
+    observed = held.observed
+    wrong = replace(held, predicted={**held.predicted, "gp": np.zeros_like(observed) + observed[:PUSHES].mean(axis=0)})
+    assert within_nmse(wrong.at(0), ("gp",)).value == pytest.approx(3.0)
+
+
+def test_the_difference_of_two_kinds_is_that_of_their_figures():
+    at = windows((0.5,) * 4, (0.1,) * 4).at(2)
+    each = [within_nmse(at, (kind,)).value for kind in ("analytical", "vhgp")]
+    assert within_nmse(at, ("analytical", "vhgp")).value == pytest.approx(each[1] - each[0])
+
+
+def test_the_bias_along_is_a_share_of_the_travel():
+    held = windows()
+    ahead = held.observed - np.column_stack([0.1 * held.travel, np.zeros((len(held.travel), 2))])
+    found = bias(replace(held, predicted={**held.predicted, "gp": ahead}), "gp", 0)
+    assert found.value == pytest.approx(0.1) and found.low == pytest.approx(0.1)
+
+
+def test_left_and_right_do_not_cancel_in_the_bias_across():
+    held = windows()
+    short = {**held.predicted, "analytical": 0.5 * held.observed}
+    assert bias(replace(held, predicted=short), "analytical", 1).low > 0.0
+
+
+def test_speeds_that_scatter_about_a_command_are_one_group():
+    command = np.repeat([0.02, 0.05, 0.4], 20)
+    measured = command * np.random.default_rng(0).uniform(0.97, 1.03, 60)
+    group = speed_groups(np.array([f"p{k}" for k in range(60)]), measured)
+    assert np.array_equal(group, np.repeat([0, 1, 2], 20))
+
+
+def test_speeds_without_gaps_are_cut_into_equal_groups():
+    group = speed_groups(np.array([f"p{k}" for k in range(120)]), np.geomspace(0.01, 0.5, 120))
+    assert np.array_equal(np.bincount(group), [20] * 6)
+
+
+def test_speeds_of_few_pushes_join_their_neighbours():
+    group = np.repeat([0, 1, 2, 3], [3, 6, FEWEST_PUSHES, 2])
+    pushes = np.array([f"p{k}" for k in range(len(group))])
+    assert np.array_equal(joined(group, pushes), np.repeat([0, 1], [9, FEWEST_PUSHES + 2]))
+
+
+def test_a_push_has_one_speed():
+    assert push_speeds(np.array(["a", "a", "a", "b"]), np.array([0.1, 0.2, 0.4, 0.3])) == pytest.approx(
+        [0.2] * 3 + [0.3]
+    )
+
+
+def test_the_section_shows_every_speed(tmp_path):
+    made = speed_error.section(made_up_study(tmp_path))
+    assert len(made.findings) == 2 and made.pictures[0].path.exists()
+    assert sum(int(row[1]) for row in made.tables[0].rows) == 16  # two folds of five, of 40 pushes
+    json.dumps(made.data, allow_nan=False)
+
+
+def test_a_set_of_one_speed_gets_a_note(tmp_path):
+    study = replace(made_up_study(tmp_path), simulated=made_up_corpus(speeds=(0.02,)))
+    made = speed_error.section(study)
+    assert made.findings == () and "one speed only (20 mm/s)" in made.notes[0]

@@ -1,0 +1,252 @@
+"""Work on many cores: results in order, kept on disk, resumed after an interruption, spread over a dask cluster."""
+
+from __future__ import annotations
+
+import builtins
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from joblib.externals.loky import get_reusable_executor
+from push_predictor_paper.work import Work, fingerprint
+
+import push_predictor
+from push_predictor.errors import PushPredictorError
+from push_predictor_paper import work as work_module
+
+REPOSITORY = Path(push_predictor.__file__).parents[1]
+PIECES = textwrap.dedent(
+    """
+    import os
+    import time
+    from pathlib import Path
+
+    def squared(number, log):
+        with Path(log).open("a") as lines:
+            lines.write(f"{number}\\n")
+        return number * number
+
+    def slowly(number, log):
+        while number > 3 and not Path(log).with_name("go_on").exists():
+            time.sleep(0.05)
+        return squared(number, log)
+
+    def where(number):
+        time.sleep(0.2)
+        return number, os.getpid()
+    """
+)
+
+
+@pytest.fixture
+def pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
+    """A module of small pieces of work, importable here and in every process started from here."""
+    (tmp_path / "pieces_of_work.py").write_text(PIECES)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(REPOSITORY)]))
+    get_reusable_executor().shutdown(wait=True)  # processes that other tests have left know nothing of the module
+    import pieces_of_work
+
+    yield pieces_of_work
+    del sys.modules["pieces_of_work"]
+
+
+class Seen:
+    """A watch that writes down what it sees."""
+
+    def __init__(self) -> None:
+        self.events: list[object] = []
+
+    def begin(self, doing: str, count: int) -> None:
+        self.events.append((doing, count))
+
+    def advance(self) -> None:
+        self.events.append("one")
+
+
+def lines(log: Path) -> list[int]:
+    return sorted(int(line) for line in log.read_text().split()) if log.exists() else []
+
+
+@pytest.mark.parametrize("cores", [1, 2])
+def test_results_come_in_the_order_of_the_calls(pieces, tmp_path: Path, cores: int) -> None:
+    work = Work(tmp_path / "kept", cores=cores)
+    assert work.run("squares", pieces.squared, [(n, str(tmp_path / "log")) for n in (3, 1, 2)]) == [9, 1, 4]
+
+
+def test_no_calls_give_no_results(pieces, tmp_path: Path) -> None:
+    assert Work(tmp_path / "kept", cores=1).run("nothing", pieces.squared, []) == []
+
+
+def test_a_call_made_before_is_read_from_disk(pieces, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, [(2, str(log)), (3, str(log))])
+    again = Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, [(3, str(log)), (4, str(log))])
+    assert again == [9, 16]
+    assert lines(log) == [2, 3, 4]
+
+
+def test_another_folder_knows_nothing_of_it(pieces, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    for folder in ("one", "other"):
+        Work(tmp_path / folder, cores=1).run("squares", pieces.squared, [(2, str(log))])
+    assert lines(log) == [2, 2]
+
+
+def test_the_watch_sees_the_begin_and_every_piece_kept_ones_too(pieces, tmp_path: Path) -> None:
+    for _ in range(2):
+        seen = Seen()
+        calls = [(n, str(tmp_path / "log")) for n in range(3)]
+        Work(tmp_path / "kept", cores=1, watch=seen).run("squares", pieces.squared, calls)
+        assert seen.events == [("squares", 3), "one", "one", "one"]
+
+
+@pytest.mark.parametrize(("cores", "end"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGKILL)])
+def test_what_was_done_before_an_interruption_is_kept(pieces, tmp_path: Path, cores: int, end: signal.Signals) -> None:
+    log, count = tmp_path / "log", 8
+    process = started(tmp_path, log, cores, count)
+    try:
+        wait_for(lambda: len(lines(log)) >= 3)
+        os.killpg(process.pid, end)  # as a terminal does
+        assert process.wait(timeout=60) != 0
+    finally:
+        end_group(process)
+    done = len(lines(log))
+    assert 3 <= done < count
+    (tmp_path / "go_on").touch()
+    results = Work(tmp_path / "kept", cores=1).run("slow squares", pieces.slowly, calls_of(log, count))
+    assert results == [n * n for n in range(count)]
+    assert len(lines(log)) <= count + cores  # at most what was being written when it ended is made again
+
+
+def started(folder: Path, log: Path, cores: int, count: int) -> subprocess.Popen[bytes]:
+    """Another process at the same work, leader of its own group."""
+    program = textwrap.dedent(
+        f"""
+        import signal
+        from pathlib import Path
+        from pieces_of_work import slowly
+        from push_predictor_paper.work import Work
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
+        Work(Path({str(folder / "kept")!r}), cores={cores}).run("slow squares", slowly, {calls_of(log, count)!r})
+        """
+    )
+    return subprocess.Popen([sys.executable, "-c", program], start_new_session=True, stderr=subprocess.DEVNULL)
+
+
+def calls_of(log: Path, count: int) -> list[tuple[int, str]]:
+    return [(n, str(log)) for n in range(count)]
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """Whatever a killed leader has left of its workers."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(timeout=60)
+
+
+def wait_for(condition, timeout: float = 120.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def copied_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the sources, which the fingerprint is then made of."""
+    copy = tmp_path / "push_predictor"
+    shutil.copytree(Path(push_predictor.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(work_module.push_predictor, "__file__", str(copy / "__init__.py"))
+    return copy
+
+
+def fresh_fingerprint() -> str:
+    return fingerprint.__wrapped__()
+
+
+@pytest.mark.parametrize("name", ["models/gp.py", "simulation/dynamics.py", "paper/fits.py", "recordings/windows.py"])
+def test_a_change_of_a_source_that_matters_changes_the_fingerprint(copied_package: Path, name: str) -> None:
+    before = fresh_fingerprint()
+    (copied_package / name).write_text((copied_package / name).read_text() + "\nANOTHER = 1\n")
+    assert fresh_fingerprint() != before
+
+
+@pytest.mark.parametrize(
+    "name", ["evaluation/html.py", "evaluation/figures/canvas.py", "paper/claims/data.py", "paper/figures/__init__.py"]
+)
+def test_a_change_of_looks_does_not(copied_package: Path, name: str) -> None:
+    before = fresh_fingerprint()
+    (copied_package / name).write_text((copied_package / name).read_text() + "\nANOTHER = 1\n")
+    assert fresh_fingerprint() == before
+
+
+def test_a_new_and_a_renamed_source_change_the_fingerprint(copied_package: Path) -> None:
+    before = fresh_fingerprint()
+    (copied_package / "models" / "another.py").write_text("")
+    added = fresh_fingerprint()
+    (copied_package / "models" / "another.py").rename(copied_package / "models" / "renamed.py")
+    assert len({before, added, fresh_fingerprint()}) == 3
+
+
+def test_results_are_kept_under_the_fingerprint(tmp_path: Path) -> None:
+    assert Work(tmp_path, cores=1).folder == tmp_path / fingerprint()
+
+
+def test_without_joblib_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = builtins.__import__
+
+    def without_joblib(name: str, *arguments, **named):
+        if name == "joblib":
+            raise ImportError("No module named 'joblib'")
+        return known(name, *arguments, **named)
+
+    monkeypatch.setattr(builtins, "__import__", without_joblib)
+    with pytest.raises(PushPredictorError, match=r"pip install 'push_predictor\[report\]'"):
+        Work(tmp_path)
+
+
+@pytest.fixture
+def cluster(pieces) -> Iterator[object]:
+    """Two dask workers, processes of their own that inherit PYTHONPATH."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as workers,
+        distributed.Client(workers) as client,
+    ):
+        yield client
+
+
+def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_path: Path) -> None:
+    import joblib
+
+    calls = [(n, str(tmp_path / "log")) for n in range(6)]
+    here = Work(tmp_path / "here", cores=1).run("squares", pieces.squared, calls)
+    with joblib.parallel_config(backend="dask"):
+        there = Work(tmp_path / "there").run("squares", pieces.squared, calls)
+        places = Work(tmp_path / "there").run("places", pieces.where, [(n,) for n in range(8)])
+    assert there == here
+    assert [n for n, _ in places] == list(range(8))
+    assert {pid for _, pid in places} == set(cluster.run(os.getpid).values())
+    assert os.getpid() not in {pid for _, pid in places}
+
+
+def test_what_a_cluster_has_done_is_read_from_disk_at_home(cluster, pieces, tmp_path: Path) -> None:
+    import joblib
+
+    log = tmp_path / "log"
+    calls = [(n, str(log)) for n in range(4)]
+    with joblib.parallel_config(backend="dask"):
+        Work(tmp_path / "kept").run("squares", pieces.squared, calls)
+    assert Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, calls) == [0, 1, 4, 9]
+    assert lines(log) == [0, 1, 2, 3]

@@ -1,0 +1,417 @@
+"""Sequences of pushes with the uncertainty carried through the pose: mechanics, symmetry, limits, refusals."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from synthetic import RADIUS, square_rig
+
+from benchmarks.rollout_truth import EnergyDistance
+from push_predictor.errors import RequestError
+from push_predictor.geometry.frames import rotate, to_world, wrap_angle
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.geometry.touch import covariance_in_world, displaced
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, Provenance, PushModel
+from push_predictor.models.train import train_model
+from push_predictor.planning.particles import Deviations
+from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
+from push_predictor.planning.push_windows import windows_of
+from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, moments_of, rollout
+from push_predictor.planning.straight_drive import drive_onto
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+SD = np.array([2e-4, 3e-4, 6e-3])
+CERTAIN, NOISY = np.zeros((3, 3)), np.diag(SD**2)
+CORRELATED = np.array([[1.0, 0.3, -0.2], [0.3, 1.0, 0.8], [-0.2, 0.8, 1.0]])
+AT_REST = np.zeros(3)
+PUSH = [0.02, 0.1, 0.2, 1.0]  # five windows
+
+
+def rows(count: int = 40) -> PushTable:
+    """Windows of 0.2 s, five a push."""
+    rng = np.random.default_rng(0)
+    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    outcomes = AnalyticalPush(shape_outline("rect1"), RADIUS).displacement(inputs, np.full(count, 0.2))
+    outcomes += rng.standard_normal((count, 3)) * SD
+    return PushTable(inputs, np.full(count, 0.2), outcomes, np.array([f"p{k // 5}" for k in range(count)]))
+
+
+def model_with(covariance: Array, shape: str = "rect1") -> PushModel:
+    """The analytical model of a shape, every window of 0.2 s with one covariance (3, 3)."""
+    rig = Rig(shape, shape_outline(shape), RADIUS, "abs", 0.837)
+    body = AnalyticalBody(AnalyticalPush(rig.outline, RADIUS), covariance)
+    return PushModel("made", "analytical", rig, body, rows(), Provenance((), 8, 0, "0"))
+
+
+def heading_of(contact: float, angle: float, model: PushModel) -> float:
+    """Of a push on a slider at rest in the world's axes, rad."""
+    inward = model.rig.outline.inward_normal(np.array([contact]))[0]
+    return float(np.arctan2(inward[1], inward[0]) + angle)
+
+
+def after_one_push(model: PushModel, step: list[float]) -> Array:
+    """Where the analytical model has the slider (3,) after one push from rest, integrated at once."""
+    velocity, contact, angle, duration = step
+    heading = np.array([heading_of(contact, angle, model)])
+    assert isinstance(model.body, AnalyticalBody)
+    moved = model.body.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
+    return displaced(AT_REST[None], heading, moved)[0]
+
+
+@pytest.mark.parametrize("shape", ["rect1", "hex", "ellip2", "ellip1"])
+@pytest.mark.parametrize("contact, angle, duration", [(0.1, 0.1, 3.0), (0.2, 0.5, 3.0), (0.02, 0.0, 1.5)])
+def test_without_noise_windows_end_to_end_are_the_whole_push(shape, contact, angle, duration) -> None:
+    model, step = model_with(CERTAIN, shape), [0.02, contact, angle, duration]
+    rolled = rollout(model, AT_REST, CERTAIN, [step], particles=2, persistence=INDEPENDENT)
+    np.testing.assert_allclose(rolled.mean[0], after_one_push(model, step), atol=2e-7)
+    np.testing.assert_allclose(rolled.covariance[0], 0.0, atol=1e-20)
+
+
+def test_every_step_starts_where_the_slider_then_is() -> None:
+    model, steps = model_with(CERTAIN), [[0.02, 0.1, 0.2, 0.6], [0.02, 0.6, -0.3, 0.4]]
+    rolled = rollout(model, AT_REST, CERTAIN, steps, particles=1, persistence=INDEPENDENT)
+    first, second = (after_one_push(model, step) for step in steps)
+    np.testing.assert_allclose(rolled.mean[0], first, atol=1e-8)
+    expected = [*to_world(second[None, :2], first[None])[0], first[2] + second[2]]
+    np.testing.assert_allclose(rolled.mean[1], expected, atol=1e-8)
+
+
+def test_one_window_is_the_prediction() -> None:
+    model, particles = model_with(NOISY), 40_000
+    model = replace(model, body=replace(model.body, covariance=np.diag(SD) @ CORRELATED @ np.diag(SD)))
+    rolled = rollout(model, AT_REST, CERTAIN, [[0.02, 0.1, 0.2, 0.2]], particles)
+    heading = heading_of(0.1, 0.2, model)
+    expected = covariance_in_world(model.body.covariance[None], np.array([heading]))[0]
+    error = np.sqrt(np.diagonal(expected) / particles)
+    off = rolled.mean[0] - after_one_push(model, [0.02, 0.1, 0.2, 0.2])
+    assert np.all(np.abs(off) < 4.0 * error)
+    scale = np.sqrt(np.diagonal(expected))
+    np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.03)
+
+
+def test_the_root_of_a_covariance_keeps_deviations_with_their_outputs_in_any_unit() -> None:
+    covariance, units = np.diag(SD) @ CORRELATED @ np.diag(SD), np.diag([1e3, 1e3, 180.0 / np.pi])
+    root = root_of(covariance[None])[0]
+    np.testing.assert_allclose(root @ root.T, covariance, rtol=1e-12)
+    np.testing.assert_allclose(root_of((units @ covariance @ units)[None])[0], units @ root, rtol=1e-9)
+    np.testing.assert_allclose(root / SD[:, None], (root / SD[:, None]).T, rtol=1e-9)
+
+
+def test_a_rollout_moves_and_turns_with_the_slider() -> None:
+    model, where = model_with(NOISY), np.array([0.3, -0.1, 2.0])
+    here, there = (rollout(model, pose, CERTAIN, [PUSH, PUSH], 50) for pose in (AT_REST, where))
+    np.testing.assert_allclose(there.samples[:, :2], rotate(here.samples[:, :2], where[2]) + where[:2], atol=1e-12)
+    np.testing.assert_allclose(there.mean[:, 2], here.mean[:, 2] + where[2], atol=1e-12)
+    np.testing.assert_allclose(there.covariance, covariance_in_world(here.covariance, np.full(2, 2.0)), atol=1e-15)
+
+
+def test_an_uncertain_start_is_carried_along() -> None:
+    """A slider whose heading is off goes off sideways by the way it is pushed; without noise that is all."""
+    model, sd = model_with(CERTAIN), np.array([1e-3, 2e-3, 0.02])
+    rolled = rollout(model, AT_REST, np.diag(sd**2), [PUSH], 6000)
+    moved = after_one_push(model, PUSH)
+    lever = np.eye(3)
+    lever[:2, 2] = [-moved[1], moved[0]]
+    expected = lever @ np.diag(sd**2) @ lever.T
+    scale = np.sqrt(np.diagonal(expected))
+    np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.05)
+
+
+def test_uncertainty_grows_from_push_to_push() -> None:
+    rolled = rollout(model_with(NOISY), AT_REST, CERTAIN, [PUSH] * 4, 2000)
+    spread = np.linalg.det(rolled.covariance)
+    assert np.all(np.diff(spread) > 0.0) and np.all(np.diff(rolled.covariance[:, 2, 2]) > 0.0)
+
+
+def test_the_slider_ends_where_the_tip_is() -> None:
+    """Deviations along the normal do not add up: a slider that went too far is touched later in the next window."""
+    along = np.diag([2e-4, 0.0, 0.0]) ** 2
+    model, straight = model_with(along), [0.02, 0.125, 0.0, 4.0]
+    rolled = rollout(model, AT_REST, CERTAIN, [straight], 1000, persistence=INDEPENDENT)
+    ahead = rotate(rolled.samples[:, :2], np.array(-heading_of(0.125, 0.0, model)))[:, 0]
+    assert ahead.mean() == pytest.approx(0.08, abs=2e-5)
+    assert ahead.std() == pytest.approx(2e-4, rel=0.1)
+
+
+@pytest.mark.parametrize("edge", [0, 1, 2, 3])
+@pytest.mark.parametrize("end", [0.0, 1.0])
+def test_at_a_corner_the_contact_belongs_to_the_edge_it_slid_along(edge: int, end: float) -> None:
+    """A tip that is nearly round the corner faces the other edge more squarely."""
+    outline, towards = shape_outline("rect1"), -1.0 if end else 1.0
+    contact = outline.contact_on_edge(edge, end + 0.002 * (0.5 - end))
+    inputs, slider = np.array([[0.02, float(contact), 1.2 * towards]]), np.zeros((1, 3))
+    drive, meeting = drive_onto(outline, RADIUS, slider, inputs)
+    later = drive.meet(slider, meeting, 0.2, 0.2)
+    assert later.touch.inputs[0, 1] == pytest.approx(float(outline.contact_on_edge(edge, end)))
+    assert later.touch.inputs[0, 2] == pytest.approx(1.2 * towards)
+
+
+def test_a_slider_that_the_tip_has_passed_stays() -> None:
+    model = model_with(CERTAIN)
+    off, later = ([0.02, 0.24, -1.3, duration] for duration in (3.0, 5.0))
+    poses = [rollout(model, AT_REST, CERTAIN, [step], 1) for step in (off, later)]
+    assert [rolled.held[0] for rolled in poses] == [0.0, 0.0]
+    np.testing.assert_array_equal(poses[0].mean, poses[1].mean)
+    assert rollout(model, AT_REST, CERTAIN, [PUSH], 1).held[0] == 1.0
+
+
+def test_pushes_of_one_mode_may_lead_to_two() -> None:
+    """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
+    lasting = Persistence(np.ones(3), np.zeros(3), np.ones(3))
+    short, long = (
+        rollout(model_with(np.diag([1e-8, 1e-7, 1e-4])), AT_REST, CERTAIN, [step], 150, persistence=lasting)
+        for step in ([0.02, 0.125, 0.0, 0.2], [0.02, 0.125, 0.0, 12.0])
+    )
+    assert np.all(np.abs(short.samples[:, 2]) < 0.05)
+    turned = np.abs(long.samples[:, 2])
+    assert np.mean(turned > 0.9) > 2.0 * np.mean(turned < 0.6)
+    assert 0.3 < np.mean(long.samples[turned > 0.9, 2] > 0.0) < 0.7
+
+
+def test_a_heading_is_averaged_on_the_circle() -> None:
+    heading = np.pi + 0.1 * np.random.default_rng(0).standard_normal(2000)
+    mean, covariance = moments_of(np.column_stack([np.zeros((2000, 2)), heading]))
+    assert abs(mean[2]) == pytest.approx(np.pi, abs=0.01)
+    assert covariance[2, 2] == pytest.approx(0.01, rel=0.1)
+    rolled = rollout(model_with(NOISY), np.array([0.0, 0.0, np.pi]), CERTAIN, [PUSH], 500)
+    assert np.all(np.abs(rolled.samples[:, 2]) <= np.pi) and rolled.covariance[0, 2, 2] < 0.01
+
+
+def test_the_same_seed_gives_the_same_samples_and_another_one_others() -> None:
+    model = model_with(NOISY)
+    one, again, other = (rollout(model, AT_REST, NOISY, [PUSH], 20, seed).samples for seed in (5, 5, 6))
+    np.testing.assert_array_equal(one, again)
+    assert not np.any(one == other)
+
+
+def test_no_step_leaves_the_samples_of_the_start() -> None:
+    rolled = rollout(model_with(NOISY), np.array([1.0, 2.0, 0.5]), NOISY, np.empty((0, 4)), 5000)
+    assert rolled.mean.shape == (0, 3) and rolled.covariance.shape == (0, 3, 3)
+    np.testing.assert_allclose(rolled.samples.std(axis=0), SD, rtol=0.05)
+
+
+# --- persistence ----------------------------------------------------------------------------------------------------
+
+
+def test_deviations_correlate_over_the_way_as_told() -> None:
+    told = Persistence(np.array([0.3, 0.0, 0.1]), np.array([0.5, 0.9, 0.0]), np.array([4e-3, 2e-3, 1e-3]))
+    deviations = Deviations(told, np.full(40_000, 3e-3), np.random.default_rng(0))
+    drawn = np.array([deviations.next() for _ in range(4)])
+    np.testing.assert_allclose(np.mean(drawn**2, axis=1), 1.0, atol=0.05)
+    for lag in (1, 3):
+        expected = told.correlation(np.array([3e-3 * lag]))[0]
+        np.testing.assert_allclose(np.mean(drawn[0] * drawn[lag], axis=0), expected, atol=0.03)
+
+
+def pushes_with(persistence: Persistence, pushes: int, windows: int) -> tuple[Array, PushTable]:
+    """Residuals (pushes * windows, 3) of that persistence, and the table of the windows; 4 mm each."""
+    deviations = Deviations(persistence, np.full(pushes, 4e-3), np.random.default_rng(1))
+    residuals = np.array([deviations.next() for _ in range(windows)]).transpose(1, 0, 2).reshape(-1, 3)
+    n = pushes * windows
+    push_id = np.repeat([f"p{k}" for k in range(pushes)], windows)
+    inputs = np.column_stack([np.full(n, 0.02), np.full(n, 0.1), np.zeros(n)])
+    return residuals, PushTable(inputs, np.full(n, 0.2), np.zeros((n, 3)), push_id)
+
+
+def test_persistence_is_found_in_residuals() -> None:
+    told = Persistence(np.array([0.3, 0.0, 0.5]), np.array([0.4, 0.8, 0.0]), np.full(3, 8e-3))
+    found = fit_persistence(*pushes_with(told, 1500, 8))
+    way = np.array([4e-3, 8e-3, 16e-3, 28e-3])
+    np.testing.assert_allclose(found.correlation(way), told.correlation(way), atol=0.05)
+
+
+def test_independent_windows_show_no_persistence() -> None:
+    found = fit_persistence(*pushes_with(INDEPENDENT, 1500, 6))
+    np.testing.assert_allclose(found.correlation(np.array([4e-3, 2e-2])), 0.0, atol=0.05)
+
+
+def test_few_pushes_show_little_and_pushes_of_one_window_nothing() -> None:
+    told = Persistence(np.full(3, 0.95), np.zeros(3), np.ones(3))
+    many, few = (fit_persistence(*pushes_with(told, pushes, 10)) for pushes in (1000, 5))
+    assert np.all(many.correlation(np.array([4e-3])) > 0.85) and np.all(few.correlation(np.array([4e-3])) <= 0.5)
+    np.testing.assert_array_equal(fit_persistence(*pushes_with(told, 30, 1)).correlation(np.array([4e-3])), 0.0)
+
+
+def test_what_lasts_widens_the_end_of_a_long_push() -> None:
+    lasting = Persistence(np.ones(3), np.zeros(3), np.ones(3))
+    turned = [
+        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.05, 0.0, 3.0]], 1000, persistence=each).covariance[0]
+        for each in (INDEPENDENT, lasting)
+    ]
+    assert turned[1][2, 2] > 2.0 * turned[0][2, 2]
+
+
+# --- windows and refusals -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def learnt() -> PushModel:
+    """A GP of 40 windows of 0.2 s."""
+    return train_model(rows(), square_rig(), "gp", name="learnt")
+
+
+@pytest.mark.parametrize(
+    "duration, count", [(0.2, 1), (0.18, 1), (0.22, 1), (0.4, 2), (0.9, 5), (1.0, 5), (0.85, 4), (3.1, 16)]
+)
+def test_a_push_is_cut_into_windows_that_the_model_knows(learnt, duration, count) -> None:
+    windows = windows_of(learnt, duration)
+    assert windows.count == count and windows.duration * count == pytest.approx(duration)
+    assert windows.asked == 0.2 and windows.scale == pytest.approx(windows.duration / 0.2)
+    assert 0.9 - 1e-9 <= windows.scale <= 1.1 + 1e-9
+
+
+def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
+    short, long = (rollout(learnt, AT_REST, CERTAIN, [[0.02, 0.1, 0.1, duration]], 200) for duration in (0.2, 0.22))
+    np.testing.assert_allclose(long.samples, 1.1 * short.samples, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"steps": [PUSH, PUSH, [0.02, 0.1, 1.6, 1.0]]}, r"steps\[2\]\.angle: 1\.6 is not accepted, give an angle"),
+        ({"steps": [PUSH, [np.nan, 0.1, 0.0, 1.0]]}, r"steps\[1\]\.velocity: nan"),
+        ({"steps": [[0.02, 1.0, 0.0, 1.0]]}, r"steps\[0\]\.contact: 1\.0 .*\[0, 1\)"),
+        ({"steps": [[0.02, 0.1, 0.0, 0.5]]}, r"steps\[0\]\.duration: 0\.5 .*0\.18 to 0\.22 s, or a number of windows"),
+        ({"steps": [[0.02, 0.1, 0.0, np.inf]]}, r"steps\[0\]\.duration: inf"),
+        ({"steps": [[0.02, 0.1, 0.0, -1.0]]}, r"steps\[0\]\.duration: -1\.0"),
+        ({"steps": [[0.02, 0.1, 0.0, 1e300]]}, r"steps\[0\]\.duration: 1e\+300 .*at most 2000 s, 10000 windows"),
+        ({"steps": [[0.02, 0.1, 0.0, 400.0]], "particles": 100}, r"steps: '2000 windows'.*no more than 1000 windows"),
+        ({"particles": 0}, r"particles: 0 .*1 to 100000"),
+        ({"particles": MOST_PARTICLES + 1}, r"particles: 100001"),
+        ({"slider_mean": [0.0, np.nan, 0.0]}, r"slider_mean: \[0\.0, nan, 0\.0\]"),
+        ({"slider_covariance": np.diag([1.0, np.nan, 1.0])}, r"slider_covariance: .*symmetric"),
+        ({"slider_covariance": np.diag([1.0, -1e-3, 1.0])}, r"slider_covariance: .*without negative"),
+        ({"slider_covariance": [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, r"slider_covariance"),
+        ({"slider_covariance": np.eye(2)}, r"slider_covariance"),
+        ({"slider_covariance": np.diag([-5e-9, 1e-9, 10.0])}, r"slider_covariance"),
+        ({"slider_covariance": np.diag([1e300, 1e-6, 1e-6])}, r"slider_covariance"),
+        ({"slider_mean": [1e300, 0.0, 0.0]}, r"slider_mean: \[1e\+300"),
+    ],
+)
+def test_what_cannot_be_rolled_out_is_refused_in_words(learnt, change, message) -> None:
+    asked = {"slider_mean": AT_REST, "slider_covariance": CERTAIN, "steps": [PUSH], "particles": 10, **change}
+    with pytest.raises(RequestError, match=message):
+        rollout(learnt, **asked)
+
+
+def test_a_covariance_from_single_precision_is_one() -> None:
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
+    near_isotropic = np.diag(np.array([1.0e-6, 1.1e-6, 1e-4], dtype=np.float32))
+    matrix = (turn @ near_isotropic @ turn.T).astype(np.float64)
+    matrix[0, 1] *= 1.0 + 1e-7
+    assert is_covariance(matrix)
+    rollout(model_with(CERTAIN), AT_REST, matrix, np.empty((0, 4)), 5)
+
+
+def test_a_model_that_nobody_uses_any_more_is_not_kept_for_its_persistence() -> None:
+    model = model_with(NOISY)
+    persistence_of(model)
+    there = weakref.ref(model)
+    del model
+    gc.collect()
+    assert there() is None
+
+
+def test_a_rollout_that_is_not_wanted_any_more_stops_between_windows() -> None:
+    asked = []
+
+    def go_on() -> None:
+        asked.append(len(asked))
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.1, 0.0, 3.0]], 5, go_on=go_on)
+    assert len(asked) == 3
+
+
+def test_a_singular_covariance_of_the_start_is_accepted() -> None:
+    axis = np.array([1e-3, -2e-3, 1e-2])
+    samples = rollout(model_with(CERTAIN), AT_REST, np.outer(axis, axis), np.empty((0, 4)), 50).samples
+    np.testing.assert_allclose(np.cross(samples, axis), 0.0, atol=1e-9)
+
+
+@dataclass(eq=False)
+class Attentive:
+    """A body that needs covariates, and remembers what it was given."""
+
+    needs: tuple[str, ...]
+    seen: list[Push] = field(default_factory=list)
+
+    def moments(self, push: Push) -> tuple[Array, Array, Array]:
+        """A millimetre ahead and a turn of 0.1 rad for every push."""
+        self.seen.append(push)
+        covariance = np.zeros((len(push.inputs), 3, 3))
+        return np.tile([1e-3, 0.0, 0.1], (len(push.inputs), 1)), covariance, covariance
+
+
+def test_covariates_of_the_pose_are_those_of_each_sample() -> None:
+    body = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))
+    model = replace(model_with(CERTAIN), body=body)  # type: ignore[arg-type]  # a body of the test's own
+    start = np.array([0.1, 0.2, 3.1])
+    rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.3, 0.2]] * 2, 3, persistence=INDEPENDENT)
+    first, second = (push.covariates for push in body.seen)
+    np.testing.assert_allclose([first[name] for name in body.needs[:3]], np.tile(start[:, None], 3))
+    np.testing.assert_allclose(first["push_heading"], wrap_angle(np.array(3.1 + heading_of(0.125, 0.3, model))))
+    np.testing.assert_allclose(second["slider_x"], rolled.mean[0, 0])
+    np.testing.assert_allclose(second["slider_heading"], 3.2 - 2.0 * np.pi)
+
+
+def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each_sample() -> None:
+    table = rows(100)
+    table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
+    base = train_model(table, square_rig(), "gp", name="learnt")
+    form, size = Form("constant"), np.array([0.4, 0.2])
+    effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
+    physics = AnalyticalPush(base.rig.outline, RADIUS)
+    model = replace(base, body=ExtendedBody(base.body, physics, (effect,), np.ones(3)))
+    assert model.needs == ("slider_heading",)
+    moved = []
+    for heading in (0.0, 0.8):
+        start = np.array([0.0, 0.0, heading])
+        rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.0, 0.2]], 4000)
+        heading_of_push = np.array([heading_of(0.125, 0.0, model)])
+        covariates = {"slider_heading": np.array([heading])}
+        expected = model.predict(np.array([[0.02, 0.125, 0.0]]), np.array([0.2]), covariates)
+        along = displaced(AT_REST[None], heading_of_push, expected.mean)[0]
+        back = rotate(rolled.mean[0, :2], np.array(-heading))
+        error = 4.0 * np.sqrt(np.diagonal(expected.covariance[0]).max() / 4000)
+        np.testing.assert_allclose(back, along[:2], atol=error)
+        moved.append(rolled.mean[0, 2] - heading)
+    assert moved[0] != pytest.approx(moved[1], abs=1e-5)
+
+
+def test_a_covariate_that_no_pose_tells_is_refused_by_name() -> None:
+    body = Attentive(("slider_heading", "elapsed_time"))
+    model = replace(model_with(CERTAIN), body=body)  # type: ignore[arg-type]  # a body of the test's own
+    with pytest.raises(RequestError, match=r"made.*this one needs elapsed_time$"):
+        rollout(model, AT_REST, CERTAIN, [PUSH], 3)
+
+
+# --- what the benchmark measures by ---------------------------------------------------------------------------------
+
+
+def test_the_energy_distance_of_equal_laws_is_zero_and_grows_with_their_distance() -> None:
+    rng = np.random.default_rng(0)
+    draws = [rng.standard_normal((400, 3)) for _ in range(41)]
+    same = np.array([EnergyDistance(one, draws[0], 0.5).value() for one in draws[1:]])
+    shifted = [EnergyDistance(draws[1] + [by, 0.0, 0.0], draws[0], 0.5).value() for by in (0.3, 3.0, 30.0)]
+    assert abs(same.mean()) < 0.01 and same.min() < 0.0 < same.max()
+    assert same.max() < shifted[0] < shifted[1] < shifted[2] and shifted[2] == pytest.approx(60.0, rel=0.1)
+
+
+def test_repeats_drawn_twice_are_not_compared_with_themselves() -> None:
+    rng = np.random.default_rng(1)
+    samples, truth = rng.standard_normal((50, 3)), rng.standard_normal((30, 3))
+    distance, weight = EnergyDistance(samples, truth, 1.0), np.tile([2.0, 0.0], 15)
+    assert distance.value(weight) == pytest.approx(EnergyDistance(samples, truth[::2], 1.0).value())

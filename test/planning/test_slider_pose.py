@@ -1,0 +1,360 @@
+"""From poses in the world to the slider's pose after the push: contact, symmetries, covariance, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from repository import BAGS
+from synthetic import triangle
+
+from push_predictor.errors import RequestError
+from push_predictor.geometry.frames import rotate, to_world, wrap_angle
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.geometry.touch import covariance_in_world, displaced
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import ExtendedBody, PushModel
+from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.train import train_model
+from push_predictor.planning.slider_pose import DEEPEST, LARGEST_GAP, SliderAfter, WorldPush, slider_after
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.cut import pusher_line
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.windows.track import NANOSECOND, Track
+
+RADIUS, SPEED, DURATION = 0.00475, 0.02, 0.2
+TOLD = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
+METRES, ANGLES = st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)
+OUTLINES = {name: shape_outline(name) for name in ("rect1", "hex", "ellip2", "ellip1")} | {"triangle": triangle()}
+
+
+@cache
+def model_of(shape: str, kind: str = "analytical") -> PushModel:
+    """A model whose outcomes scatter with one noise on all three, so that they are correlated."""
+    rng = np.random.default_rng(0)
+    rig = Rig(shape, OUTLINES[shape], RADIUS, "abs", 0.837)
+    inputs = np.column_stack([np.full(60, SPEED), rng.random(60), rng.uniform(-1.0, 1.0, 60)])
+    duration = np.full(60, DURATION)
+    shared = rng.standard_normal((60, 1)) + 0.3 * rng.standard_normal((60, 3))
+    outcomes = AnalyticalPush(rig.outline, RADIUS).displacement(inputs, duration) + shared * [1e-4, 2e-4, 5e-3]
+    table = PushTable(
+        inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(60)]), {"slider_x": rng.random(60)}
+    )
+    return train_model(table, rig, kind, name=f"{shape}_{kind}")
+
+
+def push_at(
+    shape: str, contact: float, angle: float, gap: float = 0.0, pose: tuple[float, float, float] = (0.3, -0.2, 0.7)
+) -> WorldPush:
+    """The push (SPEED, contact, angle) of a slider at a pose, in world coordinates; gap between tip and outline, m."""
+    outline, slider, at = OUTLINES[shape], np.array(pose), np.array([contact])
+    inward = outline.inward_normal(at)[0]
+    tip = to_world(outline.point(at)[0] - (RADIUS + gap) * inward, slider)
+    velocity = SPEED * rotate(inward, np.array(angle + slider[2]))
+    return WorldPush(slider, tip, velocity, DURATION)
+
+
+def moved(push: WorldPush, shift: tuple[float, float], turn: float) -> WorldPush:
+    """The same push in a world that is turned by `turn` and shifted."""
+    frame = np.array([*shift, turn])
+    slider = np.array([*to_world(push.slider[:2], frame), push.slider[2] + turn])
+    return replace(
+        push, slider=slider, pusher=to_world(push.pusher, frame), velocity=rotate(push.velocity, np.array(turn))
+    )
+
+
+def refusal(push: WorldPush, predictor: PushModel | None = None) -> str:
+    with pytest.raises(RequestError) as caught:
+        slider_after(predictor or model_of("rect1"), push)
+    return str(caught.value)
+
+
+# --- the outcome ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", OUTLINES)
+@pytest.mark.parametrize("angle", [-1.2, 0.0, 0.4])
+def test_it_is_what_the_model_says_of_the_contact_that_was_meant(shape: str, angle: float) -> None:
+    model = model_of(shape)
+    for contact in np.arange(24) / 24.0 + 0.02:  # every edge of every outline
+        push = push_at(shape, contact, angle)
+        expected = model.predict(np.array([[SPEED, contact, angle]]), np.array([DURATION]))
+        heading = np.arctan2(push.velocity[1], push.velocity[0])
+        x, y, turn = expected.mean[0]
+        by_hand = push.slider + [
+            x * np.cos(heading) - y * np.sin(heading),
+            x * np.sin(heading) + y * np.cos(heading),
+            turn,
+        ]
+        after = slider_after(model, push)
+        np.testing.assert_allclose(after.pose, by_hand, atol=1e-9)
+        assert after.in_domain == bool(expected.in_domain[0])
+
+
+def test_a_push_through_the_centre_moves_the_slider_with_the_tip() -> None:
+    after = slider_after(model_of("rect1"), push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, 0.0)))
+    assert np.all(np.abs(after.pose - [SPEED * DURATION, 0.0, 0.0]) < 1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from(sorted(OUTLINES)), st.floats(0.0, 0.999), st.floats(-1.3, 1.3), METRES, METRES, ANGLES)
+def test_turning_and_shifting_the_world_turns_and_shifts_the_outcome(
+    shape: str, contact: float, angle: float, x: float, y: float, turn: float
+) -> None:
+    edge, fraction = OUTLINES[shape].edge(np.array([contact]))
+    if not 1e-6 < fraction[0] < 1.0 - 1e-6:
+        contact = float(OUTLINES[shape].contact_on_edge(edge, 0.5)[0])  # which edge a corner belongs to: see below
+    model, push = model_of(shape), push_at(shape, contact, angle)
+    here, there = slider_after(model, push), slider_after(model, moved(push, (x, y), turn))
+    frame = np.array([x, y, turn])
+    np.testing.assert_allclose(there.pose[:2], to_world(here.pose[:2], frame), atol=1e-9)
+    assert there.pose[2] == pytest.approx(here.pose[2] + turn, abs=1e-8)
+    whole = np.eye(3)
+    whole[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    np.testing.assert_allclose(there.covariance, whole @ here.covariance @ whole.T, rtol=1e-6, atol=1e-14)
+    assert here.in_domain == there.in_domain
+
+
+@pytest.mark.parametrize("angle", [-0.5, 0.2])
+def test_the_four_sides_of_a_square_are_one(angle: float) -> None:
+    """A slider turned by a quarter looks the same, and a push that stays where it is meets another side of it."""
+    push, model = push_at("rect1", 0.05, angle), model_of("rect1", "vhgp")
+    first = slider_after(model, push)
+    for quarters in (1, 2, 3):
+        turn = np.array([0.0, 0.0, quarters * np.pi / 2.0])
+        other = slider_after(model, replace(push, slider=push.slider + turn))
+        np.testing.assert_allclose(other.pose - turn, first.pose, atol=1e-9)
+        np.testing.assert_allclose(other.covariance, first.covariance, rtol=1e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 0.999), st.floats(-1.3, 1.3), ANGLES)
+def test_the_covariance_is_that_of_samples_carried_into_the_world(contact: float, angle: float, turn: float) -> None:
+    model = model_of("ellip2")
+    push = push_at("ellip2", contact, angle, pose=(1.0, 2.0, turn))
+    after = slider_after(model, push)
+    assert np.linalg.eigvalsh(after.covariance).min() > 0.0
+    np.testing.assert_allclose(after.covariance, after.covariance.T, rtol=1e-12)
+    heading = np.arctan2(push.velocity[1], push.velocity[0])
+    along = np.array([np.cos(heading), np.sin(heading), 0.0])
+    across = np.array([-np.sin(heading), np.cos(heading), 0.0])
+    axes = np.stack([along, across, [0.0, 0.0, 1.0]])
+    in_push_frame = model.predict(np.array([[SPEED, contact, angle]]), np.array([DURATION])).covariance[0]
+    np.testing.assert_allclose(axes @ after.covariance @ axes.T, in_push_frame, rtol=1e-6, atol=1e-16)
+
+
+def test_a_covariance_off_the_diagonal_is_carried_over() -> None:
+    """Made-up predictions with a full covariance, whatever the models of today know."""
+
+    class Correlated(PushModel):
+        def predict(self, inputs, duration, covariates=None):
+            full = np.array([[4e-8, 1e-8, 3e-7], [1e-8, 1e-8, 2e-7], [3e-7, 2e-7, 3e-5]])
+            return replace(super().predict(inputs, duration, covariates), covariance=full[None])
+
+    base = model_of("rect1")
+    model = Correlated(base.name, base.kind, base.rig, base.body, base.training, base.provenance)
+    push = push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, np.pi / 2.0))  # pushed along the world's y
+    expected = np.array([[1e-8, -1e-8, -2e-7], [-1e-8, 4e-8, 3e-7], [-2e-7, 3e-7, 3e-5]])
+    np.testing.assert_allclose(slider_after(model, push).covariance, expected, atol=1e-20)
+
+
+def test_a_served_model_answers_as_its_table_does() -> None:
+    served = serve(model_of("rect1", "gp"))
+    assert isinstance(served, ServedModel) and served.tabulated
+    push = push_at("rect1", 0.1, 0.3)
+    ours = served.predict(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
+    heading = np.arctan2(push.velocity[1:], push.velocity[:1])
+    after = slider_after(served, push)
+    np.testing.assert_allclose(after.pose, displaced(push.slider[None], heading, ours.mean)[0], atol=1e-9)
+    np.testing.assert_allclose(after.covariance, covariance_in_world(ours.covariance, heading)[0], rtol=1e-6)
+
+
+# --- corners ----------------------------------------------------------------------------------------------------
+
+
+def at_corner(towards: float, driving: float) -> WorldPush:
+    """A tip at the square's corner (0.045, 0.045), off it in direction `towards`, driving in direction `driving`."""
+    tip = np.full(2, 0.045) + RADIUS * np.array([np.cos(towards), np.sin(towards)])
+    return WorldPush(np.zeros(3), tip, SPEED * np.array([np.cos(driving), np.sin(driving)]), DURATION)
+
+
+def same(one: SliderAfter, other: SliderAfter) -> None:
+    np.testing.assert_allclose(one.pose, other.pose, atol=1e-9)
+    np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-6)
+
+
+def test_at_a_corner_the_edge_that_faces_the_tip_is_pushed() -> None:
+    """Edge 2 of the square faces +x and ends at this corner; edge 3 faces +y and begins there."""
+    model, driving = model_of("rect1"), np.radians(225.0)
+    end_of_2, start_of_3 = (
+        slider_after(model, replace(push_at("rect1", c, a, pose=(0.0, 0.0, 0.0)), pusher=p))
+        for c, a, p in (
+            (0.75 - 1e-12, np.radians(45.0), at_corner(0.1, 0.0).pusher),
+            (0.75, np.radians(-45.0), at_corner(1.4, 0.0).pusher),
+        )
+    )
+    same(slider_after(model, at_corner(0.1, driving)), end_of_2)
+    same(slider_after(model, at_corner(1.4, driving)), start_of_3)
+    assert np.abs(end_of_2.pose - start_of_3.pose).max() > 1e-5
+
+
+@pytest.mark.parametrize("towards", [0.1, 0.7, 0.9, 1.4])
+def test_at_a_corner_the_other_edge_is_pushed_where_the_nearer_is_not(towards: float) -> None:
+    """Driving along -x pushes on edge 2 and slides along edge 3, whichever is nearer to the tip."""
+    model = model_of("rect1")
+    expected = model.predict(np.array([[SPEED, 0.75 - 1e-12, 0.0]]), np.array([DURATION])).mean[0]
+    after = slider_after(model, at_corner(towards, np.pi))
+    np.testing.assert_allclose(after.pose, expected * [-1.0, -1.0, 1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("driving", [0.0, np.pi / 4.0, np.pi / 2.0])
+def test_at_a_corner_moving_off_is_refused(driving: float) -> None:
+    assert "degrees off" in refusal(at_corner(np.pi / 4.0, driving))
+
+
+# --- replayed windows -------------------------------------------------------------------------------------------
+
+
+def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
+    """The tip's line at a window's start leads to the window's contact and to the same outcome."""
+    recording, served = read_recording(BAGS / "square_abs_test"), serve(model_of("rect1", "vhgp"))
+    windows = find_windows(recording, recording.rig)[::4]
+    table = windows_to_table(windows)
+    shown = served.predict(table.inputs, table.duration, table.covariates)
+    headings = np.array([window.push_heading for window in windows])
+    poses = displaced(np.array([window.slider_start for window in windows]), headings, shown.mean)
+    spreads = covariance_in_world(shown.covariance, headings)
+    pusher, origin = Track(2), int(recording.pusher.stamp[0])
+    tips = np.column_stack([recording.pusher.x, recording.pusher.y])
+    pusher.extend(pusher.order.take(recording.pusher.stamp, tips, True), origin)
+    for window, pose, spread, in_domain in zip(windows, poses, spreads, shown.in_domain, strict=True):
+        line = pusher_line(pusher, (window.start - origin) * NANOSECOND)
+        push = WorldPush(window.slider_start, line.position, line.velocity, window.duration, window.covariates)
+        after = slider_after(served, push)
+        np.testing.assert_allclose(after.pose, pose, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(after.covariance, spread, rtol=1e-5, atol=1e-15)
+        assert after.in_domain == in_domain
+    assert len(windows) > 100
+
+
+# --- covariates -------------------------------------------------------------------------------------------------
+
+
+def leaning(covariate: str) -> PushModel:
+    """A model in which dx grows with a covariate."""
+    base = model_of("rect1")
+    form = Form("linear", (covariate,), (0.0,), (1.0,))
+    effect = Effect("contact_friction", covariate, form, np.array([0.1]), np.array([[1e-4]]), np.ones(3))
+    training = replace(base.training, covariates={covariate: np.linspace(-4.0, 4.0, len(base.training))})
+    body = ExtendedBody(base.body, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
+    return replace(base, body=body, training=training)
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_the_poses_tell_need_not_be_brought(name: str) -> None:
+    model, push = leaning(name), push_at("rect1", 0.1, -0.5, gap=4e-4, pose=(0.4, -0.3, 7.0))
+    assert model.needs == (name,)
+    heading = float(np.arctan2(push.velocity[1], push.velocity[0]))
+    value = dict(zip(TOLD, (0.4, -0.3, 7.0 - 2.0 * np.pi, heading, 4e-4), strict=True))[name]
+    expected = model.predict(np.array([[SPEED, 0.1, -0.5]]), np.array([DURATION]), {name: np.array([value])})
+    after = slider_after(model, push)
+    np.testing.assert_allclose(
+        after.pose, displaced(push.slider[None], np.array([heading]), expected.mean)[0], atol=1e-9
+    )
+    same(slider_after(model, replace(push, covariates={name: value})), after)
+    if name.endswith("heading"):
+        same(slider_after(model, replace(push, covariates={name: value + 2.0 * np.pi})), after)
+
+
+@pytest.mark.parametrize("name", TOLD)
+@pytest.mark.parametrize("off", [0.01, -0.01, np.nan, np.inf])
+def test_a_covariate_that_contradicts_the_poses_is_refused(name: str, off: float) -> None:
+    push = push_at("rect1", 0.1, 0.0, pose=(0.0, 0.0, 0.0))
+    message = refusal(replace(push, covariates={name: off}))
+    assert message.startswith(f"covariate {name}: {off!r} is not accepted, give ")
+    assert "as the poses say, or leave it out" in message
+
+
+def test_what_the_poses_do_not_tell_must_be_brought() -> None:
+    model, push = leaning("elapsed_time"), push_at("rect1", 0.1, -0.5)
+    assert refusal(push, model).startswith("covariate elapsed_time: 'missing'")
+    early, late = (slider_after(model, replace(push, covariates={"elapsed_time": t})).pose for t in (0.0, 3.0))
+    assert np.abs(early - late).max() > 1e-6
+    assert not slider_after(model, replace(push, covariates={"elapsed_time": 9.0})).in_domain
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "begins"),
+    [
+        ({"slider": np.array([0.0, np.nan, 0.0])}, "slider: (0.0, nan, 0.0) is not accepted, give finite numbers"),
+        ({"pusher": np.array([np.inf, 0.0])}, "pusher: (inf, 0.0)"),
+        ({"velocity": np.array([np.nan, 0.0])}, "pusher_velocity: (nan, 0.0)"),
+        ({"velocity": np.zeros(2)}, "pusher_velocity: (0.0, 0.0) is not accepted, give a velocity above 0"),
+        ({"duration": np.nan}, "duration: nan"),
+        ({"duration": 0.0}, "duration: 0.0"),
+        ({"covariates": {"topic:/warmth": np.inf}}, "covariate topic:/warmth: inf"),
+    ],
+)
+def test_bad_values_are_refused_by_field(change: dict, begins: str) -> None:
+    assert refusal(replace(push_at("rect1", 0.1, 0.0), **change)).startswith(begins)
+
+
+def test_a_learnt_model_refuses_a_duration_that_it_never_saw() -> None:
+    assert "duration: 3.0" in refusal(replace(push_at("rect1", 0.1, 0.0), duration=3.0), model_of("rect1", "gp"))
+
+
+@pytest.mark.parametrize("shape", OUTLINES)
+def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
+    model = model_of(shape)
+    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=0.99 * LARGEST_GAP)) is not None
+    message = refusal(push_at(shape, 0.1, 0.2, gap=0.0123), model)
+    assert "the gap to the outline is 0.0123 m, up to 0.001 m is contact" in message
+    refusal(push_at(shape, 0.1, 0.2, gap=1.01 * LARGEST_GAP), model)
+
+
+@pytest.mark.parametrize("shape", OUTLINES)
+def test_contact_from_inside_is_refused(shape: str) -> None:
+    model = model_of(shape)
+    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=-0.99 * DEEPEST)) is not None
+    assert "reaches 0.004 m into the outline" in refusal(push_at(shape, 0.1, 0.2, gap=-0.004), model)
+    for angle in (0.2, np.pi - 0.2):
+        message = refusal(push_at(shape, 0.1, angle, gap=-RADIUS - 0.002), model)
+        assert "outside the slider: its centre is 0.002 m inside the outline" in message
+
+
+@pytest.mark.parametrize(("degrees", "shown"), [(90.0, "90.0"), (-100.0, "-100.0"), (135.0, "135.0"), (180.0, "180.0")])
+def test_a_tip_that_moves_away_or_along_is_refused_with_its_angle(degrees: float, shown: str) -> None:
+    message = refusal(push_at("rect1", 0.1, np.radians(degrees) * (1.0 + 1e-12), pose=(0.0, 0.0, 0.0)))
+    assert message.startswith("pusher_velocity: (")
+    assert f"it is {shown} degrees off" in message or (degrees == 180.0 and "-180.0 degrees off" in message)
+
+
+def test_an_outline_with_a_notch_is_touched_where_the_tip_is() -> None:
+    """A tip between two arms is outside, though the outline is around it."""
+    vertices = np.array([[-0.04, -0.04], [0.06, -0.04], [0.06, -0.02], [0.0, -0.02], [0.0, 0.02], [0.06, 0.02]])
+    vertices = np.vstack([vertices, [[0.06, 0.04], [-0.04, 0.04]]])
+    outline = Outline(vertices - Outline(vertices).centroid)
+    model = replace(model_of("rect1"), rig=Rig("c", outline, RADIUS, "abs", 0.8))
+    tip = np.array([RADIUS, 0.0]) - Outline(vertices).centroid
+    push = WorldPush(np.zeros(3), tip, np.array([-SPEED, 0.0]), DURATION)
+    expected = model.predict(np.array([[SPEED, *contact_and_angle(outline, tip)]]), np.array([DURATION])).mean[0]
+    np.testing.assert_allclose(slider_after(model, push).pose, expected * [-1.0, -1.0, 1.0], atol=1e-9)
+
+
+def contact_and_angle(outline: Outline, tip: np.ndarray) -> tuple[float, float]:
+    nearest = outline.project(tip[None])
+    normal = nearest.normal[0]
+    return float(nearest.contact[0]), float(wrap_angle(np.pi - np.arctan2(-normal[1], -normal[0])))

@@ -1,0 +1,546 @@
+"""Bags in all the forms that rosbag2 and others write them, whole and damaged; and others read ours."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.writer import CompressionType, IndexType, Writer
+
+from push_predictor.errors import RecordingError, RigError
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
+from push_predictor.recordings.bag.definitions import FLOAT64, POSE, WRENCH, MessageType
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.bag.writer import BagWriter
+from push_predictor.recordings.read import TopicNames, read_recording, require_rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.write import write_recording
+
+N = 40
+STAMP = 1_700_000_000_000_000_000 + 4_000_000 * np.arange(N, dtype=np.int64)
+POSES = np.column_stack([0.001 * np.arange(N), np.zeros((N, 5)), np.ones(N)])
+Topics = dict[str, tuple[MessageType, list[bytes]]]
+
+
+def pose_topics(frame_id: str = "world") -> Topics:
+    messages = encode(STAMP, POSES, POSE_STAMPED, frame_id)
+    return {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
+
+
+def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options: object) -> Path:
+    """A file by the mcap package's own writer; metadata=(name, record) goes to its end, encoding is the channels'."""
+    metadata, encoding = options.pop("metadata", None), str(options.pop("encoding", "cdr"))
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2")
+        channels = {}
+        for name, (kind, _) in topics.items():
+            schema = writer.register_schema(kind.name, "ros2msg", kind.definition.encode())
+            channels[name] = writer.register_channel(name, encoding, schema)
+        for i, t in enumerate(stamp.tolist()):
+            for name, (_, messages) in topics.items():
+                if i < len(messages):
+                    writer.add_message(channels[name], t, messages[i], t)
+        if metadata:
+            writer.add_metadata(*metadata)
+        writer.finish()
+    return path
+
+
+def test_a_file_and_a_folder_with_and_without_metadata_yaml_read_alike(recording: Recording, tmp_path: Path) -> None:
+    write_recording(tmp_path / "push", recording)
+    shutil.copytree(tmp_path / "push", tmp_path / "copy")
+    (tmp_path / "copy" / "metadata.yaml").unlink()
+    whole, unlisted = read_recording(tmp_path / "push"), read_recording(tmp_path / "copy")
+    bare = read_recording(tmp_path / "push" / "push_0.mcap")
+    assert (whole.name, unlisted.name, bare.name) == ("push", "copy", "push_0")
+    for other in (unlisted, bare):
+        np.testing.assert_array_equal(other.slider.x, whole.slider.x)
+        assert other.rig is not None and whole.rig is not None
+        assert other.rig.to_record() == whole.rig.to_record()
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_several_files_are_read_in_the_bags_order(tmp_path: Path, listed: bool) -> None:
+    """By number, so that file 10 comes after file 2; or as metadata.yaml has them."""
+    parts = [2, 10, 1] if listed else [1, 2, 10]
+    for place, part in enumerate(parts):
+        one = {k: (kind, m[place : place + 1]) for k, (kind, m) in pose_topics().items()}
+        write_mcap(tmp_path / f"bag_{part}.mcap", one)
+    if listed:
+        described = {"storage_identifier": "mcap", "relative_file_paths": [f"bag/bag_{part}.mcap" for part in parts]}
+        (tmp_path / "metadata.yaml").write_text(yaml.safe_dump({"rosbag2_bagfile_information": described}))
+    np.testing.assert_array_equal(read_recording(tmp_path).slider.stamp, STAMP[:3])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"compression": CompressionType.ZSTD, "chunk_size": 500},
+        {"compression": CompressionType.LZ4, "chunk_size": 500},
+        {"compression": CompressionType.NONE},
+        {"use_chunking": False, "use_statistics": False, "index_types": IndexType.NONE, "repeat_channels": False},
+        {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False},
+        {"use_statistics": False, "enable_crcs": False},
+    ],
+    ids=["zstd", "lz4", "none", "unchunked", "no index", "no statistics"],
+)
+def test_every_way_of_packing_an_mcap_file_is_accepted(
+    tmp_path: Path, recording: Recording, options: dict[str, object]
+) -> None:
+    """The rig stands at the file's end; it is found with the index and without."""
+    assert recording.rig is not None
+    record = ("push_rig", recording.rig.to_record())
+    path = write_mcap(tmp_path / "a.mcap", pose_topics(), metadata=record, **options)
+    assert open_bag(path).topics == {"/pusher/pose": POSE.name, "/slider/pose": POSE.name}
+    read = read_recording(path)
+    assert read.notes == ()
+    assert read.rig is not None and read.rig.to_record() == recording.rig.to_record()
+    np.testing.assert_array_equal(read.slider.x, POSES[:, 0])
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+def test_all_that_stands_before_a_cut_is_used_and_the_cut_is_noted(
+    recording: Recording, tmp_path: Path, compression: str
+) -> None:
+    write_recording(tmp_path / "whole.mcap", recording, compression=compression)
+    data = (tmp_path / "whole.mcap").read_bytes()
+    whole = [m.data for m in open_bag(tmp_path / "whole.mcap").messages()]
+    path = tmp_path / "cut.mcap"
+    counts = []
+    for share in (0.3, 0.6, 0.8, 0.95):
+        path.write_bytes(data[: int(len(data) * share)])
+        bag = open_bag(path)
+        kept = [m.data for m in bag.messages()]
+        assert kept == whole[: len(kept)]
+        assert any("cut.mcap at byte" in note for note in bag.notes) or kept == whole
+        counts.append(len(kept))
+    assert counts == sorted(counts)
+    assert counts[2] > 0
+
+
+def test_a_file_without_its_last_bytes_loses_no_message(recording: Recording, tmp_path: Path) -> None:
+    """A recorder that is killed writes no summary and no end."""
+    write_recording(tmp_path / "a.mcap", recording)
+    data = (tmp_path / "a.mcap").read_bytes()
+    whole = [m.data for m in open_bag(tmp_path / "a.mcap").messages()]
+    (tmp_path / "a.mcap").write_bytes(data[:-50])
+    assert [m.data for m in open_bag(tmp_path / "a.mcap").messages()] == whole
+    assert read_recording(tmp_path / "a.mcap").rig is not None
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+def test_a_damaged_chunk_is_left_out_and_noted(tmp_path: Path, compression: CompressionType) -> None:
+    path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
+    offsets = chunk_offsets(path)
+    data = bytearray(path.read_bytes())
+    hit = slice(offsets[2] + 80, offsets[2] + 110)
+    data[hit] = bytes(byte ^ 0xA5 for byte in data[hit])
+    path.write_bytes(data)
+    read = read_recording(path)
+    assert 0 < len(read.slider) < N
+    assert set(read.slider.stamp.tolist()) < set(STAMP.tolist())
+    skipped, counted = read.notes
+    assert f"a.mcap at byte {offsets[2]}: a chunk was skipped" in skipped
+    assert f"messages were found, the summary counts {2 * N}" in counted
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
+)
+def test_no_damage_whatever_is_more_than_a_note_or_a_recording_error(
+    hits: list[tuple[float, int]], data: st.DataObject
+) -> None:
+    compression = data.draw(st.sampled_from([CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE]))
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_mcap(Path(folder) / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
+        damaged = bytearray(path.read_bytes())
+        for place, change in hits:
+            damaged[int(place * len(damaged))] ^= change
+        path.write_bytes(damaged)
+        try:
+            read = read_recording(path)
+        except (RecordingError, RigError):
+            return
+        assert len(read.slider) <= N
+        assert len(read.slider) == N or read.notes or len(hits) > 1  # the summary may be hit as well
+
+
+def chunk_offsets(path: Path) -> list[int]:
+    from mcap.reader import make_reader
+
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    return [index.chunk_start_offset for index in summary.chunk_indexes]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "the file is empty"),
+        (b"velocity,contact\n1,2\n", "not an MCAP file"),
+        (b"#ROSBAG V2.0\n" + b"x" * 50, "ROS 1 bag"),
+        (b"SQLite format 3\0" + b"x" * 50, "sqlite3 bag"),
+        (b"\x89MCAP0\r\n", "no topic /slider/pose and /pusher/pose"),
+        (b"\x89MCAP0\r\n" + b"\xff" * 200, "no topic /slider/pose"),
+    ],
+)
+def test_a_file_that_is_no_recording_is_named_and_told_what_it_is(tmp_path: Path, content: bytes, told: str) -> None:
+    (tmp_path / "thing.mcap").write_bytes(content)
+    with pytest.raises(RecordingError, match=f"thing.mcap: .*{told}"):
+        read_recording(tmp_path / "thing.mcap")
+
+
+def test_a_folder_without_recordings_and_a_path_to_nothing_are_errors(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"holds no \.mcap file"):
+        read_recording(tmp_path)
+    with pytest.raises(RecordingError, match=r"absent\.mcap: cannot be read"):
+        read_recording(tmp_path / "absent.mcap")
+
+
+def test_a_missing_topic_is_told_with_the_topics_that_are_there(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "a.mcap", {"/vicon/square/square": pose_topics()["/slider/pose"]})
+    with pytest.raises(RecordingError, match=r"no topic /slider/pose and /pusher/pose .*/vicon/square/square"):
+        read_recording(path)
+
+
+def test_topics_can_have_other_names(tmp_path: Path) -> None:
+    topics = {"/vicon/square/square": pose_topics()["/slider/pose"], "/tip": pose_topics()["/pusher/pose"]}
+    path = write_mcap(tmp_path / "a.mcap", topics)
+    read = read_recording(path, topics=TopicNames(slider="vicon/square/square", pusher="/tip"))
+    assert len(read.slider) == len(read.pusher) == N
+
+
+def test_a_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
+    poses = pose_topics()
+    wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6], WRENCH_STAMPED))}
+    with pytest.raises(RecordingError, match="topic /slider/pose is of type 'geometry_msgs/msg/WrenchStamped'"):
+        read_recording(write_mcap(tmp_path / "wrong.mcap", wrong))
+    with pytest.raises(RecordingError, match="/pose is encoded as 'json', cdr is accepted"):
+        read_recording(write_mcap(tmp_path / "json.mcap", poses, encoding="json"))
+    with pytest.raises(RecordingError, match="topic /pusher/pose holds no message"):
+        read_recording(write_mcap(tmp_path / "none.mcap", {**poses, "/pusher/pose": (POSE, [])}))
+
+
+def test_samples_that_say_nothing_are_dropped_and_counted(tmp_path: Path) -> None:
+    values = POSES.copy()
+    values[3, 0], values[5, 1], values[7, 3:] = np.nan, np.inf, 0.0
+    messages = encode(STAMP, values, POSE_STAMPED)
+    messages[9] = messages[9][:40]
+    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/slider/pose": (POSE, messages)})
+    read = read_recording(path)
+    np.testing.assert_array_equal(read.slider.stamp, np.delete(STAMP, [3, 5, 7, 9]))
+    assert any("/slider/pose: 3 samples" in note for note in read.notes)
+    assert any("/slider/pose: 1 messages" in note for note in read.notes)
+    assert len(read.pusher) == N
+
+
+def test_a_tip_needs_no_orientation(tmp_path: Path) -> None:
+    values = POSES.copy()
+    values[:, 3:] = 0.0
+    tip = {"/pusher/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **tip})
+    read = read_recording(path)
+    np.testing.assert_array_equal(read.pusher.x, POSES[:, 0])
+    assert any("/pusher/pose: 40 samples have no orientation" in note for note in read.notes)
+
+
+def test_a_quaternion_gives_its_heading_whatever_its_length_and_sign(tmp_path: Path) -> None:
+    heading = np.linspace(-3.1, 3.1, N)
+    values = POSES.copy()
+    values[:, 5], values[:, 6] = -1.7 * np.sin(heading / 2.0), -1.7 * np.cos(heading / 2.0)
+    turned = {"/slider/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
+    path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), **turned})
+    np.testing.assert_allclose(read_recording(path).slider.heading, heading, atol=1e-14)
+
+
+def test_another_frame_is_noted(tmp_path: Path) -> None:
+    read = read_recording(write_mcap(tmp_path / "a.mcap", pose_topics("vicon")))
+    assert any("/slider/pose: frame_id 'vicon', taken for 'world'" in note for note in read.notes)
+
+
+def test_header_stamps_count_not_log_times_and_file_order_is_kept(tmp_path: Path) -> None:
+    stamp = STAMP.copy()
+    stamp[[4, 5]] = stamp[[5, 4]]
+    messages = encode(stamp, POSES, POSE_STAMPED)
+    topics = {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
+    path = write_mcap(tmp_path / "a.mcap", topics, STAMP + 7)
+    np.testing.assert_array_equal(read_recording(path).slider.stamp, stamp)
+
+
+def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
+    value = np.linspace(20.0, 21.0, N)[:, None]
+    other = STAMP - 10**9
+    with_variance = encode(other, np.column_stack([value, 0.0 * value]), Layout(header=True, count=2), "sensor")
+
+    def kind(name: str) -> MessageType:
+        return MessageType(name, "", "")
+
+    topics: Topics = {
+        "/float64": (FLOAT64, encode(STAMP, value, Layout(False, 1))),
+        "/float32": (kind("std_msgs/msg/Float32"), encode(STAMP, value, Layout(False, 1, 4))),
+        "/temperature": (kind("sensor_msgs/msg/Temperature"), with_variance),
+        "/humidity": (kind("sensor_msgs/msg/RelativeHumidity"), with_variance),
+        "/pressure": (kind("sensor_msgs/msg/FluidPressure"), with_variance),
+        "/unused": (FLOAT64, []),
+        "/words": (kind("std_msgs/msg/String"), [b"\0\1\0\0\2\0\0\0a\0"]),
+    }
+    scalars = read_recording(write_mcap(tmp_path / "a.mcap", {**pose_topics(), **topics})).scalars
+    assert set(scalars) == {"/float64", "/float32", "/temperature", "/humidity", "/pressure"}
+    for name, scalar in scalars.items():
+        np.testing.assert_allclose(scalar.value, value[:, 0], rtol=1e-7 if name == "/float32" else 0.0)
+        np.testing.assert_array_equal(scalar.stamp, STAMP if "float" in name else other)
+
+
+def test_a_rig_that_is_missing_is_told_with_how_to_give_it(tmp_path: Path, recording: Recording) -> None:
+    path = write_mcap(tmp_path / "a.mcap", pose_topics())
+    with pytest.raises(
+        RigError, match=r"no push_rig record; give it with --rig FILE\.yaml or the node parameter 'rig'"
+    ):
+        require_rig(read_recording(path))
+    assert require_rig(read_recording(path, rig=recording.rig)) is recording.rig
+
+
+@pytest.mark.parametrize("form", ["json", "mapping", "keys"])
+def test_the_rig_may_stand_in_custom_data_of_metadata_yaml(tmp_path: Path, recording: Recording, form: str) -> None:
+    assert recording.rig is not None
+    record = recording.rig.to_record()
+    custom = {"json": {"push_rig": json.dumps(record)}, "mapping": {"push_rig": record}, "keys": record}[form]
+    write_mcap(tmp_path / "a_0.mcap", pose_topics())
+    described = {"storage_identifier": "mcap", "relative_file_paths": ["a_0.mcap"], "custom_data": custom}
+    (tmp_path / "metadata.yaml").write_text(yaml.safe_dump({"rosbag2_bagfile_information": described}))
+    assert require_rig(read_recording(tmp_path)).to_record() == record
+
+
+def test_the_rig_may_stand_in_the_copy_of_metadata_yaml_that_rosbag2_keeps_in_the_file(
+    tmp_path: Path, recording: Recording
+) -> None:
+    assert recording.rig is not None
+    custom = {"custom_data": {"push_rig": json.dumps(recording.rig.to_record())}}
+    record = ("rosbag2", {"serialized_metadata": yaml.safe_dump(custom)})
+    path = write_mcap(tmp_path / "a.mcap", pose_topics(), metadata=record)
+    assert require_rig(read_recording(path)).to_record() == recording.rig.to_record()
+
+
+def test_two_rigs_that_differ_are_noted_and_the_files_own_counts(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a", recording)
+    text = (tmp_path / "a" / "metadata.yaml").read_text()
+    (tmp_path / "a" / "metadata.yaml").write_text(text.replace("plywood", "delrin"))
+    read = read_recording(tmp_path / "a")
+    assert require_rig(read).surface == "plywood"
+    assert any("push_rig in metadata.yaml differs" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("text", ["{", "rosbag2_bagfile_information: 3", "other: {}", ""])
+def test_a_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, text: str) -> None:
+    write_recording(tmp_path / "a", recording)
+    (tmp_path / "a" / "metadata.yaml").write_text(text)
+    read = read_recording(tmp_path / "a")
+    assert len(read.slider) == len(recording.slider)
+    assert any("metadata.yaml: cannot be read" in note for note in read.notes)
+
+
+def test_a_listed_file_that_is_gone_is_noted(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a", recording)
+    text = (tmp_path / "a" / "metadata.yaml").read_text()
+    listed = "  relative_file_paths:\n  - a_0.mcap\n"
+    assert listed in text
+    (tmp_path / "a" / "metadata.yaml").write_text(text.replace(listed, listed + "  - a_1.mcap\n"))
+    assert any("a_1.mcap is in metadata.yaml but not there" in note for note in read_recording(tmp_path / "a").notes)
+
+
+# Writing
+
+
+def test_a_failed_write_leaves_the_earlier_bag_and_nothing_beside_it(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a", recording)
+    before = (tmp_path / "a" / "a_0.mcap").read_bytes()
+    with pytest.raises(RuntimeError, match="power cut"), BagWriter(tmp_path / "a") as writer:
+        writer.add_topic("x", FLOAT64.name, FLOAT64.definition)
+        raise RuntimeError("power cut")
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a" / "a_0.mcap").read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["a", "a.mcap"])
+def test_an_earlier_bag_is_replaced(tmp_path: Path, recording: Recording, name: str) -> None:
+    write_recording(tmp_path / name, recording)
+    write_recording(tmp_path / name, replace(recording, wrench=None))
+    assert read_recording(tmp_path / name).wrench is None
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path: Path, recording: Recording) -> None:
+    (tmp_path / "notes.txt").write_text("dear diary")
+    with pytest.raises(RecordingError, match="exists and is not a bag"):
+        write_recording(tmp_path, recording)
+    assert (tmp_path / "notes.txt").read_text() == "dear diary"
+
+
+def test_what_cannot_be_written_is_refused(tmp_path: Path, recording: Recording) -> None:
+    with pytest.raises(RecordingError, match="compression: 'rar', give one of zstd, lz4, none"):
+        write_recording(tmp_path / "a", recording, compression="rar")
+    early = replace(recording, pusher=replace(recording.pusher, stamp=recording.pusher.stamp - 2 * 10**18))
+    with pytest.raises(RecordingError, match="/pusher/pose stamp -"):
+        write_recording(tmp_path / "a", early)
+    late = replace(recording, slider=replace(recording.slider, stamp=recording.slider.stamp * 4))
+    with pytest.raises(RecordingError, match="seconds of 32 bits"):
+        write_recording(tmp_path / "a", late)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        write_recording(tmp_path / "file" / "a", recording)
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_messages_stand_in_order_of_log_time_which_is_the_header_stamp(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a.mcap", recording)
+    messages = list(open_bag(tmp_path / "a.mcap").messages())
+    times = [m.log_time for m in messages]
+    assert times == sorted(times)
+    slider = [m for m in messages if m.topic == "/slider/pose"]
+    assert [m.log_time for m in slider] == recording.slider.stamp.tolist()
+
+
+def test_metadata_yaml_is_what_jazzys_rosbag2_asks_for(tmp_path: Path, recording: Recording) -> None:
+    """The keys are those that rosbag2_storage/yaml.hpp reads; custom_data must be text throughout."""
+    write_recording(tmp_path / "a", recording)
+    told = yaml.safe_load((tmp_path / "a" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert (told["version"], told["storage_identifier"], told["ros_distro"]) == (9, "mcap", "jazzy")
+    counts = {t["topic_metadata"]["name"]: t["message_count"] for t in told["topics_with_message_count"]}
+    assert counts == {"/slider/pose": 250, "/pusher/pose": 250, "/pusher/wrench": 250, "/table/temperature": 10}
+    assert told["message_count"] == told["files"][0]["message_count"] == 760
+    assert told["relative_file_paths"] == [told["files"][0]["path"]] == ["a_0.mcap"]
+    assert told["starting_time"]["nanoseconds_since_epoch"] == recording.slider.stamp[0]
+    last = recording.pusher.stamp[-1] + 1_000_000
+    assert told["duration"]["nanoseconds"] == last - recording.slider.stamp[0]
+    assert (told["compression_format"], told["compression_mode"]) == ("", "")
+    assert all(isinstance(value, str) for value in told["custom_data"].values())
+    for topic in told["topics_with_message_count"]:
+        described = topic["topic_metadata"]
+        assert described["serialization_format"] == "cdr" and described["type_description_hash"].startswith("RIHS01_")
+        (qos,) = described["offered_qos_profiles"]
+        assert (qos["reliability"], qos["history"], qos["durability"]) == ("reliable", "keep_last", "volatile")
+
+
+# Others read it
+
+
+def test_the_mcap_packages_decoder_reads_it(tmp_path: Path, recording: Recording) -> None:
+    reader = pytest.importorskip("mcap_ros2.reader")
+    write_recording(tmp_path / "a.mcap", recording)
+    found = list(reader.read_ros2_messages(str(tmp_path / "a.mcap"), topics=["/slider/pose"]))
+    assert [m.ros_msg.pose.position.x for m in found] == recording.slider.x.tolist()
+    assert {m.ros_msg.header.frame_id for m in found} == {"world"}
+    force = [m.ros_msg for m in reader.read_ros2_messages(str(tmp_path / "a.mcap"), topics=["/pusher/wrench"])]
+    assert recording.wrench is not None
+    assert [m.wrench.force.y for m in force] == recording.wrench.fy.tolist()
+
+
+def test_rosbags_reads_it_and_we_read_what_rosbags_writes(tmp_path: Path, recording: Recording) -> None:
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    write_recording(tmp_path / "a", recording)
+    with rosbag2.Reader(tmp_path / "a") as reader:
+        assert {c.topic: c.msgtype for c in reader.connections} == open_bag(tmp_path / "a").topics
+        assert all(len(c.ext.offered_qos_profiles) == 1 for c in reader.connections)
+        messages = list(reader.messages())
+        first = store.deserialize_cdr(messages[0][2], messages[0][0].msgtype)
+    assert first.pose.position.z == recording.slider.z[0]
+    with rosbag2.Writer(tmp_path / "b", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        topics = {
+            c.topic: writer.add_connection(c.topic, c.msgtype, typestore=store)
+            for c in {m[0].topic: m[0] for m in messages}.values()
+        }
+        for connection, stamp, data in messages:
+            writer.write(topics[connection.topic], stamp, data)
+    again = read_recording(tmp_path / "b")
+    np.testing.assert_array_equal(again.slider.heading, read_recording(tmp_path / "a").slider.heading)
+    assert set(again.scalars) == {"/table/temperature"}
+
+
+@pytest.mark.parametrize("mode", ["MESSAGE", "FILE"])
+def test_what_rosbag2_compresses_on_top_of_mcap_is_unpacked(tmp_path: Path, recording: Recording, mode: str) -> None:
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    write_recording(tmp_path / "plain", recording)
+    bag = open_bag(tmp_path / "plain")
+    writer = rosbag2.Writer(tmp_path / "packed", version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+    writer.set_compression(rosbag2.CompressionMode[mode], rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        topics = {name: writer.add_connection(name, kind, typestore=store) for name, kind in bag.topics.items()}
+        for message in bag.messages():
+            writer.write(topics[message.topic], message.log_time, message.data)
+    read = read_recording(tmp_path / "packed")
+    assert read.notes == ()
+    np.testing.assert_array_equal(read.slider.x, recording.slider.x)
+    if mode == "FILE":
+        (tmp_path / "packed" / "packed.mcap.zstd").write_bytes(b"no zstd")
+        with pytest.raises(RecordingError, match=r"packed\.mcap\.zstd: cannot be unpacked"):
+            read_recording(tmp_path / "packed")
+
+
+def test_messages_that_cannot_be_unpacked_are_dropped_and_counted(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "a", recording)
+    text = (tmp_path / "a" / "metadata.yaml").read_text()
+    told = text.replace("compression_format: ''", "compression_format: zstd")
+    (tmp_path / "a" / "metadata.yaml").write_text(told.replace("compression_mode: ''", "compression_mode: MESSAGE"))
+    bag = open_bag(tmp_path / "a")
+    assert list(bag.messages()) == []
+    (note,) = bag.notes
+    assert re.fullmatch(r".*a_0\.mcap at byte \d+: 760 messages cannot be unpacked and were dropped", note)
+
+
+def test_definitions_and_hashes_are_those_of_ros(tmp_path: Path) -> None:
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    for kind in (POSE, WRENCH, FLOAT64):
+        parsed = typesys.get_types_from_msg(kind.definition, kind.name)
+        assert set(parsed) <= set(store.fielddefs)
+        assert store.hash_rihs01(kind.name) == kind.type_hash
+        ours = typesys.get_typestore(typesys.Stores.EMPTY)
+        ours.register(parsed)
+        assert ours.hash_rihs01(kind.name) == kind.type_hash
+
+
+def test_a_file_whose_summary_is_cut_off_is_whole_but_says_so(tmp_path: Path, recording: Recording) -> None:
+    write_recording(tmp_path / "whole.mcap", recording)
+    data = (tmp_path / "whole.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[:-30])
+    cut = read_recording(tmp_path / "cut.mcap")
+    assert len(cut.slider) == len(recording.slider)
+    assert any("cut.mcap" in note and "end of the file is missing" in note for note in cut.notes)
+    assert read_recording(tmp_path / "whole.mcap").notes == ()
+
+
+def test_rclpy_reads_our_bytes_and_writes_the_same() -> None:
+    serialization = pytest.importorskip("rclpy.serialization")
+    from geometry_msgs.msg import PoseStamped, WrenchStamped
+    from std_msgs.msg import Float64
+
+    values = np.arange(1.0, 8.0)[None]
+    ours = encode(STAMP[1:2], values, POSE_STAMPED)[0]
+    pose = serialization.deserialize_message(ours, PoseStamped)
+    assert (pose.header.stamp.sec, pose.header.stamp.nanosec) == divmod(int(STAMP[1]), 10**9)
+    assert (pose.header.frame_id, pose.pose.position.y, pose.pose.orientation.w) == ("world", 2.0, 7.0)
+    wrench = encode(STAMP[1:2], values[:, :6], WRENCH_STAMPED)[0]
+    scalar = encode(STAMP[1:2], values[:, :1], Layout(False, 1))[0]
+    for data, kind in ((ours, PoseStamped), (wrench, WrenchStamped), (scalar, Float64)):
+        theirs = serialization.serialize_message(serialization.deserialize_message(data, kind))
+        padding = slice(22, 28) if kind is not Float64 else slice(0, 0)  # left uninitialised by Fast CDR
+        assert bytearray(theirs)[: padding.start] == bytearray(data)[: padding.start]
+        assert theirs[padding.stop :] == data[padding.stop :]

@@ -1,0 +1,164 @@
+"""What is written as a recording is read back: the same streams, whatever they hold and however they are packed."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import hypothesis.extra.numpy as arrays
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from push_predictor.recordings.bag.cdr import Layout, decode, encode
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
+from push_predictor.recordings.write import write_recording
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+STAMP = st.integers(0, 2_000_000_000 * 10**9)
+COMPRESSIONS = ("zstd", "lz4", "none")
+
+
+def columns(count: int, n: int, elements: st.SearchStrategy[float] = FINITE) -> st.SearchStrategy[np.ndarray]:
+    return arrays.arrays(np.float64, (count, n), elements=elements)
+
+
+@st.composite
+def stamps(draw: st.DrawFn, least: int = 1) -> np.ndarray:
+    return np.array(draw(st.lists(STAMP, min_size=least, max_size=12)), dtype=np.int64)
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> PoseStream:
+    stamp = draw(stamps())
+    headings = st.floats(-10.0, 10.0)
+    return PoseStream(stamp, *draw(columns(3, len(stamp))), *draw(columns(1, len(stamp), headings)))
+
+
+@st.composite
+def wrenches(draw: st.DrawFn) -> WrenchStream:
+    stamp = draw(stamps())
+    return WrenchStream(stamp, *draw(columns(3, len(stamp))))
+
+
+@st.composite
+def scalars(draw: st.DrawFn) -> ScalarStream:
+    stamp = draw(stamps())
+    return ScalarStream(stamp, *draw(columns(1, len(stamp))))
+
+
+recordings = st.builds(
+    Recording,
+    st.just("any"),
+    st.none(),
+    poses(),
+    poses(),
+    st.none() | wrenches(),
+    st.dictionaries(st.sampled_from(["/room/temperature", "/belt", "/a/b/c"]), scalars(), max_size=2),
+)
+
+
+def assert_same_pose(read: PoseStream, written: PoseStream) -> None:
+    for name in ("stamp", "x", "y", "z"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(written, name), err_msg=name)
+    turn = read.heading - written.heading
+    np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-14)
+    np.testing.assert_allclose(np.sin(turn), 0.0, atol=1e-13)
+
+
+@settings(max_examples=60, deadline=None)
+@given(recordings, st.sampled_from(COMPRESSIONS), st.booleans())
+def test_any_recording_reads_back_as_it_was_written(written: Recording, compression: str, bare: bool) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / ("any.mcap" if bare else "any")
+        write_recording(path, written, compression=compression)
+        read = read_recording(path)
+    assert (read.name, read.rig, read.notes) == ("any", None, ())
+    assert_same_pose(read.slider, written.slider)
+    assert_same_pose(read.pusher, written.pusher)
+    assert (read.wrench is None) == (written.wrench is None)
+    if read.wrench is not None and written.wrench is not None:
+        for name in ("stamp", "fx", "fy", "torque"):
+            np.testing.assert_array_equal(getattr(read.wrench, name), getattr(written.wrench, name), err_msg=name)
+    assert set(read.scalars) == set(written.scalars)
+
+
+@settings(max_examples=30, deadline=None)
+@given(scalars())
+def test_a_scalar_without_header_is_stamped_by_log_time_and_so_comes_in_order_of_time(scalar: ScalarStream) -> None:
+    nothing = PoseStream(np.zeros(1, np.int64), *np.zeros((4, 1)))
+    with tempfile.TemporaryDirectory() as folder:
+        write_recording(Path(folder) / "a.mcap", Recording("a", None, nothing, nothing, None, {"/s": scalar}))
+        read = read_recording(Path(folder) / "a.mcap").scalars["/s"]
+    order = np.argsort(scalar.stamp, kind="stable")
+    np.testing.assert_array_equal(read.stamp, scalar.stamp[order])
+    np.testing.assert_array_equal(read.value, scalar.value[order])
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_the_rig_and_all_streams_of_a_push_survive(recording: Recording, tmp_path: Path, compression: str) -> None:
+    write_recording(tmp_path / "push", recording, compression=compression)
+    read = read_recording(tmp_path / "push")
+    assert recording.rig is not None and read.rig is not None
+    assert read.rig.to_record() == recording.rig.to_record()
+    assert_same_pose(read.slider, recording.slider)
+    np.testing.assert_array_equal(
+        read.scalars["/table/temperature"].value, recording.scalars["/table/temperature"].value
+    )
+
+
+@pytest.mark.parametrize("name", ["push", "push.mcap"])
+def test_the_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Path, name: str) -> None:
+    for folder in ("first", "second"):
+        write_recording(tmp_path / folder / name, recording)
+    first, second = ([p for p in sorted((tmp_path / k).rglob("*")) if p.is_file()] for k in ("first", "second"))
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+    assert [p.name for p in first] == (["metadata.yaml", "push_0.mcap"] if name == "push" else ["push.mcap"])
+
+
+LAYOUTS = st.builds(Layout, st.booleans(), st.integers(1, 7), st.just(8)) | st.just(Layout(False, 1, 4))
+
+
+@settings(max_examples=80, deadline=None)
+@given(stamps(0), LAYOUTS, st.text(max_size=20), st.data())
+def test_columns_survive_cdr_with_any_frame_id(
+    stamp: np.ndarray, layout: Layout, frame: str, data: st.DataObject
+) -> None:
+    frame = frame.replace("\0", "")
+    values = data.draw(columns(len(stamp), layout.count, st.floats(width=8 * layout.size)))
+    decoded = decode(encode(stamp, values, layout, frame), layout)
+    np.testing.assert_array_equal(decoded.values, values)
+    np.testing.assert_array_equal(decoded.stamp, stamp if layout.header else np.zeros_like(stamp))
+    assert decoded.valid.all()
+    assert decoded.frames == (frozenset({frame}) if layout.header and len(stamp) else frozenset())
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.binary(max_size=100), max_size=10), LAYOUTS)
+def test_no_bytes_whatever_break_the_decoder(messages: list[bytes], layout: Layout) -> None:
+    decoded = decode(messages, layout)
+    assert decoded.values.shape == (len(messages), layout.count)
+    assert not decoded.valid[[len(m) < 4 + layout.count * layout.size for m in messages]].any()
+
+
+def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_places() -> None:
+    layout = Layout(header=True, count=2)
+    stamp, values = np.arange(6, dtype=np.int64) * 10**9 + 5, np.arange(12.0).reshape(6, 2)
+    frames = ["", "w", "world", "a_long_frame_name", "world", "w"]
+    messages = [encode(stamp[i : i + 1], values[i : i + 1], layout, frames[i])[0] for i in range(6)]
+    messages[2] = big_endian(messages[2], len("world") + 1)
+    messages[4] = messages[4][:-9]
+    decoded = decode(messages, layout)
+    assert decoded.valid.tolist() == [True, True, True, True, False, True]
+    np.testing.assert_array_equal(decoded.values[decoded.valid], values[decoded.valid])
+    np.testing.assert_array_equal(decoded.stamp[decoded.valid], stamp[decoded.valid])
+
+
+def big_endian(message: bytes, frame_length: int) -> bytes:
+    """The same message in the other byte order."""
+    start = Layout(header=True, count=2).start(frame_length)
+    words = np.frombuffer(message[4:16], "<u4").astype(">u4").tobytes()
+    numbers = np.frombuffer(message[start:], "<f8").astype(">f8").tobytes()
+    return b"\0\0\0\0" + words + message[16:start] + numbers

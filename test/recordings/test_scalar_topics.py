@@ -1,0 +1,223 @@
+"""What a scalar topic is worth when a window begins: the same read at once and while everything arrives."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
+
+from msg_adapters import scalars
+from msg_adapters.scalars import ScalarInbox, SentTimes
+from push_predictor.nodes.validator import stream_sync as stream_pace
+from push_predictor.nodes.validator.sensor_subscriber import Samples
+from push_predictor.nodes.validator.stream_sync import StreamPace
+from push_predictor.recordings.streams import Recording, ScalarStream
+from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.scalars import ScalarTrack
+from push_predictor.types import Array
+
+SECOND = 10**9
+WARMTH = "/warmth"
+
+
+def stream(*samples: tuple[float, float]) -> ScalarStream:
+    """(time s, value) pairs."""
+    time, value = np.array(samples, dtype=np.float64).reshape(-1, 2).T
+    return ScalarStream(stamps(time), value)
+
+
+def track(*samples: tuple[float, float]) -> ScalarTrack:
+    found = ScalarTrack()
+    found.add(stream(*samples))
+    return found
+
+
+def at(found: ScalarTrack, time: float) -> float | None:
+    return found.at(START + round(time * SECOND))
+
+
+# --- one topic -------------------------------------------------------------------------------------------------------
+
+
+def test_the_value_is_linear_between_samples_and_constant_beyond_them() -> None:
+    warmth = track((1.0, 10.0), (2.0, 20.0), (4.0, 0.0))
+    assert [at(warmth, time) for time in (0.0, 1.0, 1.25, 2.0, 3.5, 4.0, 90.0)] == [10, 10, 12.5, 20, 5, 0, 0]
+    assert at(ScalarTrack(), 1.0) is None
+
+
+def test_over_a_long_gap_it_keeps_what_was_sent_last() -> None:
+    warmth = track((0.0, 1.0), (5.0, 2.0), (10.1, 3.0))
+    assert at(warmth, 2.5) == 1.5
+    assert [at(warmth, time) for time in (5.1, 10.0)] == [2.0, 2.0]
+
+
+def test_samples_that_do_not_come_later_are_refused_and_counted() -> None:
+    warmth = track((1.0, 1.0), (1.0, 5.0), (0.9, 6.0), (2.0, 2.0))
+    warmth.add(stream((2.0, 7.0), (3.0, 3.0)))
+    assert warmth.refused == 3
+    assert [at(warmth, time) for time in (1.0, 1.5, 2.5)] == [1.0, 1.5, 2.5]
+
+
+def test_a_clock_that_is_set_back_begins_it_anew() -> None:
+    warmth = track((100.0, 1.0), (101.0, 2.0), (3.0, 7.0))
+    assert at(warmth, 100.0) == 7.0 and not warmth.passed(START + 4 * SECOND)
+    warmth.add(stream((5.0, 9.0)))
+    assert at(warmth, 4.0) == 8.0
+
+
+def test_what_is_forgotten_makes_no_difference_later() -> None:
+    samples = [(0.1 * k, float(k % 7)) for k in range(100)]
+    whole, part = track(*samples), track(*samples)
+    part.forget_before(START + round(5.05 * SECOND))
+    assert [at(part, time) for time in (5.05, 6.3, 20.0)] == [at(whole, time) for time in (5.05, 6.3, 20.0)]
+
+
+# --- windows ---------------------------------------------------------------------------------------------------------
+
+
+def with_warmth(scalar: ScalarStream) -> Recording:
+    return replace(translating_push(), scalars={WARMTH: scalar})
+
+
+def warmth_of(windows: list[PushWindow]) -> list[float | None]:
+    return [window.covariates.get(f"topic:{WARMTH}") for window in windows]
+
+
+def fed(recording: Recording, finder: WindowFinder, begin: float, end: float) -> None:
+    """The sensors' samples from begin to end (s), the scalars not."""
+    low, high = START + round(begin * SECOND), START + round(end * SECOND)
+    wrench = recording.wrench
+    assert wrench is not None
+    finder.add_wrench(wrench_rows(wrench, (wrench.stamp >= low) & (wrench.stamp < high)))
+    finder.add_pusher(rows(recording.pusher, (recording.pusher.stamp >= low) & (recording.pusher.stamp < high)))
+    finder.add_slider(rows(recording.slider, (recording.slider.stamp >= low) & (recording.slider.stamp < high)))
+
+
+def part(scalar: ScalarStream, begin: float, end: float) -> ScalarStream:
+    inside = (scalar.stamp >= START + round(begin * SECOND)) & (scalar.stamp < START + round(end * SECOND))
+    return ScalarStream(scalar.stamp[inside], scalar.value[inside])
+
+
+def noisy(rate: float, seed: int = 0) -> ScalarStream:
+    time: Array = np.arange(0.0, 4.0, 1.0 / rate)
+    return ScalarStream(stamps(time), np.random.default_rng(seed).standard_normal(len(time)))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.35, 1.7], ids="late by {} s".format)
+@pytest.mark.parametrize("rate", [40.0, 1.3])
+def test_in_portions_it_is_the_same_as_at_once_however_late_it_comes(late: float, rate: float) -> None:
+    recording = with_warmth(noisy(rate))
+    expected, finder, found = find_windows(recording, square_rig()), WindowFinder(square_rig()), []
+    assert len({*warmth_of(expected)}) == len(expected) > 3
+    for time in np.arange(0.0, 6.0, 0.05):
+        finder.add_scalar(WARMTH, part(recording.scalars[WARMTH], time - late, time - late + 0.05))
+        fed(recording, finder, time, time + 0.05)
+        found += finder.take_ready()
+    found += finder.finish()
+    assert [window.start for window in found] == [window.start for window in expected]
+    assert warmth_of(found) == warmth_of(expected)
+
+
+def test_a_window_waits_for_the_sample_after_its_start_but_not_for_ever() -> None:
+    recording = replace(translating_push(Push(0.5, 1.6), tail=8.0), scalars={WARMTH: stream((0.0, 1.0))})
+    finder, count = WindowFinder(square_rig()), len(find_windows(recording, square_rig()))
+    finder.add_scalar(WARMTH, recording.scalars[WARMTH])
+    fed(recording, finder, 0.0, 5.0)
+    assert finder.take_ready() == []
+    fed(recording, finder, 5.0, 8.0)
+    windows = finder.take_ready()
+    assert warmth_of(windows) == [1.0] * count and count > 3
+
+
+def test_a_topic_that_has_said_nothing_gives_no_covariate() -> None:
+    recording, finder = translating_push(), WindowFinder(square_rig())
+    finder.add_scalar(WARMTH, stream())
+    fed(recording, finder, 0.0, 10.0)
+    assert finder.take_ready() == []
+    windows = finder.finish()
+    assert windows and warmth_of(windows) == [None] * len(windows)
+
+
+# --- what arrives ----------------------------------------------------------------------------------------------------
+
+
+def tick(seconds: int, rest: int, order: str = "<") -> bytes:
+    return bytes([0, order == "<", 0, 0]) + struct.pack(f"{order}iI", seconds, rest)
+
+
+def test_a_message_is_dated_by_the_last_tick_before_it() -> None:
+    times = SentTimes()
+    times.put(tick(7, 5), 100)
+    times.put(tick(8, 6, ">"), 200)
+    assert [times.at(sent) for sent in (99, 100, 199, 200, 300)] == [
+        None,
+        7 * SECOND + 5,
+        7 * SECOND + 5,
+        *[8 * SECOND + 6] * 2,
+    ]
+    assert times.newest == 200
+
+
+def float64(value: float) -> bytes:
+    return b"\0\1\0\0" + struct.pack("<d", value)
+
+
+def test_messages_wait_until_their_time_can_be_told() -> None:
+    inbox = ScalarInbox("std_msgs/msg/Float64")
+    for k in range(4):
+        inbox.put(float64(k), 10 * k)
+    taken = inbox.take(20, lambda sent: 1000 + sent if sent else None, None)
+    assert (taken.stamp.tolist(), taken.value.tolist()) == ([1010], [1.0])
+    assert dict(inbox.rejected) == {"without time": 1} and len(inbox) == 2
+    assert inbox.take(10**9, lambda sent: sent, None).value.tolist() == [2.0, 3.0]
+    assert len(inbox.take(10**9, lambda sent: sent, None)) == 0
+
+
+def test_useless_messages_are_counted_by_kind() -> None:
+    inbox = ScalarInbox("std_msgs/msg/Float32")
+    for data in (b"\0\1\0\0" + struct.pack("<f", 0.5), b"\0\1", b"\0\1\0\0" + struct.pack("<f", np.inf)):
+        inbox.put(data, 5)
+    assert inbox.take(9, lambda sent: sent, None).value.tolist() == [0.5]
+    assert dict(inbox.rejected) == {"unreadable": 1, "not finite": 1}
+
+
+def test_a_full_inbox_drops_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scalars, "LIMIT", 100)
+    inbox = ScalarInbox("std_msgs/msg/Float64")
+    for k in range(305):
+        inbox.put(float64(k), k)
+    taken = inbox.take(1000, lambda sent: sent, None)
+    assert len(taken) <= 100 and len(taken) + inbox.rejected["dropped"] == 305 and taken.value[-1] == 304.0
+
+
+def samples(recording: Recording, end: float, **named: float) -> Samples:
+    """Sensors up to `end` s, each scalar with one sample at its time."""
+    last = recording.slider.stamp < START + round(end * SECOND)
+    none = wrench_rows(recording.wrench, np.arange(0)) if recording.wrench else None
+    assert none is not None
+    found = {f"/{name}": stream((time, 0.0)) for name, time in named.items()}
+    return Samples(rows(recording.slider, last), rows(recording.pusher, last), none, found)
+
+
+def test_a_scalar_that_is_behind_is_waited_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(stream_pace, "monotonic", lambda: now[0])
+    recording = translating_push(Push(0.5, 8.0))
+    pace = StreamPace(["/warmth", "/absent"])
+    pace.note(samples(recording, 1.0, warmth=0.9))
+    assert not pace.in_step(), "/absent may only be late"
+    now[0] += 5.1
+    assert pace.in_step()
+    pace.note(samples(recording, 6.0))
+    assert not pace.in_step(), "/warmth is 5 s behind"
+    pace.note(samples(recording, 6.0, warmth=5.0))
+    assert pace.in_step()
+    pace.note(samples(recording, 8.5))
+    now[0] += 1.0
+    assert not pace.in_step()
+    now[0] += 4.1
+    assert pace.in_step(), "it has ended"

@@ -1,0 +1,267 @@
+"""What a push window is, on recordings whose truth is known."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, wrench_rows
+
+from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
+
+
+def windows_of(recording: Recording, options: WindowOptions | None = None) -> list[PushWindow]:
+    assert recording.rig is not None
+    return find_windows(recording, recording.rig, options)
+
+
+def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
+    windows = windows_of(translating_push(Push(begin=0.5, end=1.6)))
+    starts = np.array([(w.start - START) * 1e-9 for w in windows])
+    assert starts == pytest.approx(0.5 + 0.2 * np.arange(5), abs=0.011)  # within a sample of the touch
+    assert all(a.end == b.start for a, b in itertools.pairwise(windows))
+    assert {w.push_id for w in windows} == {windows[0].push_id}
+    assert [w.index for w in windows] == [0, 1, 2, 3, 4]
+
+
+def test_a_translating_slider_moves_along_the_push_and_nowhere_else() -> None:
+    for window in windows_of(translating_push(Push(speed=0.03), contact=0.4)):
+        assert window.displacement == pytest.approx([0.006, 0.0, 0.0], abs=1e-12)
+        assert (window.velocity, window.contact) == pytest.approx((0.03, 0.4), abs=1e-9)
+        assert window.angle == pytest.approx(0.0, abs=1e-9)
+        assert window.duration == pytest.approx(0.2, abs=1e-12)
+
+
+def test_the_force_on_the_slider_is_what_it_exerts_on_the_pusher_turned_round() -> None:
+    for window in windows_of(translating_push()):
+        assert window.covariates["normal_force"] == pytest.approx(2.0, abs=0.2)
+        assert window.covariates["tangential_force"] == pytest.approx(0.0, abs=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    shift=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
+    turn=st.floats(-7.0, 7.0),
+    contact=st.floats(0.0, 0.999),
+)
+def test_windows_do_not_depend_on_where_the_world_frame_lies(
+    shift: tuple[float, float], turn: float, contact: float
+) -> None:
+    here = translating_push(contact=contact)
+    there = moved(here, np.array(shift), turn)
+    for a, b in zip(windows_of(here), windows_of(there), strict=True):
+        assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-9)
+        assert a.displacement == pytest.approx(b.displacement, abs=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(cuts=st.lists(st.integers(1, 239), max_size=12, unique=True), order=st.permutations(range(3)))
+def test_portions_and_interleaving_do_not_matter(cuts: list[int], order: list[int]) -> None:
+    recording = translating_push()
+    assert recording.rig is not None and recording.wrench is not None
+    finder = WindowFinder(recording.rig)
+    found = []
+    edges = [0, *sorted(cuts), len(recording.slider)]
+    for first, last in itertools.pairwise(edges):
+        keep = np.arange(first, min(last, len(recording.slider)))
+        feeds = [
+            lambda keep=keep: finder.add_slider(rows(recording.slider, keep)),
+            lambda keep=keep: finder.add_pusher(rows(recording.pusher, keep)),
+            lambda keep=keep: finder.add_wrench(wrench_rows(recording.wrench, keep)),
+        ]
+        for k in order:
+            feeds[k]()
+            found += finder.take_ready()
+    found += finder.finish()
+    whole = windows_of(recording)
+    assert [(w.start, w.push_id, w.index) for w in found] == [(w.start, w.push_id, w.index) for w in whole]
+    for a, b in zip(found, whole, strict=True):
+        assert a.displacement == pytest.approx(b.displacement, abs=1e-12)
+        assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-12)
+
+
+def test_a_finer_sampling_gives_the_same_windows() -> None:
+    coarse, fine = windows_of(translating_push(rate=100.0)), windows_of(translating_push(rate=500.0))
+    assert len(coarse) == len(fine)
+    for a, b in zip(coarse, fine, strict=True):
+        assert (a.start - b.start) * 1e-9 == pytest.approx(0.0, abs=0.011)
+        assert a.displacement == pytest.approx(b.displacement, abs=1e-9)
+
+
+@pytest.mark.parametrize("stream", ["slider", "pusher", "wrench"])
+def test_no_window_spans_a_dropout(stream: str) -> None:
+    recording = translating_push(Push(begin=0.5, end=2.5))
+    time = (getattr(recording, stream).stamp - START) * 1e-9
+    keep = (time < 1.2) | (time > 1.26)  # 60 ms without samples, six periods
+    take = wrench_rows if stream == "wrench" else rows
+    windows = windows_of(replace(recording, **{stream: take(getattr(recording, stream), keep)}))
+    assert windows and all((w.end - START) * 1e-9 < 1.22 or (w.start - START) * 1e-9 > 1.2 for w in windows)
+    assert len({w.push_id for w in windows}) == 1  # one push all the same: its windows are not independent
+
+
+def test_a_gap_of_three_periods_is_no_dropout() -> None:
+    recording = translating_push(Push(begin=0.5, end=2.5))
+    time = (recording.slider.stamp - START) * 1e-9
+    gappy = replace(recording, slider=rows(recording.slider, (time < 1.195) | (time > 1.215)))
+    assert len(windows_of(gappy)) == len(windows_of(recording))
+
+
+def test_a_reset_of_the_slider_ends_the_push() -> None:
+    recording = translating_push(Push(begin=0.5, end=2.5))
+    time = (recording.slider.stamp - START) * 1e-9
+    late = time > 1.5
+
+    def put_elsewhere(stream: PoseStream) -> PoseStream:
+        return PoseStream(stream.stamp, stream.x + 0.1 * late, stream.y, stream.z, stream.heading)
+
+    jumped = replace(recording, slider=put_elsewhere(recording.slider), pusher=put_elsewhere(recording.pusher))
+    windows = windows_of(jumped)
+    assert all(np.hypot(*w.displacement[:2]) < 0.005 for w in windows)
+    assert len({w.push_id for w in windows}) == 2
+
+
+def test_a_lifted_tip_is_not_in_contact() -> None:
+    recording = translating_push()
+    pusher = recording.pusher
+    lifted = PoseStream(pusher.stamp, pusher.x, pusher.y, pusher.z + 0.05, pusher.heading)
+    assert windows_of(replace(recording, pusher=lifted)) == []
+
+
+def test_no_force_means_no_contact_however_near_the_tip() -> None:
+    recording = translating_push()
+    assert recording.wrench is not None
+    silent = replace(recording.wrench, fx=0.0 * recording.wrench.fx, fy=0.0 * recording.wrench.fy)
+    assert windows_of(replace(recording, wrench=silent)) == []
+
+
+def test_a_bias_of_the_sensor_is_not_contact() -> None:
+    recording = translating_push(Push(begin=0.7, end=1.6))
+    assert recording.wrench is not None
+    biased = replace(recording.wrench, fx=recording.wrench.fx + 5.0, fy=recording.wrench.fy - 3.0)
+    same = windows_of(replace(recording, wrench=biased))
+    assert [w.start for w in same] == [w.start for w in windows_of(recording)]
+
+
+@pytest.mark.parametrize("speed", [0.005, 0.02, 0.1])
+def test_without_a_wrench_contact_begins_where_the_gap_shrinks_no_more(speed: float) -> None:
+    push = Push(begin=0.8, end=2.1, speed=speed)
+    windows = windows_of(replace(translating_push(push), wrench=None))
+    assert len(windows) == 6
+    assert (windows[0].start - START) * 1e-9 == pytest.approx(push.begin, abs=0.021)
+    assert all(window.displacement[0] >= 0.9 * 0.2 * speed for window in windows)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_push_from_rest_in_contact_has_a_first_window_of_its_own_motion(seed: int) -> None:
+    rng, rate = np.random.default_rng(seed), 250.0
+    time = np.arange(0.0, 2.5, 1.0 / rate)
+    driven = 0.02 * np.maximum(time - 1.0, 0.0)  # at rest in contact for a second, then 20 mm/s at once
+    rig = translating_push().rig
+    assert rig is not None
+    slider = np.column_stack([driven, np.zeros_like(time)])
+    pusher = slider - [0.045 + rig.pusher_radius, 0.0] + 3e-5 * rng.standard_normal(slider.shape)
+    still = np.zeros_like(time)
+    recording = Recording("rest", rig, pose_stream(time, slider, still), pose_stream(time, pusher, still), None)
+    first = windows_of(recording)[0]
+    assert first.velocity == pytest.approx(0.02, rel=0.5)  # the fit may hold the moment of setting off
+    assert abs(first.angle) < 0.45
+    assert first.displacement[0] > 0.9 * 0.004
+
+
+def test_two_contacts_are_two_pushes() -> None:
+    first, second = translating_push(), translating_push()
+    assert first.wrench is not None and second.wrench is not None
+    shift = int(first.slider.stamp[-1] - first.slider.stamp[0]) + 10_000_000
+
+    def joined(a: PoseStream, b: PoseStream) -> PoseStream:
+        return PoseStream(
+            np.concatenate([a.stamp, b.stamp + shift]),
+            *(np.concatenate([getattr(a, k), getattr(b, k)]) for k in ("x", "y", "z", "heading")),
+        )
+
+    wrench = replace(
+        first.wrench,
+        stamp=np.concatenate([first.wrench.stamp, second.wrench.stamp + shift]),
+        **{k: np.tile(getattr(first.wrench, k), 2) for k in ("fx", "fy", "torque")},
+    )
+    both = replace(
+        first, slider=joined(first.slider, second.slider), pusher=joined(first.pusher, second.pusher), wrench=wrench
+    )
+    table = windows_to_table(windows_of(both))
+    assert len(table.pushes) == 2
+    assert len(table) == 2 * len(windows_of(first))
+
+
+def test_a_stride_overlaps_windows_for_training() -> None:
+    tiled, overlapping = windows_of(translating_push()), windows_of(translating_push(), WindowOptions(stride=0.05))
+    assert len(overlapping) > 3 * len(tiled)
+    assert all(b.start - a.start == 50_000_000 for a, b in itertools.pairwise(overlapping))
+
+
+def test_late_and_repeated_stamps_are_refused_and_counted() -> None:
+    recording = translating_push()
+    assert recording.rig is not None and recording.wrench is not None
+    finder = WindowFinder(recording.rig)
+    shuffled = np.r_[0:50, 45:50, 50:100, 80, 100 : len(recording.slider)]
+    finder.add_slider(rows(recording.slider, shuffled))
+    finder.add_pusher(recording.pusher)
+    finder.add_wrench(recording.wrench)
+    assert [w.start for w in finder.finish()] == [w.start for w in windows_of(recording)]
+    assert finder.counts["refused"] == 6
+
+
+def test_a_clock_set_back_begins_anew_and_loses_no_window() -> None:
+    recording = translating_push()
+    assert recording.rig is not None and recording.wrench is not None
+    finder = WindowFinder(recording.rig)
+    found = []
+    for _ in range(3):  # as a looped replay does
+        finder.add_wrench(recording.wrench)
+        finder.add_pusher(recording.pusher)
+        finder.add_slider(recording.slider)
+        found += finder.take_ready()
+    found += finder.finish()
+    assert finder.counts["clock_set_back"] >= 2
+    assert len(found) == 3 * len(windows_of(recording))
+
+
+def test_at_a_vertex_the_contact_belongs_to_the_edge_it_slid_along() -> None:
+    recording = translating_push(Push(begin=0.5, end=2.5))
+    rig = recording.rig
+    assert rig is not None
+    time = (recording.slider.stamp - START) * 1e-9
+    # The slider recedes as fast as the tip advances, while the tip slides along the first side and beyond its end.
+    speed = 0.025
+    advance = speed * (time - 0.5)
+    y = -0.035 - speed * np.clip(time - 0.5, 0.0, 0.52)
+    pusher = pose_stream(time, np.column_stack([advance - 0.045 - rig.pusher_radius, y]), np.zeros_like(time))
+    slider = pose_stream(time, np.column_stack([advance, np.zeros_like(time)]), np.zeros_like(time))
+    sliding = replace(recording, slider=slider, pusher=pusher, wrench=None)
+    table = windows_to_table(windows_of(sliding, WindowOptions(touch_gap_alone=0.002)))
+    beyond = table.inputs[:, 1] > 0.2499
+    assert np.sum(beyond) >= 2
+    assert np.all(table.covariates["edge"] == 0.0) and np.all(table.inputs[:, 1] < 0.25)
+
+
+def test_memory_stays_bounded_over_a_long_stream() -> None:
+    recording = translating_push()
+    assert recording.rig is not None and recording.wrench is not None
+    finder = WindowFinder(recording.rig)
+    span = int(recording.slider.stamp[-1] - recording.slider.stamp[0]) + 10_000_000
+    for k in range(30):
+        finder.add_wrench(replace(recording.wrench, stamp=recording.wrench.stamp + k * span))
+        finder.add_pusher(replace(recording.pusher, stamp=recording.pusher.stamp + k * span))
+        finder.add_slider(replace(recording.slider, stamp=recording.slider.stamp + k * span))
+        finder.take_ready()
+    assert max(len(track) for track in finder._tracks.values()) < 2 * len(recording.slider)
+
+
+def test_stamps_keep_their_nanoseconds() -> None:
+    window = windows_of(translating_push())[0]
+    assert window.start in stamps(np.arange(0.0, 3.0, 0.01)).tolist()

@@ -1,0 +1,136 @@
+"""Recorded time runs at a rate, pauses, jumps, and wakes those who sleep on it."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_predictor.replay.clock import COARSE, SECOND, PlayerClock, SystemWall
+from push_predictor.replay.lateness import Lateness
+
+
+class FakeWall:
+    """Time that passes only when somebody sleeps; a wait without end is the test's mistake."""
+
+    def __init__(self) -> None:
+        self.time = 0
+        self.sleeps: list[int] = []
+
+    def now(self) -> int:
+        return self.time
+
+    def sleep(self, duration: int) -> None:
+        self.sleeps.append(duration)
+        self.time += duration
+
+    def wait(self, condition: threading.Condition, duration: int | None) -> None:
+        assert duration is not None, "would wait for ever"
+        self.time += duration
+
+
+def sleep_through(clock: PlayerClock, recorded: int) -> int:
+    looks = 1
+    while not clock.sleep_until(recorded, clock.generation):
+        looks += 1
+    return looks
+
+
+@given(rate=st.floats(0.01, 100.0), recorded=st.integers(0, 3600 * SECOND))
+def test_sleeping_takes_the_recorded_time_divided_by_the_rate(rate: float, recorded: int) -> None:
+    wall = FakeWall()
+    clock = PlayerClock(wall, rate)
+    sleep_through(clock, recorded)
+    assert wall.time == pytest.approx(recorded / rate, abs=1.0)
+    assert clock.now() == pytest.approx(recorded, abs=rate + 1.0)
+
+
+def test_deadlines_are_absolute_so_that_lateness_does_not_add_up() -> None:
+    wall = FakeWall()
+    clock = PlayerClock(wall)
+    for k in range(1, 101):
+        sleep_through(clock, k * 1_000_000)
+        assert wall.time == k * 1_000_000
+        wall.time += 300_000  # publishing takes its time
+
+
+def test_a_paused_clock_stands_still_and_goes_on_where_it_stood() -> None:
+    wall = FakeWall()
+    clock = PlayerClock(wall)
+    wall.time = 5 * SECOND
+    clock.pause()
+    wall.time = 9 * SECOND
+    assert clock.now() == 5 * SECOND
+    clock.resume()
+    wall.time = 10 * SECOND
+    assert clock.now() == 6 * SECOND
+    assert clock.deadline(7 * SECOND) == 11 * SECOND
+
+
+def test_a_new_rate_counts_from_now_on() -> None:
+    wall = FakeWall()
+    clock = PlayerClock(wall)
+    wall.time = 2 * SECOND
+    clock.set_rate(10.0)
+    wall.time = 3 * SECOND
+    assert clock.now() == 12 * SECOND
+
+
+def test_a_jump_moves_recorded_time_and_keeps_a_pause() -> None:
+    clock = PlayerClock(FakeWall(), paused=True)
+    clock.jump(42 * SECOND)
+    assert clock.paused
+    assert clock.now() == 42 * SECOND
+
+
+def test_a_control_that_came_before_the_sleep_is_not_slept_over() -> None:
+    wall = FakeWall()
+    clock = PlayerClock(wall)
+    seen = clock.generation
+    clock.jump(0)
+    assert not clock.sleep_until(SECOND, seen)
+    assert wall.time == 0
+
+
+def test_the_last_stretch_is_one_plain_sleep() -> None:
+    wall = FakeWall()
+    sleep_through(PlayerClock(wall), 10 * SECOND)
+    assert len(wall.sleeps) == 1
+    assert wall.sleeps[0] <= COARSE
+
+
+@pytest.mark.parametrize("control", ["pause", "interrupt", "jump"])
+def test_a_control_wakes_a_long_sleep(control: str) -> None:
+    clock = PlayerClock(SystemWall())
+    arguments = [0] if control == "jump" else []
+    timer = threading.Timer(0.05, getattr(clock, control), arguments)
+    timer.start()
+    begin = time.monotonic()
+    assert not clock.sleep_until(60 * SECOND, clock.generation)
+    assert time.monotonic() - begin < 5.0
+    timer.join()
+
+
+def test_spinning_ends_no_earlier_than_the_deadline() -> None:
+    wall = SystemWall()
+    clock = PlayerClock(wall, spin=500_000)
+    begin = wall.now()
+    assert clock.sleep_until(clock.now() + 5_000_000, clock.generation)
+    assert wall.now() - begin >= 4_900_000
+
+
+@given(st.lists(st.integers(0, 10**11), min_size=1, max_size=200), st.sampled_from([0.5, 0.9, 0.99, 1.0]))
+def test_percentiles_of_lateness_are_right_to_a_bin(values: list[int], share: float) -> None:
+    lateness = Lateness()
+    for value in values:
+        lateness.add(value)
+    exact = sorted(values)[max(0, -(-round(share * 1000) * len(values) // 1000) - 1)]
+    assert exact <= max(2, lateness.percentile(share)) <= max(2.0, 1.045 * exact)
+    assert lateness.maximum == max(values)
+
+
+def test_no_lateness_is_zero() -> None:
+    assert Lateness().percentile(0.99) == 0.0

@@ -1,0 +1,293 @@
+"""The play loop on a fake clock: what goes out, when, in which order, and what each control does."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_predictor.recordings.bag.reader import RawMessage
+from push_predictor.replay.clock import SECOND, PlayerClock
+from push_predictor.replay.player import Outlet, ReplayPlayer
+from push_predictor.replay.range import PlayRange
+from push_predictor.replay.source import ReadAhead
+
+START = 1000 * SECOND
+
+
+def message(seconds: float, topic: str = "/t") -> RawMessage:
+    return RawMessage(topic, "std_msgs/msg/String", START + round(seconds * SECOND), f"{seconds}".encode())
+
+
+class ListSource:
+    start = START
+
+    def __init__(self, messages: list[RawMessage]) -> None:
+        self.recorded = messages
+
+    def messages(self, start: int) -> Iterator[RawMessage]:
+        return (m for m in self.recorded if m.log_time >= start)
+
+
+class Stage:
+    """A player over fake time. script: {published so far: what to do then}; a wait without end closes the player."""
+
+    def __init__(self, messages: list[RawMessage], **options: object) -> None:
+        self.time = 0
+        self.script: dict[int, list[str | tuple[str, object]]] = {}
+        self.when_stuck: list[tuple[str, object] | str] = []
+        self.log: list[tuple[float, RawMessage]] = []
+        self.states: list[str] = []
+        self.settled: list[int] = []
+        self.cost = 0
+        self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
+        outlet = Outlet(
+            lambda message: None, self.publish, lambda: self.settled.append(len(self.log)), self.states.append
+        )
+        settings = {"window": 10, "loop": False, "delay": 0, **options}
+        self.player = ReplayPlayer(ListSource(messages), self.clock, self, outlet, **settings)
+
+    def now(self) -> int:
+        return self.time
+
+    def sleep(self, duration: int) -> None:
+        self.time += duration
+
+    def wait(self, condition: threading.Condition, duration: int | None) -> None:
+        if duration is not None:
+            self.time += duration
+            return
+        assert condition is not None
+        self.do(self.when_stuck.pop(0) if self.when_stuck else "close")
+
+    def publish(self, sent: RawMessage) -> bool:
+        self.log.append((self.time / SECOND, sent))
+        self.time += self.cost
+        for action in self.script.pop(len(self.log), []):
+            self.do(action)
+        return True
+
+    def do(self, action: str | tuple[str, object]) -> None:
+        name, *arguments = [action] if isinstance(action, str) else action
+        result = getattr(self.player, str(name))(*arguments)
+        self.answers = [*getattr(self, "answers", []), result]
+
+    def run(self, what: PlayRange | None = None) -> list[float]:
+        """Recorded seconds of what was published."""
+        assert self.player.play(what or PlayRange())
+        thread = threading.Thread(target=self.player.run)
+        thread.start()
+        thread.join(10.0)
+        assert not thread.is_alive(), "the player hangs"
+        return self.seconds
+
+    @property
+    def seconds(self) -> list[float]:
+        return [(m.log_time - START) / SECOND for _, m in self.log]
+
+    @property
+    def times(self) -> list[float]:
+        return [wall for wall, _ in self.log]
+
+
+TEN = [message(k / 10) for k in range(10)]
+TENTHS = [k / 10 for k in range(10)]
+
+
+@given(rate=st.floats(0.1, 50.0), gaps=st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20))
+def test_every_message_goes_out_at_its_recorded_time_over_the_rate(rate: float, gaps: list[float]) -> None:
+    at = [sum(gaps[: k + 1]) for k in range(len(gaps))]
+    stage = Stage([message(t) for t in at], rate=rate)
+    stage.run()
+    assert stage.times == pytest.approx([t / rate for t in at], abs=1e-6)
+    assert stage.states == ["playing", "finished"]
+    assert stage.player.lateness.maximum <= 1
+
+
+def test_a_slow_publisher_makes_messages_late_but_loses_none_and_says_so() -> None:
+    stage = Stage(TEN)
+    stage.cost = round(0.15 * SECOND)
+    assert stage.run() == TENTHS
+    assert stage.player.lateness.maximum == pytest.approx(0.6 * SECOND, rel=0.01)
+
+
+@given(st.permutations(range(10)))
+def test_messages_are_sorted_within_the_window(order: list[int]) -> None:
+    stage = Stage([TEN[k] for k in order], window=10)
+    assert stage.run() == TENTHS
+
+
+def test_out_of_order_beyond_the_window_is_published_all_the_same() -> None:
+    stage = Stage([*TEN[1:], TEN[0]], window=3)
+    assert sorted(stage.run()) == TENTHS
+
+
+def test_messages_of_one_time_keep_their_order() -> None:
+    stage = Stage([message(0.5, topic) for topic in ("/b", "/a", "/c")])
+    stage.run()
+    assert [m.topic for _, m in stage.log] == ["/b", "/a", "/c"]
+
+
+@pytest.mark.parametrize(
+    ("what", "expected"),
+    [
+        (PlayRange(offset=SECOND // 2), TENTHS[5:]),
+        (PlayRange(duration=SECOND // 5), TENTHS[:3]),
+        (PlayRange(until=START + SECOND // 10), TENTHS[:2]),
+        (PlayRange(offset=SECOND // 2, duration=SECOND // 10), TENTHS[5:7]),
+        (PlayRange(duration=SECOND // 10, until=START + SECOND // 2), TENTHS[:6]),  # the later of the two
+        (PlayRange(offset=20 * SECOND), []),
+    ],
+)
+def test_a_range_is_played_from_its_offset_to_its_end_inclusive(what: PlayRange, expected: list[float]) -> None:
+    stage = Stage(TEN)
+    assert stage.run(what) == expected
+    assert stage.states[-1] == "finished"
+
+
+def test_an_offset_is_not_waited_for() -> None:
+    stage = Stage(TEN)
+    stage.run(PlayRange(offset=SECOND // 2))
+    assert stage.times[0] == 0.0
+
+
+def test_delay_comes_before_each_loop() -> None:
+    stage = Stage(TEN[:2], loop=True, delay=3 * SECOND)
+    stage.script[4] = ["stop"]
+    assert stage.run() == [0.0, 0.1, 0.0, 0.1]
+    assert stage.times == pytest.approx([3.0, 3.1, 6.1, 6.2])
+
+
+def test_a_loop_over_nothing_ends() -> None:
+    assert Stage([], loop=True).run() == []
+
+
+def test_finished_is_said_after_the_subscribers_have_everything() -> None:
+    stage = Stage(TEN)
+    stage.run()
+    assert stage.settled == [10]
+
+
+def test_pause_holds_the_next_message_and_resume_sends_it_when_due() -> None:
+    stage = Stage(TEN)
+    stage.script[3] = ["pause"]
+    stage.when_stuck = ["resume"]
+    assert stage.run() == TENTHS
+    assert stage.states == ["playing", "paused", "playing", "finished"]
+    assert stage.times == pytest.approx(TENTHS)
+
+
+def test_start_paused_waits_for_play_next_and_burst() -> None:
+    stage = Stage(TEN, paused=True)
+    stage.when_stuck = ["play_next", ("burst", 3), ("burst", 0)]
+    assert stage.run() == TENTHS
+    assert stage.answers[:3] == [True, 3, 6]
+    assert stage.times == [0.0] * 10
+    assert stage.states == ["paused", "finished"]
+
+
+def test_after_a_burst_the_rest_comes_at_its_pace() -> None:
+    stage = Stage(TEN, paused=True)
+    stage.when_stuck = [("burst", 5), "resume"]
+    stage.run()
+    assert stage.times == pytest.approx([0.0] * 5 + [0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+def test_play_next_and_burst_do_nothing_while_playing() -> None:
+    stage = Stage(TEN)
+    stage.script[2] = ["play_next", ("burst", 3)]
+    assert stage.run() == TENTHS
+    assert stage.answers[:2] == [False, 0]
+
+
+def test_seek_goes_forward_and_back_without_waiting() -> None:
+    stage = Stage(TEN)
+    stage.script[2] = [("seek", START + 8 * SECOND // 10)]
+    stage.script[4] = [("seek", START + 9 * SECOND // 10)]
+    assert stage.run() == [0.0, 0.1, 0.8, 0.9, 0.9]
+    assert stage.times == pytest.approx([0.0, 0.1, 0.1, 0.2, 0.2])
+
+
+def test_seek_before_the_start_means_the_start() -> None:
+    stage = Stage(TEN)
+    stage.script[3] = [("seek", 0)]
+    assert stage.run() == [0.0, 0.1, 0.2, *TENTHS]
+
+
+def test_seek_after_the_end_plays_from_there() -> None:
+    stage = Stage(TEN)
+    stage.when_stuck = [("seek", START + 7 * SECOND // 10)]
+    assert stage.run() == [*TENTHS, 0.7, 0.8, 0.9]
+    assert stage.states == ["playing", "finished", "playing", "finished"]
+
+
+def test_play_begins_again_only_when_nothing_is_playing() -> None:
+    stage = Stage(TEN)
+    stage.script[2] = [("play", PlayRange())]
+    stage.when_stuck = [("play", PlayRange(offset=SECOND // 2))]
+    assert stage.run() == [*TENTHS, *TENTHS[5:]]
+    assert stage.answers[:2] == [False, True]
+
+
+def test_stop_ends_the_playback() -> None:
+    stage = Stage(TEN)
+    stage.script[4] = ["stop"]
+    assert stage.run() == TENTHS[:4]
+    assert stage.states == ["playing", "finished"]
+
+
+def test_stop_ends_a_pause() -> None:
+    stage = Stage(TEN, paused=True)
+    stage.when_stuck = ["stop"]
+    assert stage.run() == []
+    assert stage.states == ["paused", "finished"]
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_rate_that_is_not_positive_is_refused(rate: float) -> None:
+    stage = Stage(TEN)
+    assert not stage.player.set_rate(rate)
+    assert stage.player.rate == 1.0
+
+
+def test_a_new_rate_holds_from_the_next_message_on() -> None:
+    stage = Stage(TEN)
+    stage.script[5] = [("set_rate", 10.0)]
+    stage.run()
+    assert stage.times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.41, 0.42, 0.43, 0.44, 0.45])
+
+
+def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
+    stage = Stage(TEN)
+    stage.cost = SECOND
+    seen: list[int | None] = []
+
+    def look(sent: RawMessage) -> bool:
+        done = stage.publish(sent)
+        stage.player.tell_time(seen.append)  # late by now, so that the clock alone would be far ahead
+        return done
+
+    stage.player._outlet = Outlet(lambda message: None, look, lambda: None, stage.states.append)
+    stage.run()
+    assert seen == [*(m.log_time for m in TEN[1:]), TEN[-1].log_time]
+
+
+def test_half_a_window_is_read_without_time_and_all_of_it_with() -> None:
+    read: list[RawMessage] = []
+
+    def source() -> Iterator[RawMessage]:
+        for one in TEN:
+            read.append(one)
+            yield one
+
+    ahead = ReadAhead(source(), 4)
+    assert len(read) == 4
+    for _ in range(3):
+        ahead.pop()
+    ahead.fill(lambda: False)
+    assert len(read) == 5
+    ahead.fill(lambda: True)
+    assert len(read) == 7

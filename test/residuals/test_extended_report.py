@@ -1,0 +1,123 @@
+"""The report of an extended model: its maps are drawn at covariates that are named."""
+
+from __future__ import annotations
+
+import html
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from repository import BAGS
+
+from push_predictor.cli import main
+from push_predictor.evaluation.report.figures.readme import readme_picture
+from push_predictor.evaluation.report.map_conditions import covariates_of_map, held_covariates, held_in_words
+from push_predictor.evaluation.report.maps import fine_cells, push_map
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, PushModel
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.table import PushTable
+
+BAG = BAGS / "hexagon_delrin"
+DRIFT = Form("linear", ("elapsed_time",), (30.0,), (20.0,))
+AHEAD = Form("periodic", ("push_heading",))
+
+
+def slippery() -> Effect:
+    """A contact friction that changes by 0.2 in 20 s."""
+    return Effect("contact_friction", "elapsed_time", DRIFT, np.array([0.2]), np.array([[0.01]]), np.ones(3))
+
+
+def grain() -> Effect:
+    body = "anisotropic_friction", "push_heading", Form("constant")
+    return Effect(*body, np.array([0.2, 0.1]), 1e-3 * np.eye(2), np.ones(3))
+
+
+def headed() -> Effect:
+    """A contact friction that differs with the heading of the push."""
+    return Effect("contact_friction", "push_heading", AHEAD, np.array([0.1, 0.1]), 1e-4 * np.eye(2), np.ones(3))
+
+
+@pytest.fixture(scope="module")
+def table() -> PushTable:
+    return load_data([BAG])
+
+
+@pytest.fixture(scope="module")
+def base(table: PushTable) -> PushModel:
+    return train_model(table, load_rig_for([BAG]), "analytical", name="plain")
+
+
+def extended(base: PushModel, *effects: Effect) -> PushModel:
+    assert isinstance(base.body, AnalyticalBody)
+    body = ExtendedBody(base.body, base.body.physics, effects, np.ones(3))
+    return replace(base, name="extended", body=body)
+
+
+def test_a_map_is_drawn_at_the_middle_of_the_covariates(base: PushModel, table: PushTable) -> None:
+    model, cells = extended(base, slippery(), grain()), fine_cells(base.rig.outline, table)
+    held = held_covariates(model, table)
+    times = table.covariates["elapsed_time"]
+    assert set(held) == {"elapsed_time", "slider_heading"}
+    assert held["elapsed_time"] in times and 0.4 < np.mean(times <= held["elapsed_time"]) < 0.6
+    shown = push_map(model, 0.02, 0.2, cells, held)
+    contact = cells.contact[7:9].mean() / base.rig.outline.perimeter
+    inputs = np.array([[0.02, contact, cells.angle[20:22].mean()]])
+    columns = {name: np.array([value]) for name, value in held.items()}
+    expected = model.predict(inputs, np.array([0.2]), columns)
+    assert expected.in_domain[0]
+    np.testing.assert_allclose(shown.mean[20, 7], expected.mean[0], rtol=1e-9)
+    np.testing.assert_allclose(shown.sd[20, 7] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)
+
+
+def test_beyond_what_was_seen_a_map_is_empty_and_says_so(base: PushModel, table: PushTable) -> None:
+    model, cells = extended(base, slippery()), fine_cells(base.rig.outline, table)
+    held = {"elapsed_time": 1e4}
+    assert np.isnan(push_map(model, 0.02, 0.2, cells, held).mean).all()
+    assert "Nothing is drawn: the model was extended on elapsed_time from " in held_in_words(model, held)
+
+
+def test_the_heading_of_a_push_follows_from_that_of_the_slider(base: PushModel, table: PushTable) -> None:
+    model = extended(base, headed())
+    assert model.needs == ("push_heading",)
+    held = held_covariates(model, table)
+    assert list(held) == ["slider_heading"]
+    inside = {**held, "slider_heading": table.covariates["slider_heading"]}
+    for row in range(0, len(table), 7):
+        one = {name: float(np.atleast_1d(column)[row]) for name, column in inside.items()}
+        found = covariates_of_map(base.rig.outline, one, table.inputs[[row]])["push_heading"][0]
+        assert abs(wrap_angle(found - table.covariates["push_heading"][row])) < 1e-9
+    assert "(push_heading follows from it); at another the map differs." in held_in_words(model, held)
+    lacking = replace(table.take(np.arange(4)), covariates={"push_heading": np.array([3.1, -3.1, 3.0, 0.0])})
+    assert held_covariates(model, lacking) == {"push_heading": 3.1}
+
+
+def test_what_is_not_extended_holds_nothing(base: PushModel, table: PushTable) -> None:
+    assert held_covariates(base, table) == {} and held_in_words(base, {}) == ""
+
+
+def test_the_report_of_an_extended_model_names_where_its_maps_are_drawn(
+    base: PushModel, table: PushTable, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = extended(base, slippery(), grain())
+    save_model(model, tmp_path / "extended.pushmodel")
+    save_model(base, tmp_path / "plain.pushmodel")
+    models = [str(tmp_path / f"{name}.pushmodel") for name in ("extended", "plain")]
+    call = ["report", "validation", "--model", *models, "--recording", str(BAG), "--out", str(tmp_path / "out")]
+    assert main([*call, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    page = html.unescape(Path(found["report"]).read_text())
+    time = held_covariates(model, table)["elapsed_time"]
+    assert page.count(f"The map of extended is drawn at elapsed_time {time:.3g} s and slider_heading ") == 2
+    assert "of the outline's 6 alike parts, the first is drawn." in page
+    assert "The map of plain" not in page
+
+
+def test_the_picture_of_the_readme_takes_an_extended_model(base: PushModel, table: PushTable, tmp_path: Path) -> None:
+    assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

@@ -1,0 +1,158 @@
+"""Loading data to judge a model on: every covariate by its name, from recordings and push tables alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import Push, square_rig, translating_push
+
+from push_predictor.errors import RecordingError, RigError
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.streams import Recording, ScalarStream, WrenchStream
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.write import write_recording
+from push_predictor.residuals.evidence.loading import cut_anew, load_evidence, previous_residual
+
+OF_A_RECORDING = {
+    *("elapsed_time", "push_index", "slid_distance", "slider_x", "slider_y", "slider_heading", "push_heading"),
+    *("velocity", "contact", "angle", "edge", "dwell_time", "time_since_contact", "contact_gap", "normal_force"),
+    *("tangential_force", "recording"),
+}
+LATER = 100_000_000_000  # ns
+
+
+def saved(folder: Path, name: str, later: int = 0, scalars: dict[str, ScalarStream] | None = None) -> Path:
+    """A recording of one push of 1.1 s at 20 mm/s, that much later, as a bag."""
+    write_recording(folder / name, replace(later_by(translating_push(Push()), later), name=name, scalars=scalars or {}))
+    return folder / name
+
+
+def later_by(recording: Recording, later: int) -> Recording:
+    slider, pusher = (replace(s, stamp=s.stamp + later) for s in (recording.slider, recording.pusher))
+    wrench = recording.wrench
+    moved = None if wrench is None else WrenchStream(wrench.stamp + later, wrench.fx, wrench.fy, wrench.torque)
+    return replace(recording, slider=slider, pusher=pusher, wrench=moved)
+
+
+def warming(start: int, name: str = "/surface/temperature") -> dict[str, ScalarStream]:
+    """A scalar topic that rises by one a second."""
+    return {name: ScalarStream(start + 100_000_000 * np.arange(30, dtype=np.int64), 20.0 + 0.1 * np.arange(30.0))}
+
+
+def rows(pushes: list[str], **covariates: list[float]) -> PushTable:
+    n = len(pushes)
+    inputs = np.column_stack([np.full(n, 0.02), np.linspace(0.1, 0.9, n), np.linspace(-0.5, 0.5, n)])
+    columns = {name: np.array(values) for name, values in covariates.items()}
+    return PushTable(inputs, np.full(n, 0.2), np.tile([0.004, 0.0, 0.01], (n, 1)), np.array(pushes), columns)
+
+
+def saved_table(folder: Path, name: str, table: PushTable) -> Path:
+    write_table(folder / f"{name}.csv", table)
+    save_rig(square_rig(), folder / f"{name}.rig.yaml")
+    return folder / f"{name}.csv"
+
+
+def test_a_recording_gives_every_covariate_of_the_contract_and_its_scalar_topics(tmp_path: Path) -> None:
+    start = int(translating_push().slider.stamp[0])
+    loaded = load_evidence([saved(tmp_path, "one", scalars=warming(start))])
+    assert set(loaded.table.covariates) == OF_A_RECORDING | {"topic:/surface/temperature"}
+    assert loaded.left_out == {}
+    assert loaded.recordings is not None
+    assert len(loaded.recordings) == 1
+    columns = loaded.table.covariates
+    assert columns["topic:/surface/temperature"] - 20.0 == pytest.approx(columns["elapsed_time"], abs=0.01)
+    assert np.diff(columns["slid_distance"]) == pytest.approx(0.004, abs=1e-4)
+    assert np.array_equal(columns["velocity"], loaded.table.inputs[:, 0])
+    assert np.array_equal(columns["angle"], loaded.table.inputs[:, 2])
+
+
+def test_time_index_and_way_run_on_from_one_recording_to_the_next_by_the_clock_of_the_stamps(tmp_path: Path) -> None:
+    second, first = saved(tmp_path, "a", later=LATER), saved(tmp_path, "b")
+    table = load_evidence([second, first]).table  # given in the wrong order
+    recording, columns = table.covariates["recording"], table.covariates
+    early, late = (np.flatnonzero(recording == number) for number in (0.0, 1.0))
+    assert np.all(np.diff(recording) >= 0.0)
+    assert columns["elapsed_time"][late] - columns["elapsed_time"][early] == pytest.approx(100.0, abs=1e-6)
+    assert columns["push_index"][early[0]] == 0.0
+    assert columns["push_index"][late[0]] == 1.0
+    assert columns["slid_distance"][late[0]] == pytest.approx(0.004 * len(early), abs=1e-4)
+
+
+def test_one_recording_keeps_the_clock_that_the_validator_shows(tmp_path: Path) -> None:
+    elapsed = load_evidence([saved(tmp_path, "late", later=LATER)]).table.covariates["elapsed_time"]
+    assert 0.5 <= elapsed[0] < 0.6  # the touch comes 0.5 s after the first sample
+
+
+def test_a_topic_that_one_recording_lacks_is_left_out_and_named(tmp_path: Path) -> None:
+    start = int(translating_push().slider.stamp[0])
+    paths = [saved(tmp_path, "a", scalars=warming(start)), saved(tmp_path, "b", later=LATER)]
+    loaded = load_evidence(paths)
+    assert "topic:/surface/temperature" not in loaded.table.covariates
+    half = len(loaded.table) // 2
+    assert loaded.left_out == {"topic:/surface/temperature": f"{half} of {2 * half} windows lack it"}
+
+
+def test_a_push_table_gives_its_columns_and_counts_its_pushes_in_their_order(tmp_path: Path) -> None:
+    table = rows(["b", "b", "a", "c"], humidity=[0.1, 0.2, 0.3, 0.4])
+    loaded = load_evidence([saved_table(tmp_path, "pushes", table)])
+    assert loaded.recordings is None
+    expected = {"push_index", "edge", "humidity", "velocity", "contact", "angle", "recording"}
+    assert set(loaded.table.covariates) == expected
+    assert loaded.table.covariates["push_index"].tolist() == [0.0, 0.0, 1.0, 2.0]
+    assert loaded.table.covariates["edge"].tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_what_a_table_says_itself_is_kept(tmp_path: Path) -> None:
+    table = rows(["a", "b"], push_index=[7.0, 9.0], recording=[3.0, 4.0], edge=[2.0, 2.0])
+    columns = load_evidence([saved_table(tmp_path, "pushes", table)]).table.covariates
+    assert columns["push_index"].tolist() == [7.0, 9.0]
+    assert columns["recording"].tolist() == [3.0, 4.0]
+    assert columns["edge"].tolist() == [2.0, 2.0]
+
+
+def test_a_column_with_an_empty_cell_is_left_out_and_named(tmp_path: Path) -> None:
+    table = rows(["a", "b", "c"], slider_x=[0.1, np.nan, 0.2], slider_y=[0.1, 0.0, 0.2])
+    loaded = load_evidence([saved_table(tmp_path, "pushes", table)])
+    assert loaded.left_out == {"slider_x": "1 of 3 windows lack it"}
+    assert "slider_y" in loaded.table.covariates
+
+
+def test_pushes_of_the_same_name_in_two_tables_are_two_pushes(tmp_path: Path) -> None:
+    other = rows(["a", "b"])
+    other.outcomes[:] += 0.001
+    paths = [saved_table(tmp_path, "one", rows(["a", "b"])), saved_table(tmp_path, "two", other)]
+    table = load_evidence(paths).table
+    assert table.pushes == ["one.csv/a", "one.csv/b", "two.csv/a", "two.csv/b"]
+    assert table.covariates["push_index"].tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert table.covariates["recording"].tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_streams_corrected_in_memory_are_cut_anew_into_the_same_kind_of_table(tmp_path: Path) -> None:
+    loaded = load_evidence([saved(tmp_path, "a"), saved(tmp_path, "b", later=LATER)])
+    assert loaded.recordings is not None
+    again = cut_anew(loaded.recordings, loaded.rig)
+    assert np.array_equal(again.outcomes, loaded.table.outcomes)
+    assert set(again.covariates) == set(loaded.table.covariates)
+    shifted = [replace(r, pusher=replace(r.pusher, x=r.pusher.x + 0.0003)) for r in loaded.recordings]
+    moved = cut_anew(shifted, loaded.rig)
+    assert np.any(np.abs(moved.covariates["contact_gap"].mean() - again.covariates["contact_gap"].mean()) > 1e-4)
+
+
+def test_no_rig_and_no_push_are_errors_that_name_the_data(tmp_path: Path) -> None:
+    write_table(tmp_path / "bare.csv", rows(["a"]))
+    with pytest.raises(RigError, match=r"bare\.csv"):
+        load_evidence([tmp_path / "bare.csv"])
+    still = replace(translating_push(Push(begin=5.0, end=5.1), tail=-4.0), name="still")
+    write_recording(tmp_path / "still", still)
+    with pytest.raises(RecordingError, match="still"):
+        load_evidence([tmp_path / "still"])
+
+
+def test_the_previous_residual_is_the_mean_of_the_push_before_in_the_same_recording() -> None:
+    table = rows(["a", "a", "b", "c", "d"], recording=[0.0, 0.0, 0.0, 1.0, 1.0])
+    z = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 7.0], [-3.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0]])
+    assert previous_residual(table, z).tolist() == [0.0, 0.0, 3.0, 0.0, 9.0]

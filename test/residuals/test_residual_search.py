@@ -1,0 +1,271 @@
+"""The search for what a model leaves over: rare false alarms, power, and the right name or none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import design_of
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.candidates import candidates_of, entangled
+from push_predictor.residuals.channels.variance import variance_effects
+from push_predictor.residuals.evidence.baseline import baseline_of
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.residuals import evidence_of
+from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
+from push_predictor.residuals.selection.screening import block_scores, screen
+from push_predictor.residuals.selection.search import Search, search
+
+WINDOWS = 2
+SIDE = 0.09
+SQUARE = Outline(0.5 * SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))
+RIG = Rig("square", SQUARE, 0.00475, "made up", 0.8)
+PHYSICS = AnalyticalPush(SQUARE, 0.00475, 0.25)
+SCATTER = np.array([0.0001, 0.00015, 0.004])  # m, m, rad
+SIX = (
+    "contact_friction", "pressure_spread", "centre_of_friction", "anisotropic_friction", "tilted_surface", "inertia"
+)  # fmt: skip
+DRIVERS = ("elapsed_time", "topic:/temperature", "slider_x", "slider_heading", "edge")
+
+
+def pushes(n: int, seed: int, scatter: np.ndarray = SCATTER) -> PushTable:
+    """Pushes of a square with contact friction 0.25; half of the scatter is common to the windows of a push."""
+    rng = np.random.default_rng(seed)
+    push = np.repeat(np.arange(n), WINDOWS)
+    edge = rng.integers(4, size=n)[push].astype(np.float64)
+    contact = (edge + rng.uniform(0.05, 0.95, n)[push]) / 4.0
+    inputs = np.column_stack([np.full(len(push), 0.02), contact, rng.uniform(-1.0, 1.0, n)[push]])
+    duration = np.full(len(push), 0.2)
+    noise = np.sqrt(0.5) * (rng.normal(size=(n, 3))[push] + rng.normal(size=(len(push), 3)))
+    walk = np.cumsum(rng.normal(size=n))
+    covariates = {
+        "elapsed_time": 10.0 * push + rng.uniform(0.0, 3.0, n)[push],
+        "topic:/temperature": 20.0 + walk[push],
+        "slider_x": rng.normal(0.0, 0.03, n)[push],
+        "slider_heading": rng.uniform(-np.pi, np.pi, n)[push],
+        "edge": edge,
+    }
+    outcomes = PHYSICS.displacement(inputs, duration) + scatter * noise
+    return PushTable(inputs, duration, outcomes, np.array([f"{seed} {k}" for k in push]), covariates)
+
+
+def with_effect(table: PushTable, mechanism: str | None, form: Form, *coefficients: float) -> PushTable:
+    push = evidence_of(ANALYTICAL, table, PHYSICS).push
+    design = design_of(mechanism, form, PHYSICS, push, np.ones(3))
+    return replace(table, outcomes=table.outcomes + design @ np.array(coefficients))
+
+
+def linear(table: PushTable, name: str) -> Form:
+    values = table.covariates[name]
+    return Form("linear", (name,), (float(values.mean()),), (float(values.std()),))
+
+
+ANALYTICAL = train_model(pushes(60, 1), RIG, "analytical", name="textbook")
+
+
+@pytest.fixture(scope="module")
+def learnt():
+    return train_model(pushes(150, 2), RIG, "gp", name="learnt")
+
+
+@pytest.fixture(autouse=True)
+def a_library_of_six(monkeypatch) -> None:
+    """Responses take most of the time."""
+    monkeypatch.setattr("push_predictor.residuals.candidates.candidates.LIBRARY", [m for m in LIBRARY if m.name in SIX])
+
+
+def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> Search:
+    evidence, basis = evidence_of(model, table, PHYSICS), inputs_basis(model, table)
+    candidates = candidates_of(evidence, drivers, basis)
+    if mechanisms is not None:
+        candidates = [c for c in candidates if c.mechanism is None or c.mechanism in mechanisms]
+    return search(evidence, candidates, basis, alpha, baseline=baseline_of(model, PHYSICS))
+
+
+class TestFalseAlarms:
+    """On made-up nulls the family-wise p is at most alpha in about the share alpha of them."""
+
+    REPETITIONS = 200
+    ALPHA = 0.05
+
+    @pytest.mark.parametrize(
+        ("tails", "common"), [(np.inf, 0.0), (3.0, 0.8)], ids=["normal", "heavy tails, windows of a push alike"]
+    )
+    def test_stay_within_binomial_bounds(self, tails: float, common: float) -> None:
+        alarms = sum(self._smallest_p(seed, tails, common) <= self.ALPHA for seed in range(self.REPETITIONS))
+        error = np.sqrt(self.REPETITIONS * self.ALPHA * (1.0 - self.ALPHA))
+        assert alarms <= self.REPETITIONS * self.ALPHA + 3.0 * error
+        assert alarms >= self.REPETITIONS * self.ALPHA - 3.0 * error
+
+    def _smallest_p(self, seed: int, tails: float, common: float) -> float:
+        rng = np.random.default_rng(seed)
+        n, pushed = 120, np.repeat(np.arange(40), 3)
+        angle = rng.uniform(-1.0, 1.0, 40)[pushed]
+        basis = np.cos(angle[:, None] * np.arange(8))  # a fifth of the pushes: as rich as it gets
+        draw = rng.standard_normal if np.isinf(tails) else lambda size: rng.standard_t(tails, size)
+        z = np.sqrt(common) * draw((40, 3))[pushed] + np.sqrt(1.0 - common) * draw((n, 3))
+        walk = np.cumsum(rng.normal(size=40))[pushed]
+        drivers = [pushed / 40.0, pushed / 40.0 + 0.01 * walk, walk, walk**2, rng.normal(size=40)[pushed]]
+        responses = [np.eye(3)[:, :1] * angle[:, None, None], np.eye(3) * (1.0 + angle[:, None, None])]
+        columns = [response * driver[:, None, None] for response in responses for driver in drivers]
+        return float(screen([block_scores(z, c, basis, pushed) for c in columns], seed).p_value.min())
+
+
+class TestNothingThere:
+    def test_nothing_is_found_with_a_learnt_base_that_saw_few_pushes(self, learnt) -> None:
+        verdicts = [searched(learnt, pushes(150, 100 + seed)) for seed in range(3)]
+        assert [len(found.terms) for found in verdicts] == [0, 0, 0]
+
+    def test_what_the_base_lacks_is_no_news_where_training_shows_it_as_well(self) -> None:
+        """A slider whose sides differ, learnt by a model that folds them: as many pushes later it is the same one."""
+        shift = Form("constant"), 0.003, -0.002
+        base = train_model(with_effect(pushes(150, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
+        same = searched(base, with_effect(pushes(150, 3), "centre_of_friction", *shift))
+        assert not same.terms
+        assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.standing)
+        other = searched(base, with_effect(pushes(150, 3), "centre_of_friction", Form("constant"), -0.003, 0.002))
+        assert other.terms[0].best.label == ("centre_of_friction", "edge")
+
+    def test_a_driver_that_goes_with_the_inputs_is_not_tried(self, learnt) -> None:
+        """Pushes done in the order of their angle: time could be blamed for whatever the base gets wrong there."""
+        table = pushes(150, 3)
+        ordered = replace(table, covariates={**table.covariates, "elapsed_time": 100.0 * table.inputs[:, 2]})
+        evidence, basis = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
+        assert entangled(evidence, DRIVERS, basis) == ["elapsed_time"]
+        assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, basis)}
+
+    def test_a_touch_that_is_felt_late_is_no_effect_of_the_time_since_contact(self, learnt) -> None:
+        """The window that begins with the touch is then off by the way of the tip; the others are as they were."""
+        table = pushes(150, 3)
+        since = np.tile([0.0, 0.2], 150)
+        late = np.where(since == 0.0, 0.97, 1.0)
+        short = PHYSICS.displacement(table.inputs, table.duration * late)
+        moved = table.outcomes + short - PHYSICS.displacement(table.inputs, table.duration)
+        table = replace(table, outcomes=moved, covariates={**table.covariates, "time_since_contact": since})
+        found = searched(ANALYTICAL, table, drivers=("time_since_contact",)).terms
+        assert "time_since_contact" not in {term.best.covariate for term in found}
+
+    def test_a_learnt_base_is_honest_about_pushes_that_it_is_told_without(self, learnt) -> None:
+        deviation = baseline_of(learnt, PHYSICS).deviation
+        assert np.all((deviation > 0.85) & (deviation < 1.15))
+
+    def test_it_says_how_small_an_effect_would_have_been_found(self, learnt) -> None:
+        table = pushes(150, 103)
+        evidence, basis, baseline = (
+            evidence_of(learnt, table, PHYSICS),
+            inputs_basis(learnt, table),
+            baseline_of(learnt, PHYSICS),
+        )
+        found = search(evidence, candidates_of(evidence, DRIVERS, basis), basis, 0.01, baseline=baseline)
+        size = detectable_json(minimum_detectable(found, evidence, basis, 0.01, baseline))["contact_friction"]["driven"]
+        assert size["unit"] == "1"
+        small, large = (
+            with_effect(table, "contact_friction", linear(table, size["covariate"]), share * size["value"])
+            for share in (0.2, 1.5)
+        )
+        assert not searched(learnt, small).terms
+        assert searched(learnt, large).terms
+
+
+class TestNames:
+    @pytest.mark.parametrize(
+        ("mechanism", "driver", "coefficients"),
+        [
+            ("contact_friction", "topic:/temperature", [0.08]),
+            ("pressure_spread", "elapsed_time", [0.15]),
+            ("centre_of_friction", "slider_x", [0.003, 0.002]),
+        ],
+    )
+    def test_mechanism_and_driver_of_a_planted_effect(self, learnt, mechanism, driver, coefficients) -> None:
+        plain = pushes(200, 200)
+        found = searched(learnt, with_effect(plain, mechanism, linear(plain, driver), *coefficients))
+        first = found.terms[0]
+        assert first.best.label == (mechanism, driver)
+        assert first.naming.known
+        assert driver in first.naming.drivers
+        assert first.p_value <= 0.01
+
+    def test_a_grain_of_the_table_is_driven_by_the_heading(self, learnt) -> None:
+        table = with_effect(pushes(200, 201), "anisotropic_friction", Form("constant"), 0.2, 0.1)
+        first = searched(learnt, table).terms[0]
+        assert first.best.label == ("anisotropic_friction", "push_heading")
+
+    def test_a_shift_in_the_body_is_told_by_the_sides_that_the_base_folds(self, learnt) -> None:
+        table = with_effect(pushes(200, 202), "centre_of_friction", Form("constant"), 0.003, 0.002)
+        assert searched(learnt, table).terms[0].best.label == ("centre_of_friction", "edge")
+
+    def test_a_change_without_a_driver_lies_in_the_models_own_inputs(self, learnt) -> None:
+        table = with_effect(pushes(200, 203), "contact_friction", Form("constant"), 0.2)
+        assert searched(learnt, table).terms[0].best.label == ("contact_friction", "model_inputs")
+
+    def test_contact_friction_other_than_the_textbooks_is_found_by_the_textbook_model(self) -> None:
+        found = searched(ANALYTICAL, pushes(200, 204), drivers=())
+        assert found.terms[0].best.label == ("contact_friction", "model_inputs")
+        assert found.terms[0].coefficients[0] == pytest.approx(0.25 - 0.3, abs=0.02)
+
+    def test_an_effect_outside_the_library_comes_back_with_its_driver_alone(self, learnt) -> None:
+        """Slip to one side that grows with temperature, with a library that holds only the pressure's spread."""
+        plain = pushes(200, 205)
+        table = with_effect(plain, "contact_asymmetry", linear(plain, "topic:/temperature"), 0.15)
+        first = searched(learnt, table, mechanisms=["pressure_spread", "tilted_surface"]).terms[0]
+        assert first.best.label == (None, "topic:/temperature")
+        assert not first.naming.known
+
+    def test_drivers_that_go_together_stay_undecided(self, learnt) -> None:
+        plain = pushes(200, 206)
+        twins = {**plain.covariates, "slid_distance": 0.003 * plain.covariates["elapsed_time"] + 0.001}
+        table = with_effect(replace(plain, covariates=twins), "contact_friction", linear(plain, "elapsed_time"), 0.08)
+        naming = searched(learnt, table, drivers=(*DRIVERS, "slid_distance")).terms[0].naming
+        assert naming.undecided
+        assert set(naming.drivers) == {"elapsed_time", "slid_distance"}
+        assert naming.mechanisms[0] == "contact_friction"
+
+
+class TestForm:
+    def test_a_step_is_told_with_its_place(self, learnt) -> None:
+        plain = pushes(200, 300)
+        place = 1200.0
+        table = with_effect(plain, "contact_friction", Form("step", ("elapsed_time",), place=place), 0.25)
+        form = searched(learnt, table).terms[0].best.form
+        assert form.name == "step"
+        assert form.place == pytest.approx(place, abs=150.0)
+
+    def test_a_straight_line_stays_a_straight_line(self, learnt) -> None:
+        plain = pushes(200, 301)
+        table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)
+        assert searched(learnt, table).terms[0].best.form.name == "linear"
+
+
+class TestScatter:
+    def test_that_grows_with_a_driver_is_told_as_variance_and_as_no_shift(self, learnt) -> None:
+        table = pushes(200, 400)
+        warm = table.covariates["topic:/temperature"]
+        factor = np.exp(0.5 * (warm - warm.mean()) / warm.std())
+        clean = PHYSICS.displacement(table.inputs, table.duration)
+        louder = replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
+        found = searched(learnt, louder)
+        evidence = evidence_of(learnt, louder, PHYSICS)
+        scatter = variance_effects(learnt, evidence, found.left, 0.01, baseline=baseline_of(learnt, PHYSICS))
+        assert not found.terms
+        assert scatter.found[0].covariate == "topic:/temperature"
+        assert scatter.found[0].ratio > 2.0
+
+    def test_of_the_training_is_no_finding(self, learnt) -> None:
+        table = pushes(200, 401)
+        evidence = evidence_of(learnt, table, PHYSICS)
+        assert not variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
+
+    def test_that_is_larger_than_in_training_needs_no_driver(self, learnt) -> None:
+        table = pushes(200, 402, scatter=2.0 * SCATTER)
+        evidence = evidence_of(learnt, table, PHYSICS)
+        scatter = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
+        assert scatter[0].covariate == "model_inputs"
+        assert scatter[0].ratio == pytest.approx(2.0, rel=0.25)

@@ -1,0 +1,159 @@
+"""The wrench channel: what changes the force of a push and not its motion is found there, and only there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.limit_surface import contact_force
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.candidates.limit_load import loads
+from push_predictor.residuals.channels.wrench import WrenchFinding, wrench_effects
+from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
+from push_predictor.types import Array
+
+PHYSICS = AnalyticalPush(shape_outline("rect1"), 0.00475, contact_friction=0.25)
+PUSHES, WINDOWS = 120, 3  # per push
+FMAX = 2.0  # N
+SCATTER = 0.08  # of the logarithm of the force, by push and by window alike
+
+
+def made(
+    seed: int,
+    *,
+    drift: float = 0.0,
+    level: float = 0.0,
+    bias: tuple[float, float] = (0.0, 0.0),
+    contact_friction: float = 0.25,
+) -> PushTable:
+    """Windows whose force is that of the limit surface: log fmax drifts and is shifted, the sensor reads too much."""
+    rng = np.random.default_rng(seed)
+    n = PUSHES * WINDOWS
+    push = np.repeat(np.arange(PUSHES), WINDOWS)
+    contact, angle = rng.random(PUSHES)[push], rng.uniform(-1.0, 1.0, PUSHES)[push]
+    heading = rng.uniform(-np.pi, np.pi, PUSHES)[push]
+    noise = SCATTER * (rng.standard_normal(PUSHES)[push] + rng.standard_normal(n)) / np.sqrt(2.0)
+    fmax = FMAX * np.exp(level + drift * (push / PUSHES - 0.5) + noise)
+    force = predicted_force(contact, angle, contact_friction) * fmax[:, None]
+    x, y = np.cos(heading - angle), np.sin(heading - angle)  # the inward normal in the world
+    read = force - np.column_stack([bias[0] * x + bias[1] * y, bias[1] * x - bias[0] * y])
+    covariates = {
+        "elapsed_time": push * 2.0 + np.tile(np.arange(WINDOWS) * 0.2, PUSHES),
+        "push_heading": heading,
+        "slider_x": rng.normal(0.0, 0.02, PUSHES)[push],
+        "normal_force": read[:, 0],
+        "tangential_force": read[:, 1],
+        "topic:/hum": rng.standard_normal(PUSHES)[push],
+    }
+    inputs = np.column_stack([np.full(n, 0.02), contact, angle])
+    return PushTable(inputs, np.full(n, 0.2), np.zeros((n, 3)), push.astype(np.str_), covariates)
+
+
+def predicted_force(contact: Array, angle: Array, contact_friction: float) -> Array:
+    """Force (n, 2) along the inward normal and its left per unit of fmax."""
+    outline, support = PHYSICS.outline, PHYSICS.support
+    normal, arm = outline.inward_normal(contact), outline.point(contact) / support.length
+    p = arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0]
+    q = arm[:, 0] * normal[:, 0] + arm[:, 1] * normal[:, 1]
+    fn, ft, _ = contact_force(1 + p * p, p * q, 1 + q * q, np.cos(angle), np.sin(angle), contact_friction)
+    return np.column_stack([fn, ft]) / np.sqrt(fn**2 + ft**2 + (p * fn + q * ft) ** 2)[:, None]
+
+
+def found(table: PushTable, baseline: PushTable | None) -> WrenchFinding:
+    return wrench_effects(table, baseline, PHYSICS, alpha=0.002)
+
+
+def test_every_window_gives_the_friction_on_the_surface_by_itself() -> None:
+    """Whatever the direction of the push and the friction at the contact."""
+    for contact_friction in (0.1, 0.5):
+        table = made(0, contact_friction=contact_friction)
+        assert np.median(np.exp(loads(table, PHYSICS).size)) == pytest.approx(FMAX, rel=0.02)
+
+
+def test_the_change_by_a_bias_is_the_derivative() -> None:
+    plain, step = loads(made(0), PHYSICS), 1e-6
+    for k, bias in enumerate([(step, 0.0), (0.0, step)]):
+        moved = loads(made(0, bias=bias), PHYSICS)
+        assert np.allclose((moved.size - plain.size) / step, plain.bias[:, 0, k], atol=1e-5)
+        assert np.allclose((moved.direction - plain.direction) / step, plain.bias[:, 1, k], atol=1e-5)
+
+
+@pytest.mark.parametrize("baseline", [made(1), None], ids=["against training", "alone"])
+@pytest.mark.parametrize("drift", [0.2, -0.4])
+def test_a_drift_of_the_surface_friction_is_found_and_sized(drift: float, baseline: PushTable | None) -> None:
+    effects = found(made(2, drift=drift), baseline).effects
+    assert [(e.mechanism, e.covariate) for e in effects] == [("surface_friction", "elapsed_time")]
+    size = effects[0].parameters[0]
+    assert size.low < np.expm1(0.9 * drift) < size.high  # over the middle 90 % of the time
+    assert size.unit == "1"
+
+
+def test_another_level_shows_against_the_training_windows_alone() -> None:
+    table = made(2, level=0.15)
+    effects = found(table, made(1)).effects
+    assert [(e.mechanism, e.covariate, e.form) for e in effects] == [("surface_friction", "model_inputs", "constant")]
+    assert effects[0].parameters[0].low < np.expm1(0.15) < effects[0].parameters[0].high
+    assert found(table, None).effects == ()
+
+
+@pytest.mark.parametrize("baseline", [made(1), None], ids=["against training", "alone"])
+def test_a_bias_of_the_sensor_is_no_friction(baseline: PushTable | None) -> None:
+    effects = found(made(2, bias=(0.15, -0.1)), baseline).effects
+    assert [e.mechanism for e in effects] == ["wrench_bias"]
+    assert all(p.low < truth < p.high for p, truth in zip(effects[0].parameters, (0.15, -0.1), strict=True))
+    assert {p.unit for p in effects[0].parameters} == {"N"}
+
+
+def test_a_drift_that_the_training_windows_have_over_the_place_is_no_news() -> None:
+    def sloped(seed: int) -> PushTable:
+        table = made(seed)
+        grip = np.exp(5.0 * table.covariates["slider_x"])
+        forces = {name: table.covariates[name] * grip for name in ("normal_force", "tangential_force")}
+        return replace(table, covariates={**table.covariates, **forces})
+
+    assert found(sloped(2), made(1)).effects[0].covariate == "slider_x"
+    assert found(sloped(2), sloped(1)).effects == ()
+
+
+def test_without_an_effect_nothing_is_found() -> None:
+    for seed in range(10, 22):
+        assert found(made(seed), made(1)).effects == ()
+        assert found(made(seed), None).effects == ()
+
+
+def test_another_contact_friction_is_no_surface_friction() -> None:
+    assert found(made(2, contact_friction=0.4), made(1)).effects == ()
+
+
+def test_all_that_was_tried_is_told() -> None:
+    tested = {(t.mechanism, t.covariate) for t in found(made(2), made(1)).tested}
+    assert {("surface_friction", "elapsed_time"), ("wrench_bias", "model_inputs")} <= tested
+    assert {("surface_friction", "model_inputs"), ("surface_friction", "topic:/hum")} <= tested
+
+
+def test_windows_without_a_force_tell_nothing() -> None:
+    table = made(2)
+    assert found(replace(table, covariates={}), table) == found(replace(table, covariates={}), None)
+    assert found(replace(table, covariates={}), table).tested == ()
+
+
+def test_in_a_recording_a_drift_of_the_force_moves_no_motion_and_is_found() -> None:
+    pushes = random_pushes(60, (0.02, 0.05), rng=np.random.default_rng(3))
+    recording = simulate(SimulationSpec("rect1", "delrin", pushes, seed=3))
+    rig, wrench = recording.rig, recording.wrench
+    assert rig is not None and wrench is not None
+    share = (wrench.stamp - wrench.stamp[0]) / np.ptp(wrench.stamp)
+    worn = replace(wrench, fx=wrench.fx * (1.0 + 0.4 * share), fy=wrench.fy * (1.0 + 0.4 * share))
+    clean, drifted = (windows_to_table(find_windows(r, rig)) for r in (recording, replace(recording, wrench=worn)))
+    assert np.array_equal(clean.outcomes, drifted.outcomes)
+    assert found(clean, None).effects == ()
+    effect = found(drifted, clean).effects[0]
+    assert effect.mechanism == "surface_friction"
+    assert {effect.covariate, *effect.rivals} >= {"elapsed_time", "push_index", "slid_distance"}
+    assert effect.parameters[0].low > 0.2

@@ -1,0 +1,184 @@
+"""push_predictor trace: what it writes, prints and refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up_traces import made_up_trace, pushes, slippery
+from synthetic import square_rig
+
+import push_predictor.residuals.trace as trace_module
+from push_predictor.cli import main
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table_file import write_table
+from push_predictor.residuals.outcome import Trace
+
+SECTION_5 = {
+    "verdict", "effect_present", "channel", "kind", "covariates", "equivalent", "undecided", "motion_model_changed",
+    "effects", "before", "refit", "after", "gain", "minimum_detectable", "remaining", "experiment", "tested", "pushes",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def extended() -> Trace:
+    return made_up_trace(slippery(0.06), count=90)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model and a table of pushes whose contact friction drifts."""
+    folder = tmp_path_factory.mktemp("trace")
+    save_model(train_model(pushes(60, 1), square_rig(), "analytical", name="deployed"), folder / "deployed.pushmodel")
+    write_table(folder / "new.csv", pushes(60, 2, slippery(0.1)))
+    (folder / "new.rig.yaml").write_text(json.dumps(square_rig().to_record()))
+    return folder
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Makes the command find this trace; what it was asked is kept."""
+    asked: dict[str, Any] = {}
+
+    def find(trace: Trace) -> dict[str, Any]:
+        def trace_data(paths: Sequence[Path], model: Path, **options: Any) -> Trace:
+            asked.update(paths=paths, model=model, **options)
+            return trace
+
+        monkeypatch.setattr(trace_module, "trace_data", trace_data)
+        return asked
+
+    return find
+
+
+def run(place: Path, *options: str) -> int:
+    return main(["trace", str(place / "new.csv"), "--model", str(place / "deployed.pushmodel"), *options])
+
+
+def test_a_real_trace_from_a_table_to_an_extended_model(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, model = tmp_path / "sub" / "out.json", tmp_path / "sub" / "extended.pushmodel"
+    status = run(place, "--covariates", "elapsed_time,slider_x", "--json", str(out), "--save-model", str(model))
+    assert status == 0, capsys.readouterr().err
+    result = json.loads(out.read_text())
+    assert set(result) >= SECTION_5 and result["pushes"] == {"analysis": 42, "held_out": 18}
+    assert result["effects"][0]["covariate"] == "elapsed_time" and result["motion_model_changed"]
+    assert load_model(model).needs == ("elapsed_time",)
+    assert "a request must bring elapsed_time" in capsys.readouterr().out
+
+
+def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = found(extended)
+    assert run(place, "--covariates", "topic:/warmth, elapsed_time", "--alpha", "0.05", "--seed", "7") == 0
+    assert asked["covariates"] == ["topic:/warmth", "elapsed_time"]
+    assert (asked["alpha"], asked["seed"], asked["rig"]) == (0.05, 7, None)
+    assert run(place, "--rig", str(place / "new.rig.yaml")) == 0
+    assert asked["covariates"] is None and asked["alpha"] == 0.01 and asked["rig"].shape == "rect1"
+
+
+def test_json_on_stdout_is_all_there_is_on_stdout(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found(replace(extended, extended=None))
+    assert run(place, "--json", "-", "--save-model", str(tmp_path / "extended.pushmodel")) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["verdict"] == "effect"
+    assert "is not written: the motion model did not change" in printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_json_a_person_reads_what_was_found(
+    place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found(extended)
+    assert run(place) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("effect: The model lacks 1 effect: contact friction, driven by elapsed_time")
+    assert "so the motion model is extended" in text and extended.held_out.digest in text
+    for name in ("before", "refit", "after"):
+        assert f"\n{name} " in text
+
+
+def test_the_extended_model_is_saved_as_it_is(place: Path, tmp_path: Path, found: Any, extended: Trace) -> None:
+    found(extended)
+    path = tmp_path / "extended.pushmodel"
+    assert run(place, "--save-model", str(path)) == 0
+    table = pushes(5, 3)
+    assert extended.extended is not None
+    one, other = (
+        m.predict(table.inputs, table.duration, table.covariates) for m in (load_model(path), extended.extended)
+    )
+    np.testing.assert_allclose(one.mean, other.mean, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--alpha", "0"], ["--alpha", "0.0", "above 0 and below 1"]),
+        (["--alpha", "1"], ["--alpha", "1.0"]),
+        (["--alpha", "nan"], ["--alpha", "nan"]),
+        (["--seed", "-1"], ["--seed"]),
+        (["--covariates", "elapsed_time,,x"], ["--covariates", "commas"]),
+        (["--covariates", "topic:/absent"], ["topic:/absent", "elapsed_time", "slider_x"]),
+        (["--model", "absent.pushmodel"], ["absent.pushmodel"]),
+        (["--rig", "absent.yaml"], ["absent.yaml"]),
+    ],
+)
+def test_errors_are_one_line_that_names_what_is_wrong(
+    place: Path, options: list[str], words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(place, *options) == 1
+    printed = capsys.readouterr()
+    lines = [line for line in printed.err.splitlines() if not line.startswith("trace: ")]
+    assert printed.out == "" and len(lines) == 1 and lines[0].startswith("push_predictor trace: ")
+    assert all(word in lines[0] for word in words), lines[0]
+
+
+@pytest.mark.parametrize("option", ["--report", "--json", "--save-model"])
+@pytest.mark.parametrize(
+    ("where", "accepted"),
+    [("folder", "the path of a file, this is a folder"), ("file/below", "a path in a folder, ")],
+)
+def test_where_nothing_can_be_written_is_told_before_the_work(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, option: str, where: str, accepted: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    asked = found(extended)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("kept")
+    assert run(place, option, str(tmp_path / where)) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"push_predictor trace: {option}: '{tmp_path / where}' is not accepted, give {accepted}")
+    assert asked == {} and (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_folder_that_may_not_be_written_to_is_named(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    asked = found(extended)
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere
+    assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
+    assert f"a path in a folder that may be written to, {tmp_path} may not" in capsys.readouterr().err
+    assert asked == {}
+
+
+def test_data_that_are_not_there_are_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trace", "absent.csv", "--model", str(place / "deployed.pushmodel")]) == 1
+    assert "absent.csv: no such file or folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "call", [["trace"], ["trace", "new.csv"], ["trace", "new.csv", "--model", "m", "--alpha", "x"]]
+)
+def test_a_wrong_call_exits_with_2(call: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(call)
+    assert end.value.code == 2 and capsys.readouterr().err.startswith("usage: push_predictor trace")

@@ -1,0 +1,88 @@
+"""What trace says of recordings of the rig simulator whose measurement is wrong, or only looks as if it were."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
+from push_predictor.residuals.evidence.loading import Loaded, cut_anew
+from push_predictor.residuals.outcome import Sized, Trace
+from push_predictor.residuals.reporting.trace_json import trace_json
+from push_predictor.residuals.reporting.wording import worth_sentence
+from push_predictor.residuals.trace import trace
+from push_predictor.simulation.changes import Changes
+from push_predictor.simulation.pushes import random_pushes
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.sensors import Faults
+from push_predictor.simulation.spec import SimulationSpec
+
+
+def spec(seed: int, pushes: int = 90) -> SimulationSpec:
+    plan = random_pushes(pushes, (0.02,), travel=0.014, rng=np.random.default_rng(seed))
+    return SimulationSpec("rect1", "delrin", plan, seed=seed, surface_seed=1, slider_seed=1, turn_spread=3.0)
+
+
+@cache
+def learnt() -> PushModel:
+    recording = simulate(spec(1, 120))
+    assert recording.rig is not None
+    table = windows_to_table(find_windows(recording, recording.rig))
+    return train_model(table, recording.rig, "gp", name="deployed", n_train=min(250, len(table)))
+
+
+def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
+    recording = simulate(replace(spec(2), changes=changes, faults=Faults(**faults)))
+    assert recording.rig is not None
+    return trace(learnt(), Loaded(cut_anew([recording], recording.rig), (recording,), recording.rig))
+
+
+def test_nothing_is_said_of_a_second_recording_of_the_same_rig() -> None:
+    assert traced().verdict == "none"
+
+
+def test_a_bias_of_the_force_sensor_that_is_there_between_pushes_is_zeroed_away() -> None:
+    assert traced(wrench_bias=(0.5, 0.0, 0.0)).verdict == "none"
+
+
+def test_one_that_comes_with_the_contact_is_an_error_of_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    pulls = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
+    effect = WrenchEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ())
+    found = WrenchFinding((effect,), (), 0.1, True)
+    monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
+    told = trace_json(traced())
+    assert (told["verdict"], told["channel"], told["motion_model_changed"]) == ("measurement", "measurement", False)
+    assert [effect["mechanism"] for effect in told["effects"]] == ["wrench_bias"] * 2
+
+
+def test_a_clock_that_is_late_is_corrected() -> None:
+    found = traced(clock_offset=0.03)
+    assert found.verdict == "measurement" and found.effects[0].mechanism == "clock_offset"
+    assert found.effects[0].parameter is not None
+    assert found.effects[0].parameter.value == pytest.approx(0.03, abs=0.006)
+
+
+def test_a_soft_tip_is_not_called_a_late_clock() -> None:
+    """It opens the gap as a late clock does, but with the clock put right the predictions stay as wrong."""
+    found = traced(compliance=2e-3)
+    assert found.verdict not in ("none", "measurement")
+
+
+def test_what_lies_in_the_models_own_inputs_is_told_and_left_to_a_refit() -> None:
+    """A slippery rod: every window is other than it was, and the same model trained anew has it."""
+    found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.way), -0.2)))
+    told = trace_json(found)
+    assert (told["verdict"], told["kind"], told["covariates"][0]) == ("effect", "mean", "model_inputs")
+    assert not told["motion_model_changed"] and found.extended is None
+    assert told["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
+    refit, before = (sum(told[model]["nlpd"].values()) for model in ("refit", "before"))
+    assert refit < before
+    assert "training anew" in worth_sentence(found)

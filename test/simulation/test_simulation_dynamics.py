@@ -1,0 +1,241 @@
+"""The simulated slider obeys Newton, Euler and Coulomb, and in the slow limit the mechanics of quasi-static pushing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from push_predictor.geometry.frames import rotate, to_body
+from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run
+from push_predictor.simulation.noise import no_scatter
+from push_predictor.simulation.physics import GRAVITY, Physics
+from push_predictor.simulation.pushes import PusherPath, PushPlan, pusher_path, random_pushes
+from push_predictor.simulation.slider import Slider, polar_moment, slider_named, support_points
+from push_predictor.simulation.surface import uniform_field
+from push_predictor.types import Array
+
+RADIUS = 0.00475
+FRICTION = 0.2
+ACCELERATION = 2.5
+
+
+def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, friction: float = FRICTION) -> Physics:
+    """n equal sliders of evenly shared load on an even table."""
+    points = support_points(slider.outline)
+    return Physics(
+        outline=slider.outline,
+        radius=RADIUS,
+        mass=np.full(n, slider.mass),
+        inertia=np.full(n, slider.inertia),
+        support=points,
+        shares=np.full((n, len(points)), 1.0 / len(points)),
+        contact_friction=np.full(n, contact_friction),
+        surface=uniform_field(friction),
+        pressure=no_scatter(n, len(points)),
+        rubbing=no_scatter(n, 1),
+    )
+
+
+def push(
+    physics: Physics, plan: PushPlan, poses: Array | None = None, *, rest: float = 0.3, **options: Array
+) -> Motion:
+    start = np.zeros((len(plan), 3)) if poses is None else poses
+    path = pusher_path(plan, physics.outline, physics.radius, start, ACCELERATION)
+    return run(physics, path, start, path.total_time + rest, **options)
+
+
+def let_go(physics: Physics, velocity: Array, duration: float = 0.25) -> Motion:
+    """Sliders set in motion, the rod far away."""
+    n = len(velocity)
+    away = PusherPath(np.full((n, 2), 1.0), np.tile([1.0, 0.0], (n, 1)), np.full(n, 0.01), np.full(n, 0.01), 1.0)
+    still = np.zeros((n, 3))
+    return run(physics, away, still, np.full(n, duration), velocity=velocity, time_step=np.full(n, 2e-4))
+
+
+def travelled(motion: Motion) -> Array:
+    return motion.slider[:, -1] - motion.slider[:, 0]
+
+
+def relative(difference: Array, reference: Array) -> Array:
+    """Root mean square of a difference over that of the reference, per column."""
+    return np.asarray(np.sqrt(np.mean(difference**2, axis=0) / np.mean(reference**2, axis=0)))
+
+
+def turned(plan: PushPlan, speed: float) -> PushPlan:
+    """The plan at another speed."""
+    return PushPlan(plan.contact, plan.angle, np.full(len(plan), speed), plan.travel)
+
+
+def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, sticks: bool, steps: int = 100) -> Array:
+    """Where quasi-static pushes over `distance` beyond the touch bring sliders (n, 3).
+
+    The slider's twist is the one of least frictional power that the contact allows (Peshkin and Sanderson 1988): a
+    sticking contact hands on the tip's velocity, a frictionless one its normal part.
+    """
+    inward = physics.outline.inward_normal(plan.contact)
+    tips = physics.outline.point(plan.contact) - physics.radius * inward
+    directions = rotate(inward, plan.angle)
+    lever = 0.03
+    ends = []
+    for tip, direction, shares in zip(tips, directions, physics.shares, strict=True):
+        pose, guess = np.zeros(3), np.zeros(1 if sticks else 2)
+        for step in range(steps):
+            here = tip + (step / steps) * distance * direction
+            nearest = physics.outline.project(to_body(here[None], pose[None]))
+            normal = rotate(nearest.normal, pose[None, 2])[0]
+            arm, arms = rotate(nearest.point, pose[None, 2])[0], rotate(physics.support, pose[2])
+            across = np.array([-normal[1], normal[0]])
+
+            def twist(free: Array, normal=normal, arm=arm, across=across, direction=direction) -> Array:
+                turn = free[0] / lever
+                given = direction if sticks else (direction @ normal) * normal + free[1] * across
+                return np.array([given[0] + turn * arm[1], given[1] - turn * arm[0], turn])
+
+            def power(free: Array, arms=arms, shares=shares, twist=twist) -> float:
+                v = twist(free)
+                at = v[:2] + v[2] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+                return float(shares @ np.linalg.norm(at, axis=1))
+
+            guess = minimize(power, guess, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-11}).x
+            pose = pose + twist(guess) * distance / steps
+        ends.append(pose)
+    return np.array(ends)
+
+
+def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: float) -> Array:
+    """Where the sliders (n, 3) are once the tips have gone `distance` beyond the commanded touch."""
+    inward = physics.outline.inward_normal(plan.contact)
+    goal = physics.outline.point(plan.contact) - physics.radius * inward + distance * rotate(inward, plan.angle)
+    reached = np.argmin(np.linalg.norm(motion.pusher - goal[:, None], axis=2), axis=1)
+    return motion.slider[np.arange(len(plan)), reached]
+
+
+SLOW = PushPlan(
+    np.array([0.04, 0.125, 0.19, 0.33]), np.array([0.3, -0.2, 0.1, -0.5]), np.full(4, 0.005), np.full(4, 0.012)
+)
+
+
+@pytest.mark.parametrize(("contact_friction", "sticks"), [(20.0, True), (0.0, False)])
+@pytest.mark.parametrize("shape", ["rect1", "ellip2", "hex"])
+def test_a_slow_push_is_the_one_of_least_dissipation(shape: str, contact_friction: float, sticks: bool) -> None:
+    physics = even_physics(slider_named(shape), len(SLOW), contact_friction)
+    expected = least_dissipation_path(physics, SLOW, 0.01, sticks)
+    found = at_distance(push(physics, SLOW), SLOW, physics, 0.01)
+    assert np.all(np.abs(found - expected)[:, :2] < 1e-4)  # 1 % of the way
+    assert np.all(np.abs(found - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
+
+
+@pytest.mark.parametrize("shape", ["rect1", "ellip2"])
+def test_inertia_shows_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
+    plan = random_pushes(40, [0.005], 0.015, np.random.default_rng(1))
+    physics = even_physics(slider_named(shape), 40, friction=0.15)
+    slowest, slow, fast = (travelled(push(physics, turned(plan, speed))) for speed in (0.005, 0.01, 0.15))
+    assert np.all(relative(slow - slowest, slowest) < 0.005)
+    assert np.all(relative(fast - slowest, slowest) > 0.05)
+    assert np.any(relative(fast - slowest, slowest) > 0.12)
+
+
+@given(st.floats(0.05, 0.4), st.floats(-np.pi, np.pi), st.sampled_from(["rect1", "ellip3", "hex"]))
+@settings(max_examples=8, deadline=None)
+def test_a_slider_let_go_stops_where_friction_has_used_up_its_energy(speed: float, way: float, shape: str) -> None:
+    velocity = np.array([[speed * np.cos(way), speed * np.sin(way), 0.0]])
+    end = travelled(let_go(even_physics(slider_named(shape), 1), velocity))[0]
+    assert np.hypot(*end[:2]) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
+    assert np.arctan2(end[1], end[0]) == pytest.approx(way, abs=1e-3)
+    assert abs(end[2]) < 1e-6
+
+
+def test_friction_only_takes_energy_and_brings_to_rest() -> None:
+    slider = slider_named("ellip2")
+    velocity = np.random.default_rng(3).normal(size=(20, 3)) * [0.2, 0.2, 4.0]
+    motion = let_go(even_physics(slider, 20), velocity, duration=0.5)
+    speed = np.diff(motion.slider, axis=1) / 2e-4
+    energy = 0.5 * (slider.mass * np.sum(speed[..., :2] ** 2, axis=2) + slider.inertia * speed[..., 2] ** 2)
+    assert np.all(np.diff(energy, axis=1) <= 1e-9 * energy[:, :1])
+    assert np.all(energy[:, -1] < 1e-12 * energy[:, 0])
+
+
+def test_a_symmetric_rig_pushes_mirror_images_alike() -> None:
+    plan = random_pushes(40, [0.02, 0.2], 0.02, np.random.default_rng(4), angle_limit=1.0)
+    mirrored = PushPlan(
+        (0.25 - plan.contact) % 1.0, -plan.angle, plan.speed, plan.travel
+    )  # left and right of the square
+    physics = even_physics(slider_named("rect1"), 40)
+    one, other = travelled(push(physics, plan)), travelled(push(physics, mirrored))
+    assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
+
+
+def test_an_even_table_is_the_same_in_every_place_and_direction() -> None:
+    plan = random_pushes(20, [0.02, 0.2], 0.02, np.random.default_rng(5))
+    poses = np.random.default_rng(6).normal(size=(20, 3)) * [0.03, 0.03, 1.0]
+    physics = even_physics(slider_named("hex"), 20)
+    there, here = travelled(push(physics, plan, poses)), travelled(push(physics, plan))
+    assert np.allclose(rotate(there[:, :2], -poses[:, 2]), here[:, :2], atol=1e-9)
+    assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
+
+
+def test_the_outcome_converges_as_steps_shrink() -> None:
+    plan = random_pushes(30, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7))
+    physics = even_physics(slider_named("ellip2"), 30)
+    path = pusher_path(plan, physics.outline, RADIUS, np.zeros((30, 3)), ACCELERATION)
+    ends = [travelled(push(physics, plan, time_step=way / path.speed)) for way in (8e-5, 4e-5, 1e-5)]
+    coarse, usual = (relative(end - ends[-1], ends[-1]) for end in ends[:2])
+    assert np.all(usual < 0.005)
+    assert np.all(usual < coarse)
+
+
+def test_more_surface_friction_changes_the_force_of_a_slow_push_and_not_its_motion() -> None:
+    plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.005), np.full(2, 0.01))
+    light, heavy = (push(even_physics(slider_named("rect1"), 2, friction=f), plan) for f in (0.15, 0.3))
+    assert np.all(relative(travelled(heavy) - travelled(light), travelled(light)) < 0.005)
+    force = [np.median(np.hypot(m.wrench[..., 0], m.wrench[..., 1]), axis=1) for m in (light, heavy)]
+    assert force[1] / force[0] == pytest.approx(2.0, rel=0.01)
+
+
+def test_pushed_through_its_centre_the_force_is_friction_times_weight() -> None:
+    plan = PushPlan(np.array([0.125]), np.array([0.0]), np.array([0.01]), np.array([0.01]))
+    slider = slider_named("rect1")
+    motion = push(even_physics(slider, 1), plan)
+    assert -np.median(motion.wrench[0, :, 0]) == pytest.approx(FRICTION * slider.mass * GRAVITY, rel=0.01)
+    assert np.max(np.abs(motion.wrench[0, :, 1:])) < 1e-6
+
+
+def test_the_contact_pushes_within_its_friction_cone_and_never_pulls() -> None:
+    plan = random_pushes(60, [0.02, 0.1, 0.3], 0.02, np.random.default_rng(8))
+    physics = even_physics(slider_named("ellip3"), 60, contact_friction=0.25)
+    motion = push(physics, plan)
+    poses, tips = motion.slider[:, :-1].reshape(-1, 3), motion.pusher[:, :-1].reshape(-1, 2)
+    normal = rotate(physics.outline.project(to_body(tips, poses)).normal, poses[:, 2])
+    force = motion.wrench[:, 1:, :2].reshape(-1, 2)
+    pressing = np.sum(force * normal, axis=1)
+    rubbing = np.abs(normal[:, 0] * force[:, 1] - normal[:, 1] * force[:, 0])
+    assert np.min(pressing) >= -1e-9
+    assert np.all(rubbing <= 0.25 * pressing + 1e-9)
+
+
+def test_slider_and_rod_hardly_overlap_and_part_when_the_rod_goes_back() -> None:
+    plan = random_pushes(60, [0.02, 0.1, 0.3], 0.02, np.random.default_rng(9))
+    physics = even_physics(slider_named("rect1"), 60)
+    motion = push(physics, plan)
+    gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
+    gap = gap.reshape(motion.time.shape)
+    stopping_way = plan.speed * physics.mass / DAMPING  # of a slider that a damper alone stops
+    yielding = 2.0 * FRICTION * physics.mass * GRAVITY / STIFFNESS
+    assert np.all(np.min(gap, axis=1) > -stopping_way - yielding)
+    assert np.all(gap[:, -1] > 0.0)
+    assert np.all(motion.wrench[:, -1] == 0.0)
+    assert np.max(np.abs(motion.slider[:, -1] - motion.slider[:, -20])) < 1e-7
+
+
+@pytest.mark.parametrize("shape", ["rect1", "ellip1", "ellip2", "ellip3", "hex"])
+def test_the_moment_of_inertia_is_that_of_an_even_plate(shape: str) -> None:
+    outline = slider_named(shape).outline
+    reach = float(np.max(np.abs(outline.vertices)))
+    axis = (np.arange(300) + 0.5) / 150.0 * reach - reach
+    grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    inside = grid[outline.project(grid).distance < 0.0]
+    assert polar_moment(outline) == pytest.approx(np.mean(np.sum(inside**2, axis=1)), rel=5e-3)
+    assert np.allclose(np.mean(support_points(outline), axis=0), 0.0, atol=1e-12)

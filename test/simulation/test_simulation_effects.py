@@ -1,0 +1,295 @@
+"""What acts beside the plain rig does to pushes what mechanics says, and nothing where nothing is asked for."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.simulation.batches import run_pushes
+from push_predictor.simulation.changes import Changes, Conditions, Moment, Topic
+from push_predictor.simulation.pushes import PushPlan, random_pushes
+from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, simulate
+from push_predictor.simulation.sensors import Faults, Sensors
+from push_predictor.simulation.slider import support_points
+from push_predictor.simulation.surface import Surface
+from push_predictor.types import Array
+
+GLASS = Surface("glass", 0.2, 0.0, 0.02, 0.0, 0.0)  # alike everywhere, nothing left to chance
+QUIET = Sensors(tracker_noise=0.0, heading_noise=0.0, tip_noise=0.0, dropout_interval=0.0)
+
+
+def spec_of(plan: PushPlan, **options: object) -> SimulationSpec:
+    return SimulationSpec("rect1", GLASS, plan, **{"place_spread": 0.0, "turn_spread": 0.0, **options})
+
+
+def middle_pushes(angle: Array, speed: float = 0.02) -> PushPlan:
+    """At the middle of the lowest side."""
+    n = len(angle)
+    return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, 0.012))
+
+
+def some_pushes(n: int = 10) -> PushPlan:
+    return random_pushes(n, [0.02], 0.012, np.random.default_rng(4), angle_limit=0.8)
+
+
+def mean_outcome(spec: SimulationSpec) -> Array:
+    return np.asarray(push_outcomes(spec).outcomes.mean(axis=0))
+
+
+def constant(value: float) -> Changes:
+    return Changes(contact_friction=lambda moment: np.full(len(moment.way), value))
+
+
+def streams(recording: Recording) -> list[Array]:
+    assert recording.wrench is not None
+    slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
+    return [
+        slider.stamp,
+        slider.x,
+        slider.y,
+        slider.heading,
+        pusher.x,
+        pusher.y,
+        wrench.stamp,
+        wrench.fx,
+        wrench.torque,
+    ]
+
+
+def test_laws_that_change_nothing_change_no_bit() -> None:
+    plan = some_pushes()
+    none = Changes(
+        contact_friction=lambda moment: np.zeros(len(moment.way)),
+        load=lambda moment: np.zeros((len(moment.way), 1)),
+        grip=lambda moment: np.ones(len(moment.way)),
+        pull=lambda moment: np.zeros((len(moment.way), 3)),
+    )
+    plain = SimulationSpec("rect1", "abs", plan, seed=3)
+    for one, other in zip(streams(simulate(plain)), streams(simulate(replace(plain, changes=none))), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_spec_that_went_through_another_process_makes_the_same_recording() -> None:
+    plain = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
+    for one, other in zip(streams(simulate(plain)), streams(simulate(pickle.loads(pickle.dumps(plain)))), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_law_of_no_direction_gives_the_same_motion_by_the_directed_way() -> None:
+    spec = spec_of(some_pushes())
+    level = Changes(grain=lambda moment: np.zeros((len(moment.way), 2)))
+    assert push_outcomes(replace(spec, changes=level)).outcomes == pytest.approx(push_outcomes(spec).outcomes, abs=1e-9)
+
+
+def test_more_contact_friction_lets_fewer_pushes_slip() -> None:
+    spec = spec_of(middle_pushes(np.array([0.9, -0.9])))
+    along_edge = [_slip(replace(spec, changes=constant(change))) for change in (-0.15, 0.0, 0.2)]
+    assert along_edge[0] > along_edge[1] > along_edge[2]
+
+
+def _slip(spec: SimulationSpec) -> float:
+    """Mean change of the contact from a push's first window to its last, as a share of the perimeter."""
+    table = push_outcomes(spec)
+    by_push = [table.inputs[table.push_id == push, 1] for push in table.pushes]
+    return float(np.mean([abs(contact[-1] - contact[0]) for contact in by_push]))
+
+
+def test_contact_friction_never_falls_below_none() -> None:
+    spec = spec_of(some_pushes(4))
+    assert mean_outcome(replace(spec, changes=constant(-9.0))) == pytest.approx(
+        mean_outcome(replace(spec, changes=constant(-0.25))), abs=1e-12
+    )
+
+
+def test_a_slippery_table_changes_the_force_and_not_the_motion() -> None:
+    spec = spec_of(some_pushes())
+    half = replace(spec, changes=Changes(grip=lambda moment: np.full(len(moment.way), 0.5)))
+    plain, slippery = push_outcomes(spec).outcomes, push_outcomes(half).outcomes
+    assert np.max(np.abs(slippery - plain)) < 0.03 * np.max(np.abs(plain))
+    assert _largest_force(half) == pytest.approx(0.5 * _largest_force(spec), rel=0.05)
+
+
+def _largest_force(spec: SimulationSpec) -> float:
+    """Median over the pushes' middles, N."""
+    (batch,) = run_pushes(spec)
+    force = np.hypot(batch.motion.wrench[..., 0], batch.motion.wrench[..., 1])
+    return float(np.median(force[force > 0.0]))
+
+
+def test_ballast_on_the_centre_changes_the_force_and_not_the_motion() -> None:
+    spec = spec_of(some_pushes())
+    loaded = replace(spec, changes=Changes(added_mass=0.4))
+    plain, heavy = push_outcomes(spec).outcomes, push_outcomes(loaded).outcomes
+    assert np.max(np.abs(heavy - plain)) < 0.03 * np.max(np.abs(plain))
+    assert _largest_force(loaded) == pytest.approx((1.0 + 0.4 / spec.slider.mass) * _largest_force(spec), rel=0.05)
+
+
+def test_a_slider_that_presses_at_its_rim_turns_less() -> None:
+    spec = spec_of(PushPlan(np.full(2, 0.19), np.zeros(2), np.full(2, 0.02), np.full(2, 0.012)))
+    points = support_points(spec.slider.outline)
+    rim = np.sum(points**2, axis=1) / np.mean(np.sum(points**2, axis=1)) - 1.0
+    turns = [
+        abs(mean_outcome(replace(spec, changes=Changes(load=lambda moment, k=k: np.tile(k * rim, (2, 1)))))[2])
+        for k in (-0.8, 0.0, 0.8)
+    ]
+    assert turns[0] > turns[1] > turns[2]
+
+
+def test_a_load_off_the_centre_turns_the_slider_towards_the_other_side() -> None:
+    spec = spec_of(middle_pushes(np.zeros(1)))
+    x = support_points(spec.slider.outline)[:, 0]
+    heading = spec.slider.outline.inward_normal(np.array([0.125]))[0]
+    left = x * -heading[1] if abs(heading[1]) > 0.5 else support_points(spec.slider.outline)[:, 1] * heading[0]
+    loaded = replace(spec, changes=Changes(load=lambda moment: 30.0 * left[None, :]))
+    assert abs(mean_outcome(spec)[2]) < abs(mean_outcome(loaded)[2])
+    assert mean_outcome(loaded)[2] > 0.005  # the heavy left side stays behind: it turns to the left
+
+
+def test_grain_of_the_table_has_period_pi_in_the_heading_and_changes_sign_at_right_angles() -> None:
+    plan = middle_pushes(np.zeros(1))
+
+    def turned(heading: float) -> Array:
+        """What the grain does to a push of a slider with this heading."""
+        grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.way), 1)))
+        spec = replace(spec_of(plan), turn_spread=1.0)
+        return _at_heading(replace(spec, changes=grain), heading) - _at_heading(spec, heading)
+
+    along, opposite, right = turned(0.3), turned(0.3 + np.pi), turned(0.3 + np.pi / 2.0)
+    assert abs(along[1]) > 3e-5
+    assert opposite == pytest.approx(along, abs=0.02 * abs(along[1]))
+    assert right[1] == pytest.approx(-along[1], rel=0.1)
+
+
+def _at_heading(spec: SimulationSpec, heading: float) -> Array:
+    """The mean outcome where the slider is put down with this heading."""
+    drawn = float(spec.rng(1).standard_normal((1, 3))[0, 2])
+    return mean_outcome(replace(spec, turn_spread=heading / drawn))
+
+
+def test_grain_of_the_underside_turns_with_the_slider() -> None:
+    def grain(moment: Moment) -> Array:
+        return rotate(np.tile([0.0, 0.4], (len(moment.way), 1)), 2.0 * moment.pose[:, 2])
+
+    spec = replace(spec_of(middle_pushes(np.zeros(1))), changes=Changes(grain=grain))
+    assert _at_heading(spec, 0.9) == pytest.approx(_at_heading(spec, -0.5), rel=0.02, abs=1e-7)
+
+
+def test_a_tilted_table_draws_the_slider_downhill() -> None:
+    spec = spec_of(middle_pushes(np.zeros(1)))
+    ahead = spec.slider.outline.inward_normal(np.array([0.125]))[0]
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    outcomes = [
+        mean_outcome(replace(spec, changes=Changes(pull=lambda moment, s=s: s * left[None, :])))[1]
+        for s in (-0.3, 0.0, 0.3)
+    ]
+    assert outcomes[0] < outcomes[1] < outcomes[2]
+
+
+def test_a_resting_slider_holds_on_a_gentle_slope() -> None:
+    spec = spec_of(middle_pushes(np.zeros(1)), changes=Changes(pull=lambda moment: np.array([[0.3, 0.3, 0.0]])))
+    (batch,) = run_pushes(spec)
+    untouched = batch.motion.time[0] < 0.1
+    assert np.max(np.abs(batch.motion.slider[0, untouched, :2])) < 1e-4
+
+
+def test_viscous_drag_costs_force_in_proportion_to_speed() -> None:
+    drag = Changes(viscosity=lambda moment: np.full(len(moment.way), 20.0))
+    added = []
+    for speed in (0.02, 0.04):
+        spec = spec_of(middle_pushes(np.zeros(1), speed))
+        added.append(_largest_force(replace(spec, changes=drag)) - _largest_force(spec))
+    assert added[0] == pytest.approx(20.0 * 0.02, rel=0.15)
+    assert added[1] == pytest.approx(2.0 * added[0], rel=0.15)
+
+
+def test_conditions_are_those_that_the_window_finder_sees() -> None:
+    plan = random_pushes(25, [0.02, 0.03], 0.012, np.random.default_rng(8), angle_limit=0.5)
+    pauses = np.random.default_rng(1).exponential(1.0, 25)
+    spec = replace(SimulationSpec("rect1", "abs", plan, seed=2), sensors=QUIET, pauses=pauses)
+    spec = replace(spec, topics={"room/light": Topic(np.array([0.0, 200.0]), np.array([0.0, 100.0]))})
+    seen: dict[int, Conditions] = {}
+
+    def note(moment: Moment) -> Array:
+        seen[0] = moment.conditions
+        return np.zeros(len(moment.way))
+
+    table = _found(simulate(replace(spec, changes=Changes(contact_friction=note))))
+    first = table.take(np.unique(table.push_id, return_index=True)[1])
+    told, order = seen[0], np.argsort(seen[0].row)
+    rows = order[first.covariates["push_index"].astype(int)]
+    for name, error in (("elapsed_time", 0.6), ("dwell_time", 0.1), ("slider_x", 3e-4), ("slider_heading", 3e-3)):
+        assert told.values[name][rows] == pytest.approx(first.covariates[name], abs=error), name
+    away = wrap_angle(told.values["push_heading"][rows] - first.covariates["push_heading"])
+    assert away == pytest.approx(0.0, abs=0.02)
+    assert np.corrcoef(told.values["slid_distance"][rows], first.covariates["slid_distance"])[0, 1] > 0.99
+    assert told.values["room/light"][rows] == pytest.approx(0.5 * told.values["elapsed_time"][rows])
+
+
+def _found(recording: Recording) -> PushTable:
+    assert recording.rig is not None
+    return windows_to_table(find_windows(recording, recording.rig))
+
+
+def test_a_topic_is_recorded_beside_the_pushes_and_leaves_them_alone() -> None:
+    spec = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
+    topic = Topic(np.array([0.0, 60.0]), np.array([5.0, 65.0]))
+    with_topic = simulate(replace(spec, topics={"room/light": topic}))
+    assert set(with_topic.scalars) == {"surface/temperature", "room/light"}
+    stream = with_topic.scalars["room/light"]
+    assert stream.value == pytest.approx(5.0 + (stream.stamp - stream.stamp[0]) / 1e9, abs=0.01)
+    for one, other in zip(streams(simulate(spec)), streams(with_topic), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_pauses_come_before_the_pushes() -> None:
+    spec = SimulationSpec("rect1", "abs", some_pushes(3), seed=3, sensors=QUIET)
+    plain, paused = (
+        simulate(replace(spec, pauses=pauses)).pusher.stamp for pauses in (None, np.array([0.0, 4.0, 1.0]))
+    )
+    assert (paused[-1] - paused[0]) / 1e9 == pytest.approx((plain[-1] - plain[0]) / 1e9 + 5.0, abs=0.05)
+
+
+def test_a_late_clock_delays_the_tracker_alone() -> None:
+    plain, late = _both(Faults(clock_offset=0.02))
+    moved = np.interp(late.slider.stamp - 20_000_000, plain.slider.stamp, plain.slider.x)
+    inside = slice(10, -10)
+    assert np.max(np.abs(late.slider.x - moved)[inside]) < 1e-3
+    assert np.array_equal(late.pusher.x, plain.pusher.x)
+
+
+def test_a_moved_tracker_frame_turns_and_shifts_the_slider_alone() -> None:
+    plain, moved = _both(Faults(frame_rotation=0.1, frame_shift=(0.01, -0.02)))
+    expected = rotate(np.column_stack([plain.slider.x, plain.slider.y]), np.array(0.1)) + [0.01, -0.02]
+    assert np.column_stack([moved.slider.x, moved.slider.y]) == pytest.approx(expected, abs=1e-5)
+    assert np.array_equal(moved.pusher.x, plain.pusher.x)
+
+
+def test_a_shifted_tool_point_and_a_biased_wrench_show_in_their_own_streams() -> None:
+    plain, faulty = _both(Faults(tool_offset=(0.002, 0.001), wrench_bias=(0.3, 0.0, 0.01)))
+    assert faulty.pusher.x - plain.pusher.x == pytest.approx(0.002, abs=1e-5)
+    assert faulty.pusher.y - plain.pusher.y == pytest.approx(0.001, abs=1e-5)
+    assert plain.wrench is not None and faulty.wrench is not None
+    assert faulty.wrench.fx - plain.wrench.fx == pytest.approx(0.3, abs=0.005)
+    assert np.array_equal(faulty.slider.x, plain.slider.x)
+
+
+def test_a_rod_bends_with_the_force_and_only_then() -> None:
+    plain, bent = _both(Faults(compliance=5e-4))
+    assert plain.wrench is not None
+    away = np.hypot(bent.pusher.x - plain.pusher.x, bent.pusher.y - plain.pusher.y)
+    force = np.interp(plain.pusher.stamp, plain.wrench.stamp, np.hypot(plain.wrench.fx, plain.wrench.fy))
+    assert np.max(away[plain.pusher.z > 0.04]) < 2e-5
+    assert np.median(away[force > 0.8]) == pytest.approx(5e-4 * np.median(force[force > 0.8]), rel=0.1)
+
+
+def _both(faults: Faults) -> tuple[Recording, Recording]:
+    spec = SimulationSpec("rect1", "abs", some_pushes(4), seed=3, sensors=QUIET)
+    return simulate(spec), simulate(replace(spec, faults=faults))

@@ -1,0 +1,175 @@
+"""A simulated recording looks like one from a rig: streams on their own clocks, noise, gaps, resets, a lifted tip."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from repository import BAGS
+
+from push_predictor.errors import RequestError, RigError
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.write import write_recording
+from push_predictor.simulation.pushes import PushPlan, grid_pushes, random_pushes
+from push_predictor.simulation.rig_simulator import Sensors, SimulationSpec, push_outcomes, simulate
+from push_predictor.simulation.standard_bags import standard_bags
+from push_predictor.types import Array
+
+LIFTED = 0.03  # m
+
+
+def spec_of(seed: int = 1, pushes: int = 12, **options: object) -> SimulationSpec:
+    plan = random_pushes(pushes, [0.02, 0.05], 0.02, np.random.default_rng(seed), angle_limit=0.8)
+    return SimulationSpec("rect1", "abs", plan, seed=seed, **options)
+
+
+@pytest.fixture(scope="module")
+def simulated() -> Recording:
+    return simulate(spec_of())
+
+
+def seconds(stream: PoseStream) -> Array:
+    return np.asarray((stream.stamp - stream.stamp[0]) / 1e9)
+
+
+def lifted_at(recording: Recording, stamp: Array) -> Array:
+    return np.interp(stamp, recording.pusher.stamp, recording.pusher.z) > LIFTED
+
+
+def test_stamps_increase_and_the_clocks_differ(simulated: Recording) -> None:
+    assert simulated.wrench is not None
+    streams = (simulated.slider.stamp, simulated.pusher.stamp, simulated.wrench.stamp)
+    for stamp in streams:
+        assert np.all(np.diff(stamp) > 0)
+        assert np.median(np.diff(stamp)) == pytest.approx(1e7, rel=0.02)
+        assert np.std(np.diff(stamp)) > 1e5
+    assert len(np.intersect1d(streams[0], streams[1])) < 0.2 * len(streams[0])
+
+
+def test_the_same_spec_makes_the_same_recording(simulated: Recording) -> None:
+    again = simulate(spec_of())
+    assert np.array_equal(again.slider.stamp, simulated.slider.stamp)
+    assert np.array_equal(again.slider.heading, simulated.slider.heading)
+
+
+def test_other_seeds_and_other_pushes_never_share_stamps(simulated: Recording) -> None:
+    rest = spec_of(2, 3)
+    others = (simulate(rest), simulate(spec_of(3, 3)), simulate(spec_of(2, 4)))
+    spans = sorted((r.slider.stamp[0], r.slider.stamp[-1]) for r in (simulated, *others))
+    assert all(before[1] < after[0] for before, after in pairwise(spans))
+
+
+def test_the_tracker_is_as_noisy_as_it_says() -> None:
+    quiet = Sensors(dropout_interval=0.0)
+    stream = simulate(spec_of(pushes=6, sensors=quiet)).slider
+    resting = np.abs(np.diff(stream.x, 2)) < 3e-4  # second differences: sd is sqrt(6) times that of a sample
+    assert np.std(np.diff(stream.x, 2)[resting]) / np.sqrt(6.0) == pytest.approx(quiet.tracker_noise, rel=0.3)
+
+
+def test_dropouts_come_as_often_as_asked_and_not_otherwise() -> None:
+    gaps = [
+        np.sum(np.diff(simulate(spec_of(sensors=Sensors(dropout_interval=interval))).slider.stamp) > 25_000_000)
+        for interval in (0.0, 2.0)
+    ]
+    assert gaps[0] == 0
+    assert gaps[1] >= 3
+
+
+def test_the_slider_moves_only_when_pushed_or_while_the_tip_is_lifted(simulated: Recording) -> None:
+    slider = simulated.slider
+    pushed = np.hypot(simulated.wrench.fx, simulated.wrench.fy) > 0.4
+    touched = np.interp(slider.stamp, simulated.wrench.stamp, pushed) > 0.0
+    moved = np.hypot(np.diff(slider.x), np.diff(slider.y)) / np.diff(seconds(slider)) > 0.025
+    explained = touched | lifted_at(simulated, slider.stamp)
+    coasting = np.convolve(explained, np.ones(9), mode="same") > 0
+    assert np.any(moved & lifted_at(simulated, slider.stamp)[1:])
+    assert np.all(coasting[1:][moved])
+
+
+def test_nothing_is_felt_while_the_tip_is_lifted(simulated: Recording) -> None:
+    wrench = simulated.wrench
+    assert wrench is not None
+    lifted = lifted_at(simulated, wrench.stamp)
+    assert np.std(wrench.fx[lifted]) == pytest.approx(Sensors().force_noise, rel=0.2)
+    assert np.max(np.abs(wrench.fx[lifted])) < 0.2 < np.percentile(np.hypot(wrench.fx, wrench.fy), 90)
+
+
+def test_the_rig_record_says_what_was_simulated(simulated: Recording) -> None:
+    rig = simulated.rig
+    assert rig is not None
+    assert (rig.shape, rig.surface, rig.object_mass) == ("rect1", "abs", 0.837)
+    assert rig.support_points is not None
+    assert np.sum(rig.support_points[:, 2]) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_written_recording_reads_back(simulated: Recording, tmp_path: Path) -> None:
+    write_recording(tmp_path / "bag", simulated)
+    back = read_recording(tmp_path / "bag")
+    assert np.array_equal(back.slider.stamp, simulated.slider.stamp)
+    assert np.array_equal(back.pusher.x, simulated.pusher.x)
+    assert np.allclose(back.slider.heading, simulated.slider.heading, atol=1e-12)
+    assert any("temperature" in name for name in back.scalars)
+
+
+@pytest.mark.parametrize(("shape", "surface"), [("rect1", "abs"), ("ellip2", "plywood")])
+def test_windows_found_in_the_streams_are_those_of_the_true_motion(shape: str, surface: str) -> None:
+    plan = random_pushes(30, [0.02, 0.05], 0.025, np.random.default_rng(11), angle_limit=0.9)
+    spec = SimulationSpec(shape, surface, plan, seed=5, sensors=Sensors(dropout_interval=0.0))
+    recording = simulate(spec)
+    assert recording.rig is not None
+    found, true = windows_to_table(find_windows(recording, recording.rig)), push_outcomes(spec)
+    assert abs(len(found.pushes) - len(true.pushes)) <= 1
+    assert len(found) == pytest.approx(len(true), rel=0.1)
+    assert np.std(found.outcomes, axis=0) == pytest.approx(np.std(true.outcomes, axis=0), rel=0.1)
+    assert np.mean(found.inputs[:, 0]) == pytest.approx(np.mean(true.inputs[:, 0]), rel=0.05)
+
+
+def test_pushes_go_as_planned() -> None:
+    plan = PushPlan(np.array([0.1, 0.6]), np.array([0.4, -0.7]), np.array([0.02, 0.05]), np.full(2, 0.02))
+    table = push_outcomes(SimulationSpec("ellip2", "delrin", plan, seed=1))
+    first = table.take(np.unique(table.push_id, return_index=True)[1])
+    assert first.inputs[:, 0] == pytest.approx(plan.speed)
+    assert first.inputs[:, 1] == pytest.approx(plan.contact, abs=0.002)
+    assert first.inputs[:, 2] == pytest.approx(plan.angle, abs=0.01)
+
+
+def test_recordings_are_made_more_than_twenty_times_faster_than_they_last() -> None:
+    spec = spec_of(pushes=40)
+    begin = time.process_time()
+    recording = simulate(spec)
+    taken = time.process_time() - begin
+    assert seconds(recording.slider)[-1] > 20.0 * taken
+
+
+def test_a_wrong_plan_or_rig_is_refused_by_name() -> None:
+    with pytest.raises(RequestError, match=r"angle: 1\.6"):
+        grid_pushes([0.1], [1.6], 2)
+    with pytest.raises(RequestError, match=r"speed: -0\.02"):
+        random_pushes(3, [-0.02])
+    with pytest.raises(RequestError, match="pushes: 0"):
+        random_pushes(0, [0.02])
+    with pytest.raises(RigError, match="surface: 'ice'"):
+        simulate(SimulationSpec("rect1", "ice", random_pushes(1, [0.02])))
+    with pytest.raises(RigError, match="shape: 'star'"):
+        simulate(SimulationSpec("star", "abs", random_pushes(1, [0.02])))
+
+
+@pytest.mark.parametrize("name", ["circle_pu", "hexagon_delrin"])
+def test_the_kept_bags_are_what_their_command_makes(name: str) -> None:
+    kept, made = read_recording(BAGS / name), simulate(standard_bags()[name])
+    assert np.array_equal(kept.slider.stamp, made.slider.stamp)
+    assert np.array_equal(kept.pusher.stamp, made.pusher.stamp)
+    assert np.median(np.abs(kept.slider.x - made.slider.x)) < 1e-12
+    assert np.max(np.abs(kept.slider.x - made.slider.x)) < 1e-4
+
+
+def test_the_kept_bags_are_all_there_and_small() -> None:
+    names = set(standard_bags())
+    assert {path.parent.name for path in BAGS.glob("*/metadata.yaml")} >= names
+    assert sum(path.stat().st_size for name in names for path in (BAGS / name).iterdir()) < 8e6

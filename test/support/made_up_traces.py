@@ -1,0 +1,143 @@
+"""Traces whose truth is known: pushes by the analytical model with a planted effect, and the effect as if found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from synthetic import square_rig
+
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import ExtendedBody, PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.residuals import evidence_of
+from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.extension.extension import Term, compared, extend, gain, physics_of, refit_base
+from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace
+
+NOISE = np.array([1e-4, 1e-4, 3e-3])
+DRIFT = Form("linear", ("elapsed_time",), (500.0,), (300.0,))
+JUMP = Form("step", ("elapsed_time",), place=620.0)
+PLACE = Form("map", ("slider_x", "slider_y"), (0.0, 0.0), (0.1, 0.1))
+GRAIN: Term = ("anisotropic_friction", "push_heading", Form("constant"))
+DRIVERS = ("elapsed_time", "push_index", "slider_x", "slider_heading", "push_heading", "topic:/warmth")
+TESTED = tuple(
+    Tested(mechanism, driver, float(p))
+    for (mechanism, driver), p in zip(
+        [(m, d) for m in ("contact_friction", "pressure_spread", "tilted_surface", None) for d in DRIVERS],
+        np.linspace(0.001, 1.0, 24) ** 1.2,
+        strict=True,
+    )
+)
+DETECTABLE = {"contact_friction": {"value": 0.021, "unit": "1"}, "clock_offset": {"value": 0.004, "unit": "s"}}
+EXPERIMENT = (
+    {"velocity": 0.02, "contact": 0.06, "angle": 0.6, "elapsed_time": 50.0, "push_index": 95.0, "slider_heading": 0.5},
+)
+
+
+def physics() -> AnalyticalPush:
+    rig = square_rig()
+    return AnalyticalPush(rig.outline, rig.pusher_radius)
+
+
+def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
+    """Pushes of three windows with these effects; the windows of a push share some noise."""
+    rng = np.random.default_rng(seed)
+    n = 3 * count
+    contact, angle = rng.random(count), rng.uniform(-0.9, 0.9, count)
+    contact = np.floor(4.0 * contact) / 4.0 + np.clip(contact % 0.25, 0.02, 0.23)
+    jitter = rng.uniform(-1.0, 1.0, (n, 2)) * [0.01, 0.03]
+    inputs = np.column_stack([np.full(n, 0.02), *(np.repeat([contact, angle], 3, axis=1) + jitter.T)])
+    duration = np.full(n, 0.2)
+    normal = physics().outline.inward_normal(inputs[:, 1])
+    heading = np.repeat(rng.uniform(-np.pi, np.pi, count), 3)
+    covariates = {
+        "elapsed_time": np.repeat(np.linspace(0.0, 1000.0, count), 3),
+        "push_index": np.repeat(np.arange(count, dtype=np.float64), 3),
+        "slider_x": np.repeat(rng.uniform(-0.2, 0.2, count), 3),
+        "slider_y": np.repeat(rng.uniform(-0.2, 0.2, count), 3),
+        "slider_heading": heading,
+        "push_heading": wrap_angle(heading + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2]),
+        "edge": np.floor(4.0 * inputs[:, 1]),
+    }
+    shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
+    outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
+    push = Push(inputs, duration, covariates)
+    shift = sum((effect.shift(physics(), push)[0] for effect in effects), np.zeros((n, 3)))
+    push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
+    return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
+
+
+def planted(mechanism: str | None, covariate: str, form: Form, *coefficients: float) -> Effect:
+    """An effect of exactly this size."""
+    size = np.array(coefficients)
+    return Effect(mechanism, covariate, form, size, np.zeros((len(size), len(size))), np.ones(3))
+
+
+def slippery(size: float) -> Effect:
+    """A contact friction that changes by `size` in 300 s."""
+    return planted("contact_friction", "elapsed_time", DRIFT, size)
+
+
+def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", **other: Any) -> Trace:
+    """A trace that found exactly these effects; other: fields that are to be otherwise."""
+    model = train_model(pushes(60, 1), square_rig(), kind, name="deployed")
+    table = pushes(count, 2, *effects)
+    held = held_out_rows(table)
+    return replace(traced(model, table.take(~held), table.take(held), effects), **other)
+
+
+def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tuple[Effect, ...]) -> Trace:
+    """What a trace that finds these effects would say."""
+    refit = refit_base(model, analysis)
+    terms_of = [(e.mechanism, e.covariate, e.form) for e in effects]
+    after = extend(refit, analysis, terms_of, model) if effects else refit
+    terms = after.body.effects if isinstance(after.body, ExtendedBody) else ()
+    nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
+    before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))
+    return Trace(
+        verdict="effect" if terms else "none",
+        kind="mean" if terms else None,
+        model=model,
+        effects=tuple(found(term) for term in terms),
+        terms=terms,
+        equivalent=(),
+        mechanisms=(),
+        undecided=False,
+        analysis=analysis,
+        residual=evidence_of(model, analysis, physics_of(model)).z,
+        left=evidence_of(after, analysis, physics_of(model)).z,
+        held_out=HeldOut(held, before, again, last, digest_of(held)),
+        gain_nmse=nmse,
+        gain_nlpd=nlpd,
+        extended=after if terms and nlpd.high < 0.0 else None,
+        tested=TESTED if terms else tuple(replace(t, p_value=0.3 + 0.7 * t.p_value) for t in TESTED),
+        minimum_detectable=DETECTABLE,
+        remaining=None,
+        experiment=(),
+        alpha=0.01,
+        notes=("a note for the reader",),
+    )
+
+
+def found(term: Effect) -> FoundEffect:
+    """An effect as a trace tells it."""
+    sd = float(np.sqrt(term.covariance[0, 0]))
+    value = float(term.coefficients[0])
+    size = Sized("change per 300 s", value, value - 1.96 * sd, value + 1.96 * sd, "1")
+    parameter = None if term.mechanism is None else size
+    return FoundEffect(term.mechanism, term.covariate, ("dy", "dtheta"), term.form.name, parameter, 0.001, 0.23)
+
+
+def told(verdict: Any, mechanism: str, covariate: str, size: Sized | None, **other: Any) -> Trace:
+    """A trace whose finding leaves the motion model alone."""
+    outputs = () if verdict in ("measurement", "wrench_only") else ("dy",)
+    effect = FoundEffect(mechanism or None, covariate, outputs, "constant", size, 0.002, float("nan"))
+    kind: Literal["mean", "variance"] = "variance" if verdict == "variance" else "mean"
+    return replace(made_up_trace(count=60), verdict=verdict, effects=(effect,), kind=kind, **other)

@@ -1,0 +1,64 @@
+"""A subscriber in a process of its own: writes down the raw messages of some topics until it is told to stop.
+
+python replay_listener.py OUTPUT DEPTH TOPIC=TYPE...    writes a pickle {topic: [bytes, ...]} on SIGINT
+"""
+
+from __future__ import annotations
+
+import functools
+import pickle
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from push_predictor.nodes.replay.topics import message_class
+
+
+def main(output: str, depth: str, *topics: str) -> None:
+    """Listen; depth 0 keeps all."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    done = threading.Event()
+    signal.signal(signal.SIGINT, lambda number, frame: done.set())
+    node = Node("listener")
+    history = HistoryPolicy.KEEP_LAST if int(depth) else HistoryPolicy.KEEP_ALL
+    heard: dict[str, list[bytes]] = {}
+    for pair in topics:
+        topic, kind = pair.split("=")
+        heard[topic] = []
+        profile = QoSProfile(depth=int(depth), history=history)
+        callback = functools.partial(_keep, heard[topic])
+        node.create_subscription(message_class(kind), topic, callback, profile, raw=True)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    spinner = threading.Thread(target=executor.spin)
+    spinner.start()
+    done.wait()
+    while _still_hearing(heard):
+        pass
+    executor.shutdown()
+    spinner.join()
+    Path(output).write_bytes(pickle.dumps(heard))
+    rclpy.try_shutdown()
+
+
+def _still_hearing(heard: dict[str, list[bytes]]) -> bool:
+    """Has anything come within two seconds? What is in DDS by now is taken at the pace of Python."""
+    before = sum(map(len, heard.values()))
+    time.sleep(2.0)
+    return sum(map(len, heard.values())) > before
+
+
+def _keep(heard: list[bytes], data: bytes) -> None:
+    heard.append(bytes(data))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,223 @@
+"""Start nodes as processes and talk to them over DDS: what the tests of the nodes share."""
+
+from __future__ import annotations
+
+import fcntl
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from queue import Empty, Queue
+from typing import IO, Any
+
+from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from repository import REPOSITORY
+
+START_TIMEOUT = 60.0
+PATIENCE = 10.0  # s until a call is made again; ~/finish answers within 5 s
+_HELD: deque[tuple[int, IO[str]]] = deque()
+_NAMES = itertools.count()
+
+
+def free_domain() -> int:
+    """A ROS domain (1..101) that no other test, worker or test run of this machine holds.
+
+    A lock file is held for each of the last 12 domains of this process. The environment variable
+    PUSH_PREDICTOR_TEST_DOMAINS, such as "41-45", narrows the range.
+    """
+    low, high = _domain_range()
+    if len(_HELD) >= min(12, high - low + 1):
+        _HELD.popleft()[1].close()
+    for offset in range(high - low + 1):
+        domain = low + (os.getpid() * 7 + next(_NAMES) + offset) % (high - low + 1)
+        if (lock := _lock(domain)) is not None:
+            _HELD.append((domain, lock))
+            return domain
+    raise RuntimeError(f"every ROS domain from {low} to {high} is held by another test run")
+
+
+class NodeProcess(subprocess.Popen[bytes]):
+    """A node; stdout and stderr go to one file, so that a full pipe never stops it."""
+
+    log: Path
+
+    def text(self) -> str:
+        """What it has printed so far."""
+        return self.log.read_text(errors="replace")
+
+    def wait_for_text(self, text: str, timeout: float = START_TIMEOUT) -> str:
+        """Wait until it has printed `text`; returns everything printed. Raises AssertionError otherwise."""
+        wait_until(lambda: text in self.text() or self.poll() is not None, timeout)
+        assert text in self.text(), f"{text!r} was not printed (exit status {self.poll()}):\n{self.text()}"
+        return self.text()
+
+    def stop(self, number: int = signal.SIGINT, timeout: float = 30.0) -> int:
+        """Send a signal and return the exit status; kill and fail if it does not end."""
+        if self.poll() is None:
+            self.send_signal(number)
+        try:
+            return self.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            self.wait()
+            raise AssertionError(f"signal {number} did not end the node:\n{self.text()}") from None
+
+
+@contextmanager
+def node_process(
+    executable: str,
+    *ros_args: str,
+    domain: int,
+    namespace: str | None = None,
+    params: Mapping[str, Any] | None = None,
+) -> Iterator[NodeProcess]:
+    """Run `python -m push_predictor.nodes.EXECUTABLE --ros-args ...`; leaving stops it (SIGINT, then kill).
+
+    ros_args follow --ros-args as they are, such as "-r", "slider/pose:=/vicon/pose". params: name to value.
+    """
+    command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *ros_args]
+    if namespace:
+        command += ["-r", f"__ns:={namespace}"]
+    for name, value in (params or {}).items():
+        command += ["-p", f"{name}:={json.dumps(str(value) if isinstance(value, Path) else value)}"]
+    with tempfile.TemporaryDirectory(prefix="push_node_") as folder:
+        log = Path(folder) / "output.txt"
+        with log.open("wb") as output:
+            process = NodeProcess(
+                command, cwd=REPOSITORY, env=node_environment(domain), stdout=output, stderr=subprocess.STDOUT
+            )
+        process.log = log
+        try:
+            yield process
+        finally:
+            _end(process)
+
+
+def node_environment(domain: int) -> dict[str, str]:
+    """The environment of a node under test: its domain, this machine only, this repository's packages."""
+    environment = dict(os.environ)
+    # Inherited, it would keep a Python of another environment from setting its library path.
+    environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+    environment.update(
+        ROS_DOMAIN_ID=str(domain),
+        ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+        PYTHONUNBUFFERED="1",
+        OPENBLAS_NUM_THREADS="1",
+        PYTHONPATH=os.pathsep.join(filter(None, [str(REPOSITORY), environment.get("PYTHONPATH")])),
+    )
+    return environment
+
+
+@contextmanager
+def ros_context(domain: int, namespace: str | None = None) -> Iterator[Node]:
+    """The test's own node in `domain`, spun by a background thread: callbacks and `client.call` just work."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    context = Context()
+    context.init(args=[], domain_id=domain)
+    node = Node(f"test_{os.getpid()}_{next(_NAMES)}", context=context, namespace=namespace or "")
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        executor.shutdown()
+        thread.join(5.0)
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def wait_until(condition: Callable[[], bool], timeout: float = START_TIMEOUT) -> bool:
+    """Poll until `condition` holds; False after `timeout` seconds."""
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def acquaint(node: Node, server: str, timeout: float = START_TIMEOUT) -> None:
+    """Wait until the node named `server` knows every subscription and client that `node` has made so far.
+
+    It learns of them in the order in which they were made, and answers the last one; asking that twice does no harm.
+    """
+    client = node.create_client(GetParameters, f"{server}/get_parameters")
+    try:
+        call(client, GetParameters.Request(), timeout, patience=1.0)
+    finally:
+        node.destroy_client(client)
+
+
+def call(client: Client, request: Any, timeout: float = START_TIMEOUT, patience: float = PATIENCE) -> Any:
+    """Wait for the service, call it and return the response.
+
+    Asks again now and then: the middleware drops the answer to a client that it has not yet matched after 0.1 s, which
+    happens on a busy machine to a client that has just been made. So the service must bear being asked twice; else
+    `acquaint` first.
+    Raises AssertionError if either takes longer than `timeout` (s). Another thread must spin the node.
+    """
+    assert client.wait_for_service(timeout), f"no service {client.srv_name} after {timeout} s"
+    deadline, answers, asked = time.monotonic() + timeout, Queue[Future](), list[Future]()
+    try:
+        while (left := deadline - time.monotonic()) > 0.0:
+            asked.append(client.call_async(request))
+            asked[-1].add_done_callback(answers.put)
+            with suppress(Empty):
+                return answers.get(timeout=min(left, patience)).result()
+    finally:
+        for future in asked:
+            client.remove_pending_request(future)
+    raise AssertionError(f"{client.srv_name} did not answer within {timeout} s")
+
+
+def wait_for_publisher(node: Node, topic: str, timeout: float = START_TIMEOUT) -> None:
+    """Wait until somebody publishes `topic`; AssertionError otherwise."""
+    assert wait_until(lambda: node.count_publishers(topic) > 0, timeout), f"nobody publishes {topic}"
+
+
+def _domain_range() -> tuple[int, int]:
+    low, _, high = os.environ.get("PUSH_PREDICTOR_TEST_DOMAINS", "1-101").partition("-")
+    return int(low), int(high or low)
+
+
+def _lock(domain: int) -> IO[str] | None:
+    handle = (Path(tempfile.gettempdir()) / f"push_predictor_domain_{domain}.lock").open("a")
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        handle.close()
+        return None
+    return handle
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        return
+
+
+def _end(process: NodeProcess) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+    try:
+        process.wait(30.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

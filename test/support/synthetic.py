@@ -1,0 +1,111 @@
+"""Recordings whose truth is known exactly: a pusher that drives straight, a slider that follows a given motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate, to_world
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, IntArray
+
+START = 1_600_000_000_000_000_000  # ns
+RADIUS = 0.00475
+
+
+def square_rig() -> Rig:
+    """The square of the MIT set."""
+    return Rig("rect1", shape_outline("rect1"), RADIUS, "plywood", 0.837)
+
+
+def square_pushes(count: int, seed: int = 0) -> tuple[PushTable, Rig]:
+    """Windows of the square on ABS by the analytical model, three a push; noise that grows with the angle."""
+    rng, rig = np.random.default_rng(seed), replace(square_rig(), surface="abs")
+    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    duration = np.full(count, 0.2)
+    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes += rng.standard_normal((count, 3)) * [1e-4, 2e-4, 5e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    return PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(count)])), rig
+
+
+@dataclass(frozen=True)
+class Push:
+    """A push along the inward normal of the slider, which moves with the pusher and does not turn.
+
+    begin and end of contact, s; speed m/s. The pusher comes from and goes back to 20 mm before the touch.
+    """
+
+    begin: float = 0.5
+    end: float = 1.6
+    speed: float = 0.02
+
+
+def translating_push(
+    push: Push = Push(), *, contact: float = 0.125, rate: float = 100.0, tail: float = 0.8
+) -> Recording:
+    """The slider is pushed from rest at the origin, by a tip that always drives at the push's speed towards it."""
+    rig = square_rig()
+    time = np.arange(0.0, push.end + tail, 1.0 / rate)
+    driven = np.clip(time, push.begin, push.end) - push.begin
+    normal = rig.outline.inward_normal(np.array([contact]))[0]
+    touch = rig.outline.point(np.array([contact]))[0] - RADIUS * normal
+    away = push.speed * (np.minimum(time - push.begin, 0.0) - np.maximum(time - push.end, 0.0))
+    slider = driven[:, None] * push.speed * normal
+    pusher = touch + slider + away[:, None] * normal
+    force = np.where((time >= push.begin) & (time <= push.end), 2.0, 0.0)[:, None] * -normal
+    return Recording(
+        "translating",
+        rig,
+        pose_stream(time, slider, np.zeros_like(time)),
+        pose_stream(time, pusher, np.zeros_like(time)),
+        WrenchStream(stamps(time), force[:, 0], force[:, 1], np.zeros_like(time)),
+    )
+
+
+def stamps(time: Array) -> IntArray:
+    """Header stamps (ns) of times (s)."""
+    return START + np.round(time * 1e9).astype(np.int64)
+
+
+def pose_stream(time: Array, position: Array, heading: Array) -> PoseStream:
+    """A stream in the plane z = 0."""
+    return PoseStream(stamps(time), position[:, 0], position[:, 1], np.zeros_like(time), heading)
+
+
+def moved(recording: Recording, shift: Array, turn: float) -> Recording:
+    """The same recording seen from a world that is turned by `turn` (rad) and shifted (2,) m."""
+    wrench = recording.wrench
+    assert wrench is not None
+    force = rotate(np.column_stack([wrench.fx, wrench.fy]), np.array(turn))
+    return replace(
+        recording,
+        slider=_moved_pose(recording.slider, shift, turn),
+        pusher=_moved_pose(recording.pusher, shift, turn),
+        wrench=WrenchStream(wrench.stamp, force[:, 0], force[:, 1], wrench.torque),
+    )
+
+
+def _moved_pose(stream: PoseStream, shift: Array, turn: float) -> PoseStream:
+    world = to_world(np.column_stack([stream.x, stream.y]), np.array([*shift, turn]))
+    return PoseStream(stream.stamp, world[:, 0], world[:, 1], stream.z, stream.heading + turn)
+
+
+def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
+    """The samples that `keep` (mask, indices or slice) names."""
+    return PoseStream(stream.stamp[keep], stream.x[keep], stream.y[keep], stream.z[keep], stream.heading[keep])
+
+
+def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
+    """The same of a wrench."""
+    return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
+
+
+def triangle() -> Outline:
+    """A right triangle about its centroid: no symmetry at all."""
+    return Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))

@@ -1,0 +1,117 @@
+"""A validator, a server and a replay as processes, and what the tests ask of their result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from ros_harness import REPOSITORY, START_TIMEOUT, NodeProcess, call, node_process, wait_until
+from std_srvs.srv import Trigger
+
+from push_predictor.evaluation.offline import validate_recording
+from push_predictor.evaluation.validation import metrics_json
+from push_predictor.models.store.model_file import load_model
+
+HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"  # 10 pushes, 21 s
+CIRCLE = REPOSITORY / "bags" / "circle_pu"
+WRITTEN = "validation written"
+
+
+@contextmanager
+def replaying(
+    domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
+) -> Iterator[NodeProcess]:
+    """push_replay, once somebody listens."""
+    params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
+    with node_process("push_replay", *ros_args, domain=domain, params=params) as process:
+        yield process
+
+
+class Status:
+    """The last status of a node on /diagnostics, and every one before."""
+
+    def __init__(self, node: Node, name: str = "push_validator") -> None:
+        self._name = name
+        self.all: list[tuple[bytes, str, dict[str, str]]] = []
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 100)
+
+    def wait_for_first(self) -> None:
+        """A node that was heard here has, by then, discovered this listener too, which takes DDS up to 3 s."""
+        assert wait_until(lambda: bool(self.all)), f"nothing on /diagnostics of {self._name}"
+
+    def wait_for_server(self) -> None:
+        """Until the node knows a server: one found late in a replay would answer about all of it in one burst."""
+        found = wait_until(lambda: bool(self.all) and "nobody offers" not in self.message)
+        assert found, f"no server found: {self.all[-1:]}"
+
+    def wait_for_news(self) -> None:
+        """Until the values are of after this call: the first that comes may have been on its way before."""
+        known = len(self.all)
+        assert wait_until(lambda: len(self.all) > known + 1), f"no more on /diagnostics of {self._name}"
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if self._name in status.name:
+                self.all.append((status.level, status.message, {v.key: v.value for v in status.values}))
+
+    @property
+    def message(self) -> str:
+        return self.all[-1][1] if self.all else ""
+
+    @property
+    def values(self) -> dict[str, str]:
+        return self.all[-1][2] if self.all else {}
+
+    def wait_for(self, key: str, value: str, timeout: float = START_TIMEOUT) -> None:
+        assert wait_until(lambda: self.values.get(key) == value, timeout), f"{key} is not {value}: {self.all[-1:]}"
+
+    def wait_for_message(self, text: str, timeout: float = START_TIMEOUT) -> str:
+        assert wait_until(lambda: text in self.message, timeout), f"no {text!r} in {self.all[-1:]}"
+        return self.message
+
+
+def windows_of(folder: Path, suffix: str = "") -> list[dict[str, Any]]:
+    return list(json.loads((folder / f"windows{suffix}.json").read_text())["windows"])
+
+
+def assert_same_as_offline(folder: Path, model: Path, recording: Path = HEXAGON, suffix: str = "") -> None:
+    """The same windows, their predictions equal to 1e-9, the metrics equal to rounding."""
+    windows, comparison = validate_recording(load_model(model), recording)
+    online = windows_of(folder, suffix)
+    found, expected = [(w["push_id"], w["window"]) for w in online], [(w.push_id, w.index) for w in windows]
+    assert found == expected, f"missing {sorted({*expected} - {*found})}, too many {sorted({*found} - {*expected})}"
+    assert [(w["start"], w["end"]) for w in online] == [(w.start, w.end) for w in windows]
+    predicted = np.array([w["predicted"] for w in online])
+    assert np.max(np.abs(predicted - comparison.mean)) < 1e-9
+    covariance = np.array([w["covariance"] for w in online]).reshape(-1, 3, 3)
+    assert np.max(np.abs(covariance - comparison.covariance)) < 1e-9
+    result = json.loads((folder / f"validation{suffix}.json").read_text())
+    if not suffix:
+        assert "fired" in result.pop("alarm")
+    assert_same_figures(result, metrics_json(comparison))
+
+
+def assert_same_figures(found: Any, expected: Any) -> None:
+    """The same keys and texts, numbers equal to a relative 1e-6."""
+    if isinstance(expected, dict):
+        assert found.keys() == expected.keys()
+        for key in expected:
+            assert_same_figures(found[key], expected[key])
+    elif isinstance(expected, float):
+        assert abs(found - expected) <= 1e-6 * max(1.0, abs(expected))
+    else:
+        assert found == expected
+
+
+def finish(node: Node, name: str = "push_validator/finish", timeout: float = START_TIMEOUT) -> Trigger.Response:
+    client = node.create_client(Trigger, name)
+    try:
+        return call(client, Trigger.Request(), timeout)
+    finally:
+        node.destroy_client(client)
