@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
@@ -33,7 +33,7 @@ def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> 
     return {"value": nlpd.value, "low": nlpd.low, "high": nlpd.high}
 
 
-def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, str, Form]:
+def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, str, DriverBasis]:
     """Mechanism (None: the generic one), covariate and form of the truth, on the windows of a table."""
     known = {mechanism.name for mechanism in LIBRARY}
     named = [name for name in truth["names"] if name in known]
@@ -41,20 +41,20 @@ def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, s
     return mechanism, truth["covariates"][0], true_form(truth, table)
 
 
-def true_form(truth: Mapping[str, Any], table: PushTable) -> Form:
+def true_form(truth: Mapping[str, Any], table: PushTable) -> DriverBasis:
     """The form of the truth with centre and scale of the driver in these windows."""
     driver, form = truth["covariates"][0], truth["form"]
     if form == "constant" and (driver not in table.covariates or truth["names"][0] is not None):
-        return Form("constant")
+        return DriverBasis("constant")
     if form == "map" or driver == "slider_x":
         return two_dimensional(table)
     values = table.covariates[driver]
     if form == "category" or driver == "edge":
-        return Form("category", (driver,), levels=tuple(float(level) for level in np.unique(values)))
+        return DriverBasis("category", (driver,), levels=tuple(float(level) for level in np.unique(values)))
     if form == "periodic":
-        return Form("periodic", (driver,))
+        return DriverBasis("periodic", (driver,))
     if form == "step":
-        return Form("step", (driver,), place=float(truth["place"]))
+        return DriverBasis("step", (driver,), place=float(truth["place"]))
     return standard_form(_smooth(truth), driver, values)
 
 

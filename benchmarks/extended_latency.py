@@ -18,18 +18,18 @@ from time import perf_counter
 import numpy as np
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import ExtendedBody, Prediction, PushModel
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-DRIFT = Form("linear", ("elapsed_time",), (500.0,), (300.0,))
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 Ask = Callable[[Array, Array, Mapping[str, Array]], Prediction]
 
 
@@ -40,18 +40,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the pushes (default 1)")
     options = parser.parse_args()
     base, table = _base(), _table(options.pushes, options.seed)
-    shift, body = _effect("contact_friction", 0.05), _effect("centre_of_friction", 1e-3, 1e-3)
+    friction, centre = _effect("contact_friction", 0.05), _effect("centre_of_friction", 1e-3, 1e-3)
     models = {
-        "contact_friction": _extended(base, shift),
-        "centre_of_friction": _extended(base, body),
-        "both": _extended(base, shift, body),
+        "contact_friction": _extended(base, friction),
+        "centre_of_friction": _extended(base, centre),
+        "both": _extended(base, friction, centre),
         "generic": _extended(base, _effect(None, *np.full(18, 0.1))),
         "anisotropic_friction": _extended(base, _effect("anisotropic_friction", 0.1, 0.05)),
         "analytical, no effect": _analytical(base),
     }
     print(f"{'p50, us':24s}{'base':>8s}{'before':>8s}{'now':>8s}{'ratio':>8s}{'was':>8s}{'apart':>10s}")
     for name, model in models.items():
-        first, before, now = _times([serve(base).predict, _before(model), serve(model).predict], table)
+        first, before, now = _times([tabulate(base).predict, _before(model), tabulate(model).predict], table)
         print(
             f"{name:24s}{first:8.0f}{before:8.0f}{now:8.0f}{now / first:8.1f}{before / first:8.1f}"
             f"{_apart(model, table):10.1e}"
@@ -60,14 +60,14 @@ def main() -> None:
 
 def _before(model: PushModel) -> Ask:
     """The table for the base, and arrays for the effects."""
-    if not isinstance(body := model.body, ExtendedBody):
+    if not isinstance(predictor := model.predictor, ExtendedPredictor):
         return model.predict
-    base = serve(model.base)
+    base = tabulate(model.base)
 
     def predict(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
         found = base.predict(inputs, duration)
         moments = found.mean, found.covariance, found.process_covariance
-        return Prediction(*body.extended(moments, Push(inputs, duration, covariates)), found.in_domain)
+        return Prediction(*predictor.extended(moments, Push(inputs, duration, covariates)), found.in_domain)
 
     return predict
 
@@ -86,10 +86,10 @@ def _times(asks: list[Ask], table: PushTable) -> list[float]:
 
 def _apart(model: PushModel, table: PushTable) -> float:
     """Of pushes asked one by one of the served model, from the same by arrays of one row."""
-    served, before, apart = serve(model), _before(model), 0.0
+    tabulated, before, apart = tabulate(model), _before(model), 0.0
     for k in range(len(table)):
         row = table.take(np.arange(k, k + 1))
-        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (served.predict, before))
+        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (tabulated.predict, before))
         sd = np.sqrt(np.diagonal(theirs.covariance[0]))
         apart = max(apart, float(np.max(np.abs(ours.mean - theirs.mean) / sd)))
     return apart
@@ -126,7 +126,7 @@ def _effect(mechanism: str | None, *size: float) -> Effect:
 
 
 def _extended(base: PushModel, *effects: Effect) -> PushModel:
-    return replace(base, body=ExtendedBody(base.body, _physics(), effects, np.ones(3)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor, _physics(), effects, np.ones(3)))
 
 
 if __name__ == "__main__":

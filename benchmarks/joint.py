@@ -27,7 +27,7 @@ from push_predictor.evaluation.splits import FOLDS, push_bootstrap
 from push_predictor.evaluation.validation import by_push
 from push_predictor.models.correlation import Correlation
 from push_predictor.models.correlation_fit import fit_correlation
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.load import load_data, load_rig_for
@@ -70,9 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def judged(model: PushModel, test: PushTable, cpu: float) -> Judged:
     """A learnt model against windows that it was not trained on."""
-    assert isinstance(model.body, LearnedBody)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
     start = time.process_time()
-    correlation = fit_correlation(model.body, model.training.push_id)
+    correlation = fit_correlation(model.predictor, model.training.push_id)
     of_correlation = time.process_time() - start
     constant = replace(correlation, bandwidth=EVERYWHERE) if correlation else None
     columns = [_nlpd(model, kind, test) for kind in (correlation, constant, None)]
@@ -93,8 +93,10 @@ def gain(pushes: np.ndarray, windows: Array, sums: Array) -> Estimate:
 
 
 def _nlpd(model: PushModel, correlation: Correlation | None, test: PushTable) -> Array:
-    assert isinstance(model.body, LearnedBody)
-    prediction = replace(model, body=replace(model.body, correlation=correlation)).predict(test.inputs, test.duration)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    prediction = replace(model, predictor=replace(model.predictor, correlation=correlation)).predict(
+        test.inputs, test.duration
+    )
     return joint_nlpd(prediction.mean, prediction.covariance, test.outcomes)
 
 

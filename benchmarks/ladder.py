@@ -24,7 +24,7 @@ from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import tally
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
-from push_predictor.models.predictors import ExtendedBody
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
@@ -164,8 +164,8 @@ def _of_all_levels(candidate: Candidate, table: PushTable) -> Candidate:
 def _judged(model: PushModel, found: Term, rest: PushTable, gate: PushTable) -> Step:
     best = found.best
     after = extend(model, rest, [(best.mechanism, best.covariate, best.form)])
-    assert isinstance(after.body, ExtendedBody)
-    effect, (_, nlpd) = after.body.effects[-1], gain(model, after, gate)
+    assert isinstance(after.predictor, ExtendedPredictor)
+    effect, (_, nlpd) = after.predictor.effects[-1], gain(model, after, gate)
     refused = "" if nlpd.high < 0.0 else "no gain at the gate"
     if not _plausible(effect, rest):
         refused = "no rig has such a parameter"

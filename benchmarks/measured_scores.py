@@ -11,7 +11,7 @@ from push_predictor_paper.estimate import Estimate, by_push, difference_by_push,
 
 from push_predictor.evaluation import push_scores as tallies
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
@@ -33,7 +33,7 @@ class Fold:
     cpu: float
 
     @property
-    def tally(self) -> Tally:
+    def tally(self) -> PushScores:
         """Its sums by push."""
         return tallies.tally(self.comparison)
 
@@ -46,12 +46,12 @@ def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool
     return Fold(model, compare(model, test), model.predict(test.inputs, test.duration).in_domain, cpu)
 
 
-def pooled(folds: Sequence[Fold]) -> Tally:
+def pooled(folds: Sequence[Fold]) -> PushScores:
     """The windows of all folds together; each keeps its own model's training mean as reference of the NMSE."""
     return tallies.pooled([fold.tally for fold in folds])
 
 
-def figures(tally: Tally) -> str:
+def figures(tally: PushScores) -> str:
     """The cells under HEAD: totals over the outputs in SI units, intervals by resampling whole pushes."""
     totals = tally.totals()
     nmse, nlpd = by_push(tally, total_nmse), by_push(tally, total_nlpd)
@@ -61,19 +61,19 @@ def figures(tally: Tally) -> str:
     return " | ".join(cells)
 
 
-def difference(first: Tally, second: Tally) -> str:
+def difference(first: PushScores, second: PushScores) -> str:
     """The cells under HEAD for what the second model gains over the first on the same rows: differences, paired."""
     nmse, nlpd = (difference_by_push(first, second, figure) for figure in (total_nmse, total_nlpd))
     exact = "" if _gaussian(second) else f"{total(second, 'exact_nlpd') - total(first, 'nlpd'):+.2f}"
     return f"{nmse.value:+.3f} | {_between(nmse, '+.3f')} | {nlpd.value:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"
 
 
-def total(tally: Tally, key: str) -> float:
+def total(tally: PushScores, key: str) -> float:
     """One figure (nmse, nlpd, exact_nlpd), summed over the outputs."""
     return float(np.sum(getattr(tally.totals(), key)))
 
 
-def _gaussian(tally: Tally) -> bool:
+def _gaussian(tally: PushScores) -> bool:
     return np.array_equal(tally.exact_nlpd, tally.nlpd)
 
 

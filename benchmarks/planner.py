@@ -23,13 +23,13 @@ import numpy as np
 from benchmarks.planner_table import Regime, Runs, table
 from push_predictor.models.push_model import Prediction, PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.persistence import persistence_of
-from push_predictor.planning.repertoire import Repertoire, every_line, repertoire
-from push_predictor.planning.unscented import Predict, Tip
+from push_predictor.planning.repertoire import Repertoire, push_grid, repertoire
+from push_predictor.planning.unscented import Predict, PusherGeometry
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--regimes", nargs="*", help="names; all unless given")
     options = parser.parse_args(arguments)
     model = load_model(options.model) if options.model else trained()
-    repertoires = repertoires_of(serve(model))
+    repertoires = repertoires_of(tabulate(model))
     count = len(repertoires[VARIANTS[0]])
     print(f"{count} pushes to choose from; {options.goals} goals; probability {options.probability}\n")
     for regime in REGIMES:
@@ -77,21 +77,21 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def repertoires_of(served: ServedModel) -> dict[str, Repertoire]:
+def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
     """One a variant: the same pushes and means, those of the model; the covariances of each."""
-    model = served.model
+    model = tabulated.model
 
     def predict(inputs: Array) -> Prediction:
-        return served.predict(inputs, np.full(len(inputs), WINDOW))
+        return tabulated.predict(inputs, np.full(len(inputs), WINDOW))
 
     typical = model.predict(model.training.inputs, model.training.duration).covariance.mean(axis=0)
-    lasting = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
-    tip = Tip(model.rig.outline, model.rig.pusher_radius, WINDOW)
+    persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    tip = PusherGeometry(model.rig.outline, model.rig.pusher_radius, WINDOW)
     edges = len(model.rig.outline.vertices)
     contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
-    lines = every_line([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
-    own = repertoire(predict, tip, lines, WINDOWS, lasting)
-    constant = repertoire(_with_covariance(predict, typical), tip, lines, WINDOWS, lasting)
+    lines = push_grid([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
+    own = repertoire(predict, tip, lines, WINDOWS, persistent_fraction)
+    constant = repertoire(_with_covariance(predict, typical), tip, lines, WINDOWS, persistent_fraction)
     keys = np.intersect1d(_keys(own), _keys(constant))
     own, constant = _only(own, keys), _only(constant, keys)
     every = np.tile(own.covariance.mean(axis=0), (len(own), 1, 1))

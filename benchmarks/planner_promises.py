@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.planner import AREA, SEED, VARIANTS, WINDOW, repertoires_of, trained
 from push_predictor.geometry.frames import to_body
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.repertoire import Repertoire
 from push_predictor.simulation.interactive_rig import push_once
@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--repetitions", type=int, default=16, help="of each push")
     parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train; trained now unless given")
     options = parser.parse_args(arguments)
-    repertoires = repertoires_of(serve(load_model(options.model) if options.model else trained()))
+    repertoires = repertoires_of(tabulate(load_model(options.model) if options.model else trained()))
     rng = np.random.default_rng(SEED)
     rows = rng.choice(len(repertoires[VARIANTS[0]]), options.pushes, replace=False)
     beside = _beside_the_mean(repertoires[VARIANTS[0]], rows, options.repetitions, rng)

@@ -42,7 +42,7 @@ from std_srvs.srv import Trigger
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server.direct_service import DirectService
 from push_predictor_interfaces.srv import PredictPush
@@ -139,14 +139,16 @@ def _report(times: dict[str, np.ndarray]) -> None:
 
 def _in_this_process(model: PushModel) -> None:
     start = perf_counter()
-    served = serve(model)
+    tabulated = tabulate(model)
     made = perf_counter() - start
-    print(f"{model.name}, {len(model.training)} windows, {served.how}; made in {made:.2f} s")
-    print(f"  in this process, p50: served model {_model_time(served):.0f} us, the model {_model_time(model):.0f} us")
+    print(f"{model.name}, {len(model.training)} windows, {tabulated.how}; made in {made:.2f} s")
+    print(
+        f"  in this process, p50: served model {_model_time(tabulated):.0f} us, the model {_model_time(model):.0f} us"
+    )
 
 
-def _model_time(model: PushModel | ServedModel) -> float:
-    training = model.model.training if isinstance(model, ServedModel) else model.training
+def _model_time(model: PushModel | TabulatedModel) -> float:
+    training = model.model.training if isinstance(model, TabulatedModel) else model.training
     inputs, duration = training.inputs[:200], training.duration[:200]
     times = []
     for k in range(len(inputs)):

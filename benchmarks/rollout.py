@@ -36,7 +36,7 @@ from benchmarks.rollout_truth import (
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
 from push_predictor.planning.push_windows import windows_of
@@ -60,21 +60,21 @@ def main() -> int:
     """Simulate, roll out, print the table."""
     options = _arguments()
     model = load_model(options.model) if options.model else trained()
-    served = serve(model)
-    print(f"{model.name}: {model.kind}, {len(model.training)} windows; {served.how}")
+    tabulated = tabulate(model)
+    print(f"{model.name}: {model.kind}, {len(model.training)} windows; {tabulated.how}")
     print("persistence over 4, 8, 16, 40 mm of way, dx dy dtheta:", *_persistence(model))
     pushes = [(contact, angle) for contact in CONTACTS for angle in ANGLES]
     seen = [_repeated(k, *push, options.repeats) for k, push in enumerate(pushes)]
     for place, length in enumerate(LENGTHS):
         steps = [[[SPEED, *push, length / SPEED]] for push in pushes]
-        _report(served, f"{1e3 * length:.0f} mm of way", steps, [each.poses[place] for each in seen])
+        _report(tabulated, f"{1e3 * length:.0f} mm of way", steps, [each.poses[place] for each in seen])
     singles = [[SPEED, *push, LENGTHS[IN_TURN] / SPEED] for push in pushes]
     sequences = np.random.default_rng(0).permutation(len(pushes)).reshape(-1, 3)
     truth = [in_turn([seen[k].poses[IN_TURN] for k in sequence]) for sequence in sequences]
     steps = [[singles[k] for k in sequence] for sequence in sequences]
-    _report(served, f"three pushes of {1e3 * LENGTHS[IN_TURN]:.0f} mm, one after the other", steps, truth)
+    _report(tabulated, f"three pushes of {1e3 * LENGTHS[IN_TURN]:.0f} mm, one after the other", steps, truth)
     if options.picture:
-        draw_rollout(served, options.picture)
+        draw_rollout(tabulated, options.picture)
     return 0
 
 
@@ -88,14 +88,14 @@ def _repeated(number: int, contact: float, angle: float, count: int) -> Repeats:
     return repeats(contact, angle, SPEED, np.array(LENGTHS) / SPEED, count, 1000 + number)
 
 
-def _report(served: ServedModel, title: str, cases: Sequence[Steps], truth: Sequence[Array]) -> None:
+def _report(tabulated: TabulatedModel, title: str, cases: Sequence[Steps], truth: Sequence[Array]) -> None:
     weights = weights_of(len(truth[0]))
     print(f"\n{title}: {len(cases)} of them, {len(truth[0])} repeats of each")
     head = "".join(f"{f'{100.0 * share:.0f} %':>8s}" for share in REGIONS)
     print(f"{'':12s}{'energy distance, mm':>28s}{'over rollout':>24s}{'KL, nats':>10s}{head}")
     first: Array | None = None
     for name, distribution in DISTRIBUTIONS.items():
-        samples = [distribution(served, steps) for steps in cases]
+        samples = [distribution(tabulated, steps) for steps in cases]
         energies = [EnergyDistance(s, t, ARM) for s, t in zip(samples, truth, strict=True)]
         drawn = MILLIMETRES * np.mean([[e.value(w) for w in weights] for e in energies], axis=0)
         value = MILLIMETRES * np.mean([e.value() for e in energies])
@@ -118,39 +118,39 @@ def _persistence(model: PushModel) -> list[str]:
     return [" ".join(f"{value:.2f}" for value in row) + ";" for row in correlation]
 
 
-def _rolled(served: ServedModel, steps: Steps) -> Array:
-    return rollout(served, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES).samples
+def _rolled(tabulated: TabulatedModel, steps: Steps) -> Array:
+    return rollout(tabulated, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES).samples
 
 
-def _independent(served: ServedModel, steps: Steps) -> Array:
-    return rollout(served, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES, persistence=INDEPENDENT).samples
+def _independent(tabulated: TabulatedModel, steps: Steps) -> Array:
+    return rollout(tabulated, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES, persistence=INDEPENDENT).samples
 
 
-def _naive(served: ServedModel, steps: Steps) -> Array:
+def _naive(tabulated: TabulatedModel, steps: Steps) -> Array:
     """Samples of the Gaussian along the path of the means."""
     slider, covariance = np.zeros((1, 3)), np.zeros((3, 3))
     for step in steps:
-        slider, added = _step_of_means(served, slider, step)
+        slider, added = _step_of_means(tabulated, slider, step)
         covariance += added
     return np.random.default_rng(0).multivariate_normal(slider[0], covariance, SAMPLES)
 
 
-def _step_of_means(served: ServedModel, slider: Array, step: Sequence[float]) -> tuple[Array, Array]:
+def _step_of_means(tabulated: TabulatedModel, slider: Array, step: Sequence[float]) -> tuple[Array, Array]:
     """The slider (1, 3) after the mean displacements of a step, and the sum of their covariances (3, 3)."""
-    rig, windows, covariance = served.model.rig, windows_of(served.model, step[3]), np.zeros((3, 3))
+    rig, windows, covariance = tabulated.model.rig, windows_of(tabulated.model, step[3]), np.zeros((3, 3))
     drive, meeting = drive_onto(rig.outline, rig.pusher_radius, slider, np.array([step[:3]]))
     for window in range(windows.count):
         if window:
             meeting = drive.meet(slider, meeting, window * windows.duration, windows.duration)
         if not meeting.held[0]:
             break
-        prediction = served.predict(meeting.touch.inputs, np.array([windows.asked]))
+        prediction = tabulated.predict(meeting.touch.inputs, np.array([windows.asked]))
         slider = displaced(slider, meeting.touch.heading, meeting.share[:, None] * windows.scale * prediction.mean)
         covariance += covariance_in_world(prediction.covariance, meeting.touch.heading)[0]
     return slider, covariance
 
 
-DISTRIBUTIONS: dict[str, Callable[[ServedModel, Steps], Array]] = {
+DISTRIBUTIONS: dict[str, Callable[[TabulatedModel, Steps], Array]] = {
     "rollout": _rolled,
     "independent": _independent,
     "naive": _naive,

@@ -11,7 +11,7 @@ from benchmarks.rollout_truth import repeats
 from push_predictor.evaluation.unimodality import dip, p_values
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.tabulated.tabulated_model import ServedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.rollout import rollout
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, START, draw
 from push_predictor.types import Array
@@ -28,15 +28,15 @@ BINS = 20
 DIP_DRAWS = 5000
 
 
-def draw_rollout(served: ServedModel, path: Path) -> None:
+def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
     """Draw it, and print how surely headings have two modes (Hartigan's dip)."""
-    outline = served.model.rig.outline
+    outline = tabulated.model.rig.outline
     inward = outline.inward_normal(np.array([CONTACT]))[0]
     ahead = np.arctan2(inward[1], inward[0])
     truth = repeats(CONTACT, ANGLE, SPEED, TIMES, COUNT, 500).poses
     steps = [[SPEED, CONTACT, ANGLE, float(time)] for time in TIMES]
     # One seed: the samples of a shorter push are those of the longer one at that time.
-    predicted = [rollout(served, np.zeros(3), np.zeros((3, 3)), [step], COUNT).samples for step in steps]
+    predicted = [rollout(tabulated, np.zeros(3), np.zeros((3, 3)), [step], COUNT).samples for step in steps]
     for time, samples, seen in zip(TIMES, predicted, truth, strict=True):
         p = p_values(np.concatenate([dip(samples[None, :, 2]), dip(seen[None, :, 2])]), COUNT, DIP_DRAWS)
         print(f"{1e3 * SPEED * time:.0f} mm: one mode of the heading, p = {p[0]:.2g} of samples, {p[1]:.2g} of repeats")

@@ -27,8 +27,8 @@ from push_predictor.models.store.model_file import load_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.persistence import persistence_of
-from push_predictor.planning.repertoire import Repertoire, every_line, repertoire
-from push_predictor.planning.unscented import Tip
+from push_predictor.planning.repertoire import Repertoire, push_grid, repertoire
+from push_predictor.planning.unscented import PusherGeometry
 from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.spec import SimulationSpec
@@ -82,11 +82,13 @@ def _asked(client: PlannerClient, model: PushModel) -> Repertoire:
     outline = model.rig.outline
     edges = len(outline.vertices)
     contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
-    lines = every_line([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
-    lasting = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    lines = push_grid([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
+    persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
     client.predict(lines[:1])  # returns when the server is up
     begun = time.monotonic()
-    pushes = repertoire(client.predict, Tip(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, lasting)
+    pushes = repertoire(
+        client.predict, PusherGeometry(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, persistent_fraction
+    )
     print(f"{len(pushes)} pushes stay in the model's domain; asked in {time.monotonic() - begun:.1f} s", flush=True)
     return pushes
 

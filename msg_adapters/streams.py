@@ -35,7 +35,7 @@ TIP = SensorKind(POSE_STAMPED, {"not finite": lambda rows: ~np.isfinite(rows[:, 
 WRENCH = SensorKind(WRENCH_STAMPED, {"not finite": lambda rows: ~np.isfinite(rows[:, [0, 1, 5]]).all(axis=1)})
 
 
-class Inbox:
+class MessageBuffer:
     """Serialized messages of one topic until somebody takes them; what cannot be used is counted by kind.
 
     frame_id: what the headers must name, empty for any. Beyond LIMIT the oldest messages are dropped, and counted.

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally, Totals
+from push_predictor.evaluation.push_scores import PooledScores, PushScores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array
 
-Figure = Callable[[Totals], Array]  # (d,) of d draws
+Figure = Callable[[PooledScores], Array]  # (d,) of d draws
 
 
 @dataclass(frozen=True)
@@ -48,28 +48,28 @@ def of_draws(value: float, draws: Array) -> Estimate:
     return Estimate(float(value), float(low), float(high))
 
 
-def by_push(tally: Tally, figure: Figure) -> Estimate:
+def by_push(tally: PushScores, figure: Figure) -> Estimate:
     """A figure of the pushes of a tally, by drawing whole pushes anew."""
     return of_draws(float(figure(tally.totals())[0]), figure(tally.resampled()))
 
 
-def difference_by_push(first: Tally, second: Tally, figure: Figure) -> Estimate:
+def difference_by_push(first: PushScores, second: PushScores, figure: Figure) -> Estimate:
     """The second's figure less the first's, of the same pushes drawn together."""
     weights = push_bootstrap(first.push_id)
     value = figure(second.totals())[0] - figure(first.totals())[0]
     return of_draws(float(value), figure(second.totals(weights)) - figure(first.totals(weights)))
 
 
-def total_nmse(totals: Totals) -> Array:
+def total_nmse(totals: PooledScores) -> Array:
     """NMSE summed over the outputs, (d,)."""
     return np.asarray(totals.nmse.sum(axis=1))
 
 
-def total_nlpd(totals: Totals) -> Array:
+def total_nlpd(totals: PooledScores) -> Array:
     """NLPD summed over the outputs, moment-matched Gaussian, SI units, (d,)."""
     return np.asarray(totals.nlpd.sum(axis=1))
 
 
-def total_exact_nlpd(totals: Totals) -> Array:
+def total_exact_nlpd(totals: PooledScores) -> Array:
     """NLPD summed over the outputs, exact predictive density, SI units, (d,)."""
     return np.asarray(totals.exact_nlpd.sum(axis=1))

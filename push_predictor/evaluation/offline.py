@@ -11,7 +11,7 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
@@ -70,7 +70,7 @@ def validate_recording(
     """Predict every window of a recording, as a server of the model would; tell as for `recorded_windows`."""
     windows, table = recorded_windows(model, path, rig, tell)
     check_table(model, table)
-    prediction = serve(model).predict(table.inputs, table.duration, table.covariates)
+    prediction = tabulate(model).predict(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 

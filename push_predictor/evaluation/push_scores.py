@@ -15,7 +15,7 @@ from push_predictor.types import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Tally:
+class PushScores:
     """Sums over the windows of each of p pushes.
 
     push_id (p,); windows (p,) their number; error, spread (p, 3): squared distance from the prediction and from the
@@ -31,7 +31,7 @@ class Tally:
     exact_nlpd: Array
     covered: Array
 
-    def totals(self, weights: Array | None = None) -> Totals:
+    def totals(self, weights: Array | None = None) -> PooledScores:
         """Figures for each row of weights (d, p) that says how often a push counts; each push once if None."""
         w = np.ones((1, len(self.windows))) if weights is None else weights
         count = w @ self.windows
@@ -40,15 +40,15 @@ class Tally:
             return np.asarray((w @ sums) / count[:, None])
 
         shares = np.stack([mean(self.covered[..., k]) for k in range(len(COVERAGE_LEVELS))], axis=-1)
-        return Totals((w @ self.error) / (w @ self.spread), mean(self.nlpd), mean(self.exact_nlpd), shares)
+        return PooledScores((w @ self.error) / (w @ self.spread), mean(self.nlpd), mean(self.exact_nlpd), shares)
 
-    def resampled(self, seed: int = 0) -> Totals:
+    def resampled(self, seed: int = 0) -> PooledScores:
         """Figures of 1000 draws of whole pushes with replacement; the same pushes drawn for every tally of them."""
         return self.totals(push_bootstrap(self.push_id, seed))
 
 
 @dataclass(frozen=True, eq=False)
-class Totals:
+class PooledScores:
     """Figures of d draws: nmse, nlpd, exact_nlpd (d, 3) by output, coverage (d, 3, levels)."""
 
     nmse: Array
@@ -57,7 +57,7 @@ class Totals:
     coverage: Array
 
 
-def tally(comparison: Comparison) -> Tally:
+def tally(comparison: Comparison) -> PushScores:
     """Sum what was predicted and observed over the windows of each push."""
     c = comparison
     pushes, push = np.unique(c.push_id, return_inverse=True)
@@ -66,10 +66,10 @@ def tally(comparison: Comparison) -> Tally:
     away = np.abs(c.observed - c.mean) / np.sqrt(c.variance)
     covered = away[..., None] <= ndtri(0.5 + 0.5 * np.asarray(COVERAGE_LEVELS))
     columns = ((c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2, nlpd, exact, covered.astype(np.float64))
-    return Tally(pushes, np.bincount(push).astype(np.float64), *(by_push(push, column) for column in columns))
+    return PushScores(pushes, np.bincount(push).astype(np.float64), *(by_push(push, column) for column in columns))
 
 
-def pooled(tallies: Sequence[Tally]) -> Tally:
+def pooled(tallies: Sequence[PushScores]) -> PushScores:
     """The pushes of several tallies as one: of folds (each push once), or of seeds (a push as often as it was seen)."""
     names = np.concatenate([t.push_id for t in tallies])
     pushes, push = np.unique(names, return_inverse=True)
@@ -77,4 +77,4 @@ def pooled(tallies: Sequence[Tally]) -> Tally:
     def joined(field: str) -> Array:
         return by_push(push, np.concatenate([getattr(t, field) for t in tallies]))
 
-    return Tally(pushes, *(joined(f) for f in ("windows", "error", "spread", "nlpd", "exact_nlpd", "covered")))
+    return PushScores(pushes, *(joined(f) for f in ("windows", "error", "spread", "nlpd", "exact_nlpd", "covered")))

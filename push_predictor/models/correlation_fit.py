@@ -14,7 +14,7 @@ import numpy as np
 
 from push_predictor.models.correlation import Correlation, correlations, covariances
 from push_predictor.models.gaussian_process.cross_validation import left_out
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 
 BANDWIDTHS = (0.2, 0.3, 0.4, 0.6, 0.9, 1.4, 2.5)  # standard deviations of the features
@@ -26,7 +26,7 @@ MOST_BLOCKS = 300  # that pushes are left out in
 CLEARLY = 2.0  # standard errors, from push to push
 
 
-def fit_correlation(body: LearnedBody, push_ids: np.ndarray) -> Correlation | None:
+def fit_correlation(predictor: GaussianProcessPredictor, push_ids: np.ndarray) -> Correlation | None:
     """The correlation of a body's outputs, from its training rows and the push (n,) that each belongs to.
 
     Bandwidth and shrinkage are those under which the pushes left out are likeliest. None, independence, where they are
@@ -36,15 +36,15 @@ def fit_correlation(body: LearnedBody, push_ids: np.ndarray) -> Correlation | No
     if len(pushes) < FEWEST_PUSHES:
         return None
     block = np.asarray(push % MOST_BLOCKS, dtype=np.int64)
-    best, gains = max(_candidates(body, block), key=lambda candidate: float(candidate[1].sum()))
+    best, gains = max(_candidates(predictor, block), key=lambda candidate: float(candidate[1].sum()))
     error = np.sqrt(len(gains)) * gains.std(ddof=1)
     return best if gains.sum() > CLEARLY * error else None
 
 
-def _candidates(body: LearnedBody, block: IntArray) -> Iterator[tuple[Correlation, Array]]:
+def _candidates(predictor: GaussianProcessPredictor, block: IntArray) -> Iterator[tuple[Correlation, Array]]:
     """Correlations, and by how much each makes the pushes left out likelier than independence, (blocks,) nats."""
     rows, count = np.sort(np.random.default_rng(0).permutation(len(block))[:MOST_ROWS]), len(block)
-    known, features, block = _left_over(body, block, rows), body.regressions[0].inputs[rows], block[rows]
+    known, features, block = _left_over(predictor, block, rows), predictor.regressions[0].inputs[rows], block[rows]
     kept = rows if len(rows) < count else None
     for bandwidth in BANDWIDTHS:
         smoother = Correlation(features, known.bounded, bandwidth, SHRINKAGES[0])
@@ -83,9 +83,9 @@ class _LeftOver:
         return np.asarray(-0.5 * np.sum(z**2, axis=1) - np.sum(np.log(diagonal), axis=1))
 
 
-def _left_over(body: LearnedBody, block: IntArray, rows: IntArray) -> _LeftOver:
-    latent = [left_out(regression, block) for regression in body.regressions]
-    outputs = [regression.outputs for regression in body.regressions]
+def _left_over(predictor: GaussianProcessPredictor, block: IntArray, rows: IntArray) -> _LeftOver:
+    latent = [left_out(regression, block) for regression in predictor.regressions]
+    outputs = [regression.outputs for regression in predictor.regressions]
     return _LeftOver(
         np.column_stack([y - p.mean for y, p in zip(outputs, latent, strict=True)])[rows],
         np.column_stack([p.variance for p in latent])[rows],

@@ -28,7 +28,7 @@ TOLD_BY_PUSH = (*INPUTS, SIDE)  # covariates that no request needs to bring
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
 
 
-class Body(Protocol):
+class Predictor(Protocol):
     """What the kinds of models differ in."""
 
     @property
@@ -54,7 +54,7 @@ class Scaling:
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedBody:
+class GaussianProcessPredictor:
     """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV), and how what they
     leave over goes together; None where it does not.
     """
@@ -66,17 +66,17 @@ class LearnedBody:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """See Body: none."""
+        """See Predictor: none."""
         return ()
 
     def moments(self, push: Push) -> tuple[Array, Array, Array]:
-        """See Body. Every outcome takes the duration of the training windows; the caller has checked it."""
+        """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = scaled_features(self.rig, self.scaling, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
         return self.moments_of(latent, self.correlation.at(features) if self.correlation else None)
 
     def moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> tuple[Array, Array, Array]:
-        """See Body.moments, of latent predictions in standardised units and correlation matrices (n, 3, 3)."""
+        """See Predictor.moments, of latent predictions in standardised units and correlation matrices (n, 3, 3)."""
         sd = self.scaling.outcome_sd
         mean = np.column_stack([p.mean for p in latent]) * sd + self.scaling.outcome_mean
         of_function = np.column_stack([p.variance for p in latent]) * sd**2
@@ -84,7 +84,7 @@ class LearnedBody:
         return mean, *covariances(of_function, of_process, correlation)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Body; None for the standard GP, whose predictive is Gaussian."""
+        """See Predictor; None for the standard GP, whose predictive is Gaussian."""
         return self.log_density(self.latent(push.inputs), outcomes) if self.exact else None
 
     @property
@@ -111,7 +111,7 @@ class LearnedBody:
 
 
 @dataclass(frozen=True, eq=False)
-class AnalyticalBody:
+class AnalyticalPredictor:
     """The quasi-static model of Lynch et al. 1992 with one covariance for all pushes, (3, 3)."""
 
     physics: AnalyticalPush
@@ -119,22 +119,22 @@ class AnalyticalBody:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """See Body: none."""
+        """See Predictor: none."""
         return ()
 
     def moments(self, push: Push) -> tuple[Array, Array, Array]:
-        """See Body."""
+        """See Predictor."""
         mean = self.physics.displacement(push.inputs, push.duration)
         covariance = np.broadcast_to(self.covariance, (len(mean), 3, 3)).copy()
         return mean, covariance, covariance.copy()
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Body: the predictive is Gaussian."""
+        """See Predictor: the predictive is Gaussian."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
-class ExtendedBody:
+class ExtendedPredictor:
     """A base with effects that it lacks: each shifts the mean and adds its own uncertainty to the covariance.
 
     physics: the analytical model from which the effects' responses are computed. scale (3,): what the base's standard
@@ -143,7 +143,7 @@ class ExtendedBody:
     it two effects whose drivers go together would be told as far less certain than their sum is.
     """
 
-    base: LearnedBody | AnalyticalBody
+    base: GaussianProcessPredictor | AnalyticalPredictor
     physics: AnalyticalPush
     effects: tuple[Effect, ...]
     scale: Array
@@ -156,7 +156,7 @@ class ExtendedBody:
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
-        """See Body: what its effects take and the push itself does not tell."""
+        """See Predictor: what its effects take and the push itself does not tell."""
         return tuple(name for name in self.takes if name not in TOLD_BY_PUSH)
 
     def completed(self, push: Push) -> Push:
@@ -168,7 +168,7 @@ class ExtendedBody:
         return replace(push, covariates={**push.covariates, **own}) if own else push
 
     def moments(self, push: Push) -> tuple[Array, Array, Array]:
-        """See Body."""
+        """See Predictor."""
         return self.extended(self.base.moments(push), push)
 
     def extended(self, moments: tuple[Array, Array, Array], push: Push) -> tuple[Array, Array, Array]:
@@ -192,9 +192,9 @@ class ExtendedBody:
         return shift, unsure
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Body: the latent function of the base is shifted and less certain, its noise is scaled."""
+        """See Predictor: the latent function of the base is shifted and less certain, its noise is scaled."""
         base = self.base
-        if isinstance(base, AnalyticalBody) or not base.exact:
+        if isinstance(base, AnalyticalPredictor) or not base.exact:
             return None
         shift, unsure = self.shift(push)
         shift, sd = shift / base.scaling.outcome_sd, base.scaling.outcome_sd
@@ -212,12 +212,12 @@ class ExtendedBody:
 
 
 def with_independent_outputs(
-    body: LearnedBody | AnalyticalBody | ExtendedBody,
-) -> LearnedBody | AnalyticalBody | ExtendedBody:
+    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor,
+) -> GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor:
     """The same body without what a learnt one knows of how its outputs go together."""
-    if isinstance(body, ExtendedBody) and isinstance(body.base, LearnedBody):
-        return replace(body, base=replace(body.base, correlation=None))
-    return replace(body, correlation=None) if isinstance(body, LearnedBody) else body
+    if isinstance(predictor, ExtendedPredictor) and isinstance(predictor.base, GaussianProcessPredictor):
+        return replace(predictor, base=replace(predictor.base, correlation=None))
+    return replace(predictor, correlation=None) if isinstance(predictor, GaussianProcessPredictor) else predictor
 
 
 def scaled_features(rig: Rig, scaling: Scaling, inputs: Array) -> Array:

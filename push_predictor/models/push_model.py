@@ -11,16 +11,22 @@ import numpy as np
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import AnalyticalBody, ExtendedBody, LearnedBody, Scaling, scaled_features
+from push_predictor.models.predictors import (
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    Scaling,
+    scaled_features,
+)
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray
 
 __all__ = [
     "KINDS",
-    "AnalyticalBody",
-    "ExtendedBody",
-    "LearnedBody",
+    "AnalyticalPredictor",
+    "ExtendedPredictor",
+    "GaussianProcessPredictor",
     "Prediction",
     "Provenance",
     "PushModel",
@@ -68,7 +74,7 @@ class PushModel:
     name: str
     kind: str
     rig: Rig
-    body: LearnedBody | AnalyticalBody | ExtendedBody
+    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor
     training: PushTable
     provenance: Provenance
 
@@ -79,21 +85,21 @@ class PushModel:
         covariates that the model needs is missing; others are ignored.
         """
         push = Push(inputs, duration, covariates or {})
-        return Prediction(*self.body.moments(push), self.in_domain(inputs) & self.covariates_seen(push))
+        return Prediction(*self.predictor.moments(push), self.in_domain(inputs) & self.covariates_seen(push))
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Names of the covariates that every push must bring; none unless the model is extended."""
-        return self.body.needs
+        return self.predictor.needs
 
     @cached_property
     def base(self) -> PushModel:
         """The model without its effects; itself, where it has none."""
-        return replace(self, body=self.body.base) if isinstance(self.body, ExtendedBody) else self
+        return replace(self, predictor=self.predictor.base) if isinstance(self.predictor, ExtendedPredictor) else self
 
     def exact_log_density(self, table: PushTable) -> Array | None:
         """Log density (n, 3) of a table's outcomes under the exact predictive, None where that is the Gaussian."""
-        return self.body.exact_log_density(Push(table.inputs, table.duration, table.covariates), table.outcomes)
+        return self.predictor.exact_log_density(Push(table.inputs, table.duration, table.covariates), table.outcomes)
 
     def in_domain(self, inputs: Array) -> BoolArray:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
@@ -111,8 +117,8 @@ class PushModel:
         Raises KeyError where one is missing.
         """
         seen = np.ones(len(push.inputs), dtype=np.bool_)
-        if self.covariate_ranges and isinstance(self.body, ExtendedBody):
-            covariates = self.body.completed(push).covariates
+        if self.covariate_ranges and isinstance(self.predictor, ExtendedPredictor):
+            covariates = self.predictor.completed(push).covariates
             for name, known in self.covariate_ranges.items():
                 seen &= known.holds(covariates[name])
         return seen
@@ -123,11 +129,11 @@ class PushModel:
 
         The model's own inputs have `in_domain`.
         """
-        if not isinstance(self.body, ExtendedBody):
+        if not isinstance(self.predictor, ExtendedPredictor):
             return {}
         rows = self.training
-        known = self.body.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
-        return {name: range_of(name, known[name]) for name in self.body.takes if name not in INPUTS}
+        known = self.predictor.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
+        return {name: range_of(name, known[name]) for name in self.predictor.takes if name not in INPUTS}
 
     @cached_property
     def training_mean(self) -> Array:

@@ -8,7 +8,7 @@ from math import inf, isfinite, pi
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.models.push_model import LearnedBody, PushModel
+from push_predictor.models.push_model import GaussianProcessPredictor, PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 
@@ -81,7 +81,7 @@ def _check(
 
 def _farthest(model: PushModel) -> float:
     """How long (m) a push may be that a model answers for."""
-    return inf if isinstance(model.body, LearnedBody) else FARTHEST
+    return inf if isinstance(model.predictor, GaussianProcessPredictor) else FARTHEST
 
 
 def _meaning(covariate: str) -> str:

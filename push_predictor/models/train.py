@@ -19,8 +19,8 @@ from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
 from push_predictor.models.push_model import (
     KINDS,
-    AnalyticalBody,
-    LearnedBody,
+    AnalyticalPredictor,
+    GaussianProcessPredictor,
     Provenance,
     PushModel,
     Scaling,
@@ -66,9 +66,11 @@ def train_model(
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     most_inducing = inducing_inputs(kind, len(rows), inducing)
-    body = _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice, most_inducing)
+    predictor = (
+        _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice, most_inducing)
+    )
     provenance = Provenance(tuple(sources), len(rows.pushes), seed, __version__)
-    return PushModel(name, kind, rig, body, rows, provenance)
+    return PushModel(name, kind, rig, predictor, rows, provenance)
 
 
 def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | None:
@@ -103,13 +105,15 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
 
 
-def _learned(rows: PushTable, rig: Rig, kind: str, choice: KernelChoice, most_inducing: int | None) -> LearnedBody:
+def _learned(
+    rows: PushTable, rig: Rig, kind: str, choice: KernelChoice, most_inducing: int | None
+) -> GaussianProcessPredictor:
     scaling = _scaling(rows, rig)
     features = scaled_features(rig, scaling, rows.inputs)
     scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
     regressions = (_regression(features, column, kind, choice, most_inducing) for column in scaled.T)
-    body = LearnedBody(rig, scaling, tuple(regressions))
-    return replace(body, correlation=fit_correlation(body, rows.push_id))
+    predictor = GaussianProcessPredictor(rig, scaling, tuple(regressions))
+    return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
 
 
 def _regression(
@@ -140,9 +144,9 @@ def _scaling(rows: PushTable, rig: Rig) -> Scaling:
     )
 
 
-def _analytical(rows: PushTable, rig: Rig, fit: bool) -> AnalyticalBody:
+def _analytical(rows: PushTable, rig: Rig, fit: bool) -> AnalyticalPredictor:
     physics = AnalyticalPush(rig.outline, rig.pusher_radius)
     if fit:
         physics = fit_analytical(physics, rows.inputs, rows.duration, rows.outcomes)
     residuals = rows.outcomes - physics.displacement(rows.inputs, rows.duration)
-    return AnalyticalBody(physics, residuals.T @ residuals / len(residuals))
+    return AnalyticalPredictor(physics, residuals.T @ residuals / len(residuals))

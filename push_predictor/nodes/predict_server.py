@@ -22,7 +22,7 @@ from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_registry import SHIPPED, ModelShelf
+from push_predictor.models.store.model_registry import SHIPPED, ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.nodes.server.answers import answer_batch, answer_list, answer_load, answer_push
@@ -45,7 +45,7 @@ from push_predictor_interfaces.srv import (
 )
 
 SERVICE_QOS = QoSProfile(depth=1000)  # ten, the default, loses requests of a client with more in flight
-Answer: TypeAlias = Callable[[ModelShelf, Any, Any], None]  # fills the response, or raises
+Answer: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
 
 
 class InactiveError(PushPredictorError):
@@ -58,7 +58,7 @@ class PredictServer(LifecycleNode):
     def __init__(self) -> None:
         super().__init__("push_predictor")
         declare(self, PARAMETERS)
-        self._shelf, self._log = ModelShelf(), RequestLog()
+        self._shelf, self._log = ModelRegistry(), RequestLog()
         self._problems: list[str] = []
         self._direct: DirectService | None = None
         self._ending = Event()  # long answers stop
@@ -157,7 +157,7 @@ class PredictServer(LifecycleNode):
         self._state = state
         self._tracer.end(f"the node is {state} now")
         self._withdraw()
-        self._shelf, self._problems = ModelShelf(), []
+        self._shelf, self._problems = ModelRegistry(), []
         gc.collect()  # models sit in cycles, of many MB each
 
     def _withdraw(self) -> None:
@@ -213,7 +213,7 @@ class PredictServer(LifecycleNode):
         if self._ending.is_set():
             raise InactiveError("the node ends")
 
-    def _inactive(self, shelf: ModelShelf, request: Any, response: Any) -> None:
+    def _inactive(self, shelf: ModelRegistry, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")
 
     def _deployed(self, name: str) -> PushModel:

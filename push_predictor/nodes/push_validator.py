@@ -27,7 +27,7 @@ from push_predictor.nodes.runtime import Stop, one_line, run
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.residual_recorder import ResidualJournal
-from push_predictor.nodes.validator.sensor_subscriber import SensorInlet
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.status import fired_text, validator_status
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.nodes.validator.window_markers import window_markers
@@ -90,7 +90,7 @@ class PushValidator(Node):
         self._rig: Rig | None = load_rig(Path(self._values["rig"]).expanduser()) if self._values["rig"] else None
         self._rig_problem = "" if self._rig else "waiting for the topic rig; or give the parameter rig"
         self._output = _folder(self._values["output"])
-        self._inlet = SensorInlet(self, self._values["frame_id"], self._values["scalar_topics"])
+        self._inlet = SensorSubscriber(self, self._values["frame_id"], self._values["scalar_topics"])
         self._client = PredictionClient(self, self._values["request_timeout"])
         self._report = ReportWriter()
         self._run: ValidationRun | None = None  # the present score, or the last one

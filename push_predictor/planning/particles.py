@@ -15,7 +15,7 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_model import ServedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.planning.push_windows import PushWindows, windows_of
 from push_predictor.planning.straight_drive import Meeting, drive_onto
@@ -37,7 +37,7 @@ class Pushed:
 
 
 def push_particles(
-    predictor: PushModel | ServedModel,
+    predictor: PushModel | TabulatedModel,
     sliders: Array,
     inputs: Array,
     duration: float,
@@ -65,9 +65,9 @@ def push_particles(
     return Pushed(sliders, meeting.held, in_domain)
 
 
-def model_of(predictor: PushModel | ServedModel) -> PushModel:
+def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
     """The model itself."""
-    return predictor.model if isinstance(predictor, ServedModel) else predictor
+    return predictor.model if isinstance(predictor, TabulatedModel) else predictor
 
 
 def refuse_other_covariates(model: PushModel) -> None:
@@ -78,7 +78,7 @@ def refuse_other_covariates(model: PushModel) -> None:
 
 
 def _displacements(
-    predictor: PushModel | ServedModel, sliders: Array, meeting: Meeting, windows: PushWindows, deviation: Array
+    predictor: PushModel | TabulatedModel, sliders: Array, meeting: Meeting, windows: PushWindows, deviation: Array
 ) -> tuple[Array, BoolArray]:
     """Displacements (p, 3) in the push frame, deviation (p, 3) standard ones off the mean, and which are in domain."""
     moved, known = np.zeros((len(sliders), 3)), np.ones(len(sliders), dtype=np.bool_)

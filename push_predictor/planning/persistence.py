@@ -23,7 +23,7 @@ from scipy.optimize import nnls
 
 from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedBody, LearnedBody
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import PushTable
@@ -94,12 +94,12 @@ def root_of(covariance: Array) -> Array:
 
 def _moments_unseen(model: PushModel, push: Push) -> tuple[Array, Array, Array]:
     """The model's moments at its training rows, by a learnt base without their pushes."""
-    body = model.body
-    base = body.base if isinstance(body, ExtendedBody) else body
-    if not isinstance(base, LearnedBody):
-        return body.moments(push)
+    predictor = model.predictor
+    base = predictor.base if isinstance(predictor, ExtendedPredictor) else predictor
+    if not isinstance(base, GaussianProcessPredictor):
+        return predictor.moments(push)
     moments = moments_left_out(base, np.unique(model.training.push_id, return_inverse=True)[1])
-    return body.extended(moments, push) if isinstance(body, ExtendedBody) else moments
+    return predictor.extended(moments, push) if isinstance(predictor, ExtendedPredictor) else moments
 
 
 def _way_between(table: PushTable, first: IntArray, second: IntArray) -> Array:

@@ -10,7 +10,15 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from push_predictor.errors import RequestError
-from push_predictor.planning.unscented import FLOOR, Predict, Tip, after_window, at_the_touch, lines_of, moments
+from push_predictor.planning.unscented import (
+    FLOOR,
+    Predict,
+    PusherGeometry,
+    after_window,
+    at_the_touch,
+    lines_of,
+    moments,
+)
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 256  # of each outcome
@@ -31,7 +39,7 @@ class Pushes:
         return Pushes(self.inputs[rows], self.windows[rows])
 
 
-def every_line(velocities: Sequence[float], contacts: Array, angles: Array) -> Array:
+def push_grid(velocities: Sequence[float], contacts: Array, angles: Array) -> Array:
     """Inputs (n, 3): every velocity (m/s) with every contact and every angle (rad)."""
     grids = np.meshgrid(velocities, contacts, angles, indexing="ij")
     return np.column_stack([grid.ravel() for grid in grids])
@@ -59,7 +67,9 @@ class Repertoire:
         return np.asarray(self.mean[:, None] + points @ np.swapaxes(factor, 1, 2))
 
 
-def repertoire(predict: Predict, tip: Tip, inputs: Array, windows: Sequence[int], lasting: float = 0.0) -> Repertoire:
+def repertoire(
+    predict: Predict, tip: PusherGeometry, inputs: Array, windows: Sequence[int], persistent_fraction: float = 0.0
+) -> Repertoire:
     """What straight pushes do that begin with inputs (n, 3), each of them with every number of windows.
 
     Left out are those that may leave the model's domain, or the slider, before the last window ends. predict: mean,
@@ -69,13 +79,13 @@ def repertoire(predict: Predict, tip: Tip, inputs: Array, windows: Sequence[int]
     """
     if not np.all(np.isfinite(inputs)):
         raise RequestError("inputs", "NaN or infinite", "finite velocities, contacts and angles")
-    if not 0.0 <= lasting <= 1.0:
-        raise RequestError("lasting", lasting, "a share from 0 to 1")
+    if not 0.0 <= persistent_fraction <= 1.0:
+        raise RequestError("lasting", persistent_fraction, "a share from 0 to 1")
     lines = lines_of(tip, inputs)
     rows, points = np.arange(len(inputs)), at_the_touch(len(inputs))
     ended: list[tuple[IntArray, IntArray, Array]] = []
     for window in range(max(windows, default=0)):
-        stays, points = after_window(predict, lines.take(rows), points, window, lasting)
+        stays, points = after_window(predict, lines.take(rows), points, window, persistent_fraction)
         rows = rows[stays]
         if window + 1 in windows:
             ended.append((rows, np.full(len(rows), window + 1), points[..., :3]))

@@ -16,7 +16,7 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_request
-from push_predictor.models.tabulated.tabulated_model import ServedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.particles import OF_THE_POSE, model_of, push_particles, refuse_other_covariates
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
@@ -48,7 +48,7 @@ class Rollout:
 
 
 def rollout(
-    predictor: PushModel | ServedModel,
+    predictor: PushModel | TabulatedModel,
     slider_mean: Array,
     slider_covariance: Array,
     steps: Array,
@@ -103,7 +103,7 @@ def _wrapped(poses: Array) -> Array:
     return np.column_stack([poses[:, :2], wrap_angle(poses[:, 2])])
 
 
-def _check(predictor: PushModel | ServedModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
+def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
     model = model_of(predictor)
     refuse_other_covariates(model)
     if not np.all(np.abs(mean) <= FARTHEST):
@@ -114,7 +114,7 @@ def _check(predictor: PushModel | ServedModel, mean: Array, covariance: Array, s
     if not 0 < particles <= MOST_PARTICLES:
         raise RequestError("particles", particles, f"a number from 1 to {MOST_PARTICLES}")
     windows = sum(_checked_windows(model, k, step) for k, step in enumerate(steps.tolist()))
-    tabulated = isinstance(predictor, ServedModel) and predictor.tabulated
+    tabulated = isinstance(predictor, TabulatedModel) and predictor.tabulated
     if windows * particles > (work := MOST_WORK if tabulated else MOST_EXACT_WORK):
         most = work // particles
         accepted = f"no more than {most} windows in all to {particles} particles"

@@ -14,7 +14,7 @@ from push_predictor.geometry.touch import Touch, covariance_in_world, displaced,
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_request
-from push_predictor.models.tabulated.tabulated_model import ServedModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
@@ -52,13 +52,13 @@ class SliderAfter:
     in_domain: bool
 
 
-def slider_after(predictor: PushModel | ServedModel, push: WorldPush) -> SliderAfter:
+def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> SliderAfter:
     """The outcome of one push.
 
     Raises RequestError where a value is not finite, the tip rests, does not touch, touches from inside, moves away from
     or along the outline, where a covariate contradicts the poses, and where `check_request` does.
     """
-    model = predictor.model if isinstance(predictor, ServedModel) else predictor
+    model = predictor.model if isinstance(predictor, TabulatedModel) else predictor
     touch = touch_of(model.rig, push)
     velocity, contact, angle = touch.inputs[0].tolist()
     covariates = completed_covariates(push, touch, model.rig)

@@ -31,7 +31,7 @@ Predict: TypeAlias = Callable[[Array], Prediction]  # of inputs (n, 3), one wind
 
 
 @dataclass(frozen=True, eq=False)
-class Tip:
+class PusherGeometry:
     """What pushes: the slider's outline, the tip's radius (m), the length of a window (s)."""
 
     outline: Outline
@@ -48,7 +48,7 @@ def at_the_touch(count: int) -> Array:
 class Lines:
     """The tip's lines in the frame of the slider at the start: place (n, 2) m at the touch, velocity (n, 2) m/s."""
 
-    tip: Tip
+    tip: PusherGeometry
     place: Array
     velocity: Array
 
@@ -73,14 +73,16 @@ class Lines:
         return np.asarray(held), np.asarray(poses + shift.reshape(poses.shape))
 
 
-def lines_of(tip: Tip, inputs: Array) -> Lines:
+def lines_of(tip: PusherGeometry, inputs: Array) -> Lines:
     """The lines of pushes that begin with inputs (n, 3)."""
     inward = tip.outline.inward_normal(inputs[:, 1])
     place = tip.outline.point(inputs[:, 1]) - tip.radius * inward
     return Lines(tip, place, inputs[:, :1] * rotate(inward, inputs[:, 2]))
 
 
-def after_window(predict: Predict, lines: Lines, points: Array, window: int, lasting: float) -> tuple[BoolArray, Array]:
+def after_window(
+    predict: Predict, lines: Lines, points: Array, window: int, persistent_fraction: float
+) -> tuple[BoolArray, Array]:
     """Which pushes (n,) stay in the domain and at the slider, and the points of those afterwards.
 
     points (n, 12, 6): the slider's pose and the deviations that last.
@@ -94,9 +96,11 @@ def after_window(predict: Predict, lines: Lines, points: Array, window: int, las
     stays[stays] = inside
     before, heading = points.reshape(-1, 6)[asked], touch.heading[asked]
     root = np.linalg.cholesky(answer.covariance + FLOOR * np.eye(3))
-    moved = answer.mean + np.sqrt(lasting) * np.einsum("nij,nj->ni", root, before[:, 3:])
+    moved = answer.mean + np.sqrt(persistent_fraction) * np.einsum("nij,nj->ni", root, before[:, 3:])
     after = np.column_stack([displaced(before[:, :3], heading, moved), before[:, 3:]]).reshape(-1, POINTS, 6)
-    anew = (1.0 - lasting) * covariance_in_world(answer.covariance, heading).reshape(-1, POINTS, 3, 3).mean(axis=1)
+    anew = (1.0 - persistent_fraction) * covariance_in_world(answer.covariance, heading).reshape(-1, POINTS, 3, 3).mean(
+        axis=1
+    )
     spread = _spread(after[inside], anew[inside])
     held, spread[..., :3] = lines.take(stays).settled(spread[..., :3], window + 1)
     stays[stays] = held

@@ -15,13 +15,13 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.predictors import ExtendedBody
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.corrections import NO_STREAMS, correct
-from push_predictor.residuals.channels.measurement import MeasurementError, MeasurementFinding, measurement_errors
+from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
 from push_predictor.residuals.channels.motion import MotionFinding, MotionTerm, motion_effects
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
 from push_predictor.residuals.evidence.drivers import CONSTANT
@@ -149,7 +149,9 @@ def _of_motion(
     model, terms = context.model, [_as_term(t) for t in motion.terms if not t.own]
     refit = refit_base(model, context.analysis)
     after = extend(refit, context.analysis, terms, model) if terms else refit
-    added = iter(after.body.effects[-len(terms) :] if terms and isinstance(after.body, ExtendedBody) else ())
+    added = iter(
+        after.predictor.effects[-len(terms) :] if terms and isinstance(after.predictor, ExtendedPredictor) else ()
+    )
     effects = tuple(_as_seen(t, context) if t.own else next(added) for t in motion.terms)
     equivalent = motion.equivalent if motion.terms or motion.scatter else _drivers(forces)
     nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
@@ -198,7 +200,7 @@ def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
     if first is None or first.mechanism != WRENCH_BIAS:
         return None
     size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
-    error = MeasurementError(first.mechanism, first.parameters, first.p_value, first.rivals, size)
+    error = MeasurementFault(first.mechanism, first.parameters, first.p_value, first.rivals, size)
     return MeasurementFinding((error,), forces.tested, forces.scatter, forces.against_training)
 
 

@@ -23,9 +23,9 @@ from test_node_predict_server import GOOD, server_of
 
 from push_predictor.errors import ModelFileError
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import ExtendedBody, Prediction, PushModel
+from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.store.model_file import FORMAT_VERSION, load_model, save_model
-from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 
 KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
@@ -39,8 +39,10 @@ def trained() -> dict[str, PushModel]:
     rows, rig = pushes(25), square_rig()
     models = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
     models["sparse"] = train_model(rows, rig, "vhgp", name="sparse", inducing=15)
-    body = ExtendedBody(models["gp"].body, AnalyticalPush(rig.outline, rig.pusher_radius), (slippery(0.1, 0.05),), ONES)
-    models["extended"] = replace(models["gp"], name="extended", body=body)
+    predictor = ExtendedPredictor(
+        models["gp"].predictor, AnalyticalPush(rig.outline, rig.pusher_radius), (slippery(0.1, 0.05),), ONES
+    )
+    models["extended"] = replace(models["gp"], name="extended", predictor=predictor)
     return models
 
 
@@ -118,7 +120,7 @@ def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_pa
     whole = files["gp"].read_bytes()
     (tmp_path / "good.model").write_bytes(whole)
     (tmp_path / "half.model").write_bytes(whole[: len(whole) // 2])
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     (problem,) = shelf.load_all([str(tmp_path)])
     assert str(tmp_path / "half.model") in problem and shelf.names == ["gp"]
 
@@ -156,7 +158,7 @@ def test_no_code_of_a_file_is_run(
         write(path, {name: npy(array) for name, array in arrays_of(files["gp"]).items()} | {member: payload(mark)})
     else:
         path.write_bytes(payload(mark))
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     with pytest.raises(ModelFileError, match=r"m\.model: "):
         shelf.load(path)
     assert not mark.exists() and not len(shelf)
@@ -286,7 +288,7 @@ def test_an_array_that_lies_is_refused(
 def refused_in_time(path: Path) -> str:
     """Why the file is not served; a load that never ends is a failure too."""
     problems: list[str] = []
-    loading = threading.Thread(target=lambda: problems.extend(ModelShelf().load_all([str(path)])), daemon=True)
+    loading = threading.Thread(target=lambda: problems.extend(ModelRegistry().load_all([str(path)])), daemon=True)
     loading.start()
     loading.join(20.0)
     assert not loading.is_alive()
@@ -301,7 +303,7 @@ def test_a_path_that_leads_nowhere_is_told_and_blocks_nothing(
     monkeypatch.chdir(tmp_path)
     os.mkfifo("pipe")
     Path("loop").symlink_to("loop")
-    shelf, problems = ModelShelf(), []
+    shelf, problems = ModelRegistry(), []
     loading = threading.Thread(target=lambda: problems.extend(shelf.load_all([place, str(files["gp"])])), daemon=True)
     loading.start()
     loading.join(20.0)

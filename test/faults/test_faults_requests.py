@@ -33,7 +33,7 @@ from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import FARTHEST, check_request, check_requests
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes import push_validator
 from push_predictor.nodes.parameters import Param, declare
@@ -225,7 +225,7 @@ def test_mechanics_is_integrated_over_a_metre_and_no_more(models: dict[str, Push
 def test_what_has_no_finite_answer_gets_no_number(
     models: dict[str, PushModel], tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     for name in ("matern", "drifting"):
         save_model(models[name], tmp_path / name)
         shelf.load(tmp_path / name)

@@ -18,14 +18,14 @@ from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.models import correlation_fit
 from push_predictor.models.correlation import Correlation, correlated, correlations, covariances
 from push_predictor.models.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.predictors import ExtendedBody, LearnedBody, scaled_features
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, scaled_features
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
@@ -52,18 +52,18 @@ def trained(kind: str = "gp", strength: float = 0.8, n: int = 400) -> PushModel:
 
 
 def correlation_of(model: PushModel) -> Correlation:
-    assert isinstance(model.body, LearnedBody) and model.body.correlation is not None
-    return model.body.correlation
+    assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is not None
+    return model.predictor.correlation
 
 
-def alone(model: PushModel) -> LearnedBody:
+def alone(model: PushModel) -> GaussianProcessPredictor:
     """Its body with independent outputs."""
-    assert isinstance(model.body, LearnedBody)
-    return replace(model.body, correlation=None)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    return replace(model.predictor, correlation=None)
 
 
 def without(model: PushModel) -> PushModel:
-    return replace(model, body=alone(model))
+    return replace(model, predictor=alone(model))
 
 
 def of(model: PushModel, inputs: Array) -> Array:
@@ -174,24 +174,24 @@ def test_pushes_that_it_has_not_seen_are_likelier_with_it(kind: str) -> None:
 
 def test_no_correlation_is_found_where_there_is_none() -> None:
     model = trained(strength=0.0, n=240)
-    assert isinstance(model.body, LearnedBody)
-    scaling, found = model.body.scaling, 0
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    scaling, found = model.predictor.scaling, 0
     for seed in range(20):
         table = pushes(240, seed, 0.0)
         features = scaled_features(model.rig, scaling, table.inputs)
         scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
         regressions = tuple(
             GaussianProcess(features, column, r.parameters)
-            for r, column in zip(model.body.regressions, scaled.T, strict=True)
+            for r, column in zip(model.predictor.regressions, scaled.T, strict=True)
             if isinstance(r, GaussianProcess)
         )
-        found += fit_correlation(replace(model.body, regressions=regressions), table.push_id) is not None
+        found += fit_correlation(replace(model.predictor, regressions=regressions), table.push_id) is not None
     assert found <= 1
 
 
 def test_too_few_pushes_tell_nothing() -> None:
     model = trained(n=FEWEST_PUSHES * PER_PUSH - 1 * PER_PUSH)
-    assert isinstance(model.body, LearnedBody) and model.body.correlation is None
+    assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is None
 
 
 def test_no_residual_counts_for_more_than_is_expected_of_it(model: PushModel) -> None:
@@ -222,8 +222,8 @@ def test_of_many_rows_it_keeps_some(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert of(model, np.array([[0.02, 0.12, 0.6]]))[0] > 0.5
     save_model(model, tmp_path / "m")
     found = correlation_of(load_model(tmp_path / "m"))
-    assert isinstance(model.body, LearnedBody)
-    everywhere, block = model.body.regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    everywhere, block = model.predictor.regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
     assert np.array_equal(found.left_out(everywhere, block), correlation.left_out(everywhere, block))
     own = correlation.rows[7]
     others = block[correlation.rows] != block[own]
@@ -232,9 +232,9 @@ def test_of_many_rows_it_keeps_some(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 
 def test_moments_left_out_are_full_ones(model: PushModel) -> None:
-    assert isinstance(model.body, LearnedBody)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
     correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH
-    mean, total, process = moments_left_out(model.body, block)
+    mean, total, process = moments_left_out(model.predictor, block)
     plain = moments_left_out(alone(model), block)
     assert np.array_equal(mean, plain[0])
     sd = np.sqrt(np.diagonal(plain[2], axis1=1, axis2=2))
@@ -255,21 +255,23 @@ def test_a_loaded_model_has_the_correlation_of_the_saved_one(kind: str, tmp_path
     model = trained(kind)
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
-    assert isinstance(loaded.body, LearnedBody) and loaded.body.correlation is not None
+    assert isinstance(loaded.predictor, GaussianProcessPredictor) and loaded.predictor.correlation is not None
     inputs = model.training.inputs + [0.0, 0.01, 0.01]
     push = Push(inputs, np.full(len(inputs), 0.2), {})
-    for ours, theirs in zip(model.body.moments(push), loaded.body.moments(push), strict=True):
+    for ours, theirs in zip(model.predictor.moments(push), loaded.predictor.moments(push), strict=True):
         assert np.array_equal(ours, theirs)
 
 
 def test_only_a_correlation_asks_for_version_5(model: PushModel, tmp_path: Path) -> None:
     physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
-    tip = Effect("contact_friction", "velocity", Form("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3))
-    for body, version in ((model.body, 5), (alone(model), 1)):
-        assert isinstance(body, LearnedBody)
-        extended = ExtendedBody(body, physics, (tip,), np.array([1.0, 1.0, 2.0]))
-        for kind, least in ((body, 1), (extended, 3)):
-            save_model(replace(model, body=kind), tmp_path / "m")
+    tip = Effect(
+        "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
+    )
+    for predictor, version in ((model.predictor, 5), (alone(model), 1)):
+        assert isinstance(predictor, GaussianProcessPredictor)
+        extended = ExtendedPredictor(predictor, physics, (tip,), np.array([1.0, 1.0, 2.0]))
+        for kind, least in ((predictor, 1), (extended, 3)):
+            save_model(replace(model, predictor=kind), tmp_path / "m")
             with np.load(tmp_path / "m") as archive:
                 assert json.loads(archive["header"].tobytes())["format_version"] == max(version, least)
             loaded = of(load_model(tmp_path / "m"), model.training.inputs)
@@ -290,8 +292,8 @@ def test_only_a_correlation_asks_for_version_5(model: PushModel, tmp_path: Path)
 def test_a_damaged_correlation_is_refused_in_words(
     model: PushModel, change: dict[str, object], message: str, tmp_path: Path
 ) -> None:
-    assert isinstance(model.body, LearnedBody)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
     damaged = replace(correlation_of(model), **change)  # type: ignore[arg-type]  # the point of the test
-    save_model(replace(model, body=replace(model.body, correlation=damaged)), tmp_path / "m")
+    save_model(replace(model, predictor=replace(model.predictor, correlation=damaged)), tmp_path / "m")
     with pytest.raises(ModelFileError, match=message):
         load_model(tmp_path / "m")

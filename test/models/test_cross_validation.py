@@ -15,7 +15,7 @@ from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_bound import VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
@@ -98,13 +98,15 @@ def test_the_moments_of_a_body_are_those_of_its_regressions_in_si_units() -> Non
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
     outcomes = rng.standard_normal((n, 3)) * [1e-3, 1e-3, 1e-2] + [4e-3, 0.0, 0.0]
     push_id = np.array([f"push-{k // 4}" for k in range(n)])
-    body = train_model(PushTable(inputs, np.full(n, 0.2), outcomes, push_id), square_rig(), "gp", name="gp").body
-    assert isinstance(body, LearnedBody)
+    predictor = train_model(
+        PushTable(inputs, np.full(n, 0.2), outcomes, push_id), square_rig(), "gp", name="gp"
+    ).predictor
+    assert isinstance(predictor, GaussianProcessPredictor)
     block = np.arange(n) // 4 % BLOCKS
-    found = moments_left_out(body, block)
+    found = moments_left_out(predictor, block)
     for number in range(BLOCKS):
         out = block == number
-        without = tuple(conditioned(r, r.inputs[~out], r.outputs[~out]) for r in body.regressions)
+        without = tuple(conditioned(r, r.inputs[~out], r.outputs[~out]) for r in predictor.regressions)
         push = Push(inputs[out], np.full(int(out.sum()), 0.2), {})
-        for whole, part in zip(found, replace(body, regressions=without).moments(push), strict=True):
+        for whole, part in zip(found, replace(predictor, regressions=without).moments(push), strict=True):
             np.testing.assert_allclose(whole[out], part, rtol=1e-6, atol=1e-12)

@@ -19,15 +19,15 @@ from push_predictor.cli import main
 from push_predictor.errors import ModelFileError, RequestError
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariate_range import range_of
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import KINDS, ExtendedBody, Prediction, PushModel
+from push_predictor.models.push_model import KINDS, ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.request import check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.store.model_registry import ModelShelf
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
@@ -36,9 +36,9 @@ from push_predictor.residuals.extension.extension import extend, gain, refit_bas
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
-DRIFT = Form("linear", ("elapsed_time",), (500.0,), (300.0,))
-WARMTH = Form("linear", ("topic:/warmth",), (0.0,), (1.0,))
-GRAIN = ("anisotropic_friction", "push_heading", Form("constant"))
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
+GRAIN = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
 
 
@@ -75,7 +75,7 @@ def grain(size: float) -> Effect:
 
 
 def extended(base: PushModel, *effects: Effect, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> PushModel:
-    return replace(base, body=ExtendedBody(base.body, physics(), effects, np.array(scale)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor, physics(), effects, np.array(scale)))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_an_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kin
     base, table = bases[kind], pushes(20, 1)
     nothing = extended(base, slippery(0.0), grain(0.0).__class__(*GRAIN, np.zeros(2), np.zeros((2, 2)), np.ones(3)))
     assert_same(predicted(nothing, table), predicted(base, table))
-    assert_same(predicted(serve(nothing), table), predicted(serve(base), table))
+    assert_same(predicted(tabulate(nothing), table), predicted(tabulate(base), table))
     exact, own = nothing.exact_log_density(table), base.exact_log_density(table)
     assert (exact is None) == (own is None) == (kind != "vhgp")
     if exact is not None and own is not None:
@@ -141,11 +141,11 @@ def test_the_exact_density_has_the_variance_that_is_predicted(bases: dict[str, P
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_served_model_answers_one_push_as_it_answers_many(bases: dict[str, PushModel], kind: str) -> None:
     model, table = extended(bases[kind], slippery(0.2, sd=0.1), grain(0.1)), pushes(5, 1)
-    served = serve(model)
-    assert served.tabulated == (kind != "analytical")
-    among = predicted(served, table)
+    tabulated = tabulate(model)
+    assert tabulated.tabulated == (kind != "analytical")
+    among = predicted(tabulated, table)
     for k in range(len(table)):
-        alone = predicted(served, table.take([k]))
+        alone = predicted(tabulated, table.take([k]))
         for name in FIELDS:
             np.testing.assert_allclose(getattr(alone, name)[0], getattr(among, name)[k], rtol=1e-7, atol=1e-12)
     sd = np.sqrt(np.diagonal(among.covariance, axis1=1, axis2=2))
@@ -154,18 +154,18 @@ def test_a_served_model_answers_one_push_as_it_answers_many(bases: dict[str, Pus
 
 def joint(model: PushModel, table: PushTable) -> np.ndarray:
     """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
-    body = model.body
-    assert isinstance(body, ExtendedBody)
-    sizes = [len(effect.coefficients) for effect in body.effects]
+    predictor = model.predictor
+    assert isinstance(predictor, ExtendedPredictor)
+    sizes = [len(effect.coefficients) for effect in predictor.effects]
     ends = np.cumsum([0, *sizes])
     whole = np.zeros((ends[-1], ends[-1]))
-    for k, effect in enumerate(body.effects):
+    for k, effect in enumerate(predictor.effects):
         whole[ends[k] : ends[k + 1], ends[k] : ends[k + 1]] = effect.covariance
-    for (i, j), shared in body.cross.items():
+    for (i, j), shared in predictor.cross.items():
         whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
         whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
     push = Push(table.inputs, table.duration, table.covariates)
-    design = np.concatenate([effect.design(physics(), push) for effect in body.effects], axis=2)
+    design = np.concatenate([effect.design(physics(), push) for effect in predictor.effects], axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
 
 
@@ -178,11 +178,11 @@ def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
     both = extend(refit_base(bases["analytical"], table), table, terms)
     one = extend(refit_base(bases["analytical"], table), table, terms[:1])
-    assert isinstance(both.body, ExtendedBody) and isinstance(one.body, ExtendedBody)
+    assert isinstance(both.predictor, ExtendedPredictor) and isinstance(one.predictor, ExtendedPredictor)
     push = Push(table.inputs, table.duration, table.covariates)
-    unsure, alone = both.body.shift(push)[1], one.body.shift(push)[1]
+    unsure, alone = both.predictor.shift(push)[1], one.predictor.shift(push)[1]
     np.testing.assert_allclose(unsure, joint(both, table), rtol=1e-9, atol=1e-18)
-    apart = sum(effect.shift(physics(), push)[1] for effect in both.body.effects)
+    apart = sum(effect.shift(physics(), push)[1] for effect in both.predictor.effects)
     assert np.trace(unsure.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
 
 
@@ -190,22 +190,24 @@ def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, Pu
     table = pushes(60, 4, slippery(0.2))
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     first = extend(refit_base(bases["gp"], table), table, terms)
-    second = extend(first, table, [(None, "topic:/warmth", WARMTH), ("inertia", "model_inputs", Form("constant"))])
-    assert isinstance(first.body, ExtendedBody) and isinstance(second.body, ExtendedBody)
-    assert list(first.body.cross) == [(0, 1)] and list(second.body.cross) == [(0, 1), (2, 3)]
-    np.testing.assert_array_equal(first.body.cross[0, 1], second.body.cross[0, 1])
-    assert refit_base(second, table).body.cross == second.body.cross
+    second = extend(
+        first, table, [(None, "topic:/warmth", WARMTH), ("inertia", "model_inputs", DriverBasis("constant"))]
+    )
+    assert isinstance(first.predictor, ExtendedPredictor) and isinstance(second.predictor, ExtendedPredictor)
+    assert list(first.predictor.cross) == [(0, 1)] and list(second.predictor.cross) == [(0, 1), (2, 3)]
+    np.testing.assert_array_equal(first.predictor.cross[0, 1], second.predictor.cross[0, 1])
+    assert refit_base(second, table).predictor.cross == second.predictor.cross
     save_model(second, tmp_path / "m")
     loaded, probe = load_model(tmp_path / "m"), pushes(10, 3)
     assert_same(predicted(loaded, probe), predicted(second, probe), rtol=1e-9, atol=1e-15)
-    unsure = second.body.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
+    unsure = second.predictor.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
     np.testing.assert_allclose(unsure, joint(second, probe), rtol=1e-9, atol=1e-18)
 
 
 # --- where it has seen pushes -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("answer", [lambda model: model, serve])
+@pytest.mark.parametrize("answer", [lambda model: model, tabulate])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_covariate_far_from_what_was_seen_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
     model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
@@ -250,9 +252,9 @@ def test_headings_come_around(seen: list[float], inside: list[float], outside: l
 
 def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]) -> None:
     faster = Effect(
-        "inertia", "velocity", Form("linear", ("velocity",), (0.02,), (0.01,)), np.ones(1), np.eye(1), NOISE
+        "inertia", "velocity", DriverBasis("linear", ("velocity",), (0.02,), (0.01,)), np.ones(1), np.eye(1), NOISE
     )
-    sides = Form("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
+    sides = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
     tip = Effect("contact_friction", "edge", sides, np.array([0.1, 0.2, 0.3]), 1e-4 * np.eye(3), NOISE)
     model, table = extended(bases["gp"], faster, tip), pushes(10, 1)
     assert model.needs == ()
@@ -262,7 +264,7 @@ def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]
     shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
     ours, theirs = (m.predict(inputs, table.duration).mean for m in (model, bases["gp"]))
     np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
-    np.testing.assert_allclose(serve(model).predict(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
+    np.testing.assert_allclose(tabulate(model).predict(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
 
 
 # --- what it asks for -------------------------------------------------------------------------------------------
@@ -307,9 +309,11 @@ def test_a_table_without_what_it_needs_is_refused_by_name(bases: dict[str, PushM
 def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
     generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
     trained = extend(bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN])
-    body = trained.body
-    assert isinstance(body, ExtendedBody)
-    model = replace(trained, body=replace(body, effects=(*body.effects, generic), scale=np.array([0.9, 1.0, 1.1])))
+    predictor = trained.predictor
+    assert isinstance(predictor, ExtendedPredictor)
+    model = replace(
+        trained, predictor=replace(predictor, effects=(*predictor.effects, generic), scale=np.array([0.9, 1.0, 1.1]))
+    )
     save_model(model, tmp_path / "m")
     loaded, table = load_model(tmp_path / "m"), pushes(10, 3)
     assert (loaded.kind, loaded.needs) == (kind, ("elapsed_time", "slider_heading", "topic:/warmth"))
@@ -321,8 +325,8 @@ def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path)
 
 def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
     apart = extended(bases["gp"], slippery(0.1), slippery(0.2))
-    assert isinstance(apart.body, ExtendedBody)
-    sharing = replace(apart, body=replace(apart.body, cross={(0, 1): np.zeros((1, 1))}))
+    assert isinstance(apart.predictor, ExtendedPredictor)
+    sharing = replace(apart, predictor=replace(apart.predictor, cross={(0, 1): np.zeros((1, 1))}))
     for name, model, version in (("base", bases["gp"], 1), ("more", apart, 3), ("sharing", sharing, 4)):
         save_model(model, tmp_path / name)
         assert _header(tmp_path / name)["format_version"] == version
@@ -342,8 +346,8 @@ def test_a_damaged_shared_covariance_is_refused(
     bases: dict[str, PushModel], pair: tuple[int, int], shared: Any, message: str, tmp_path: Path
 ) -> None:
     model = extended(bases["analytical"], slippery(0.1, sd=1.0), slippery(0.2, sd=1.0))
-    assert isinstance(model.body, ExtendedBody)
-    save_model(replace(model, body=replace(model.body, cross={pair: np.atleast_2d(shared)})), tmp_path / "m")
+    assert isinstance(model.predictor, ExtendedPredictor)
+    save_model(replace(model, predictor=replace(model.predictor, cross={pair: np.atleast_2d(shared)})), tmp_path / "m")
     with pytest.raises(ModelFileError, match=message):
         load_model(tmp_path / "m")
 
@@ -389,10 +393,10 @@ def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushM
     away = []
     for seed in range(10, 16):
         table = pushes(100, seed, slippery(0.15), grain(0.1))
-        body = extend(refit_base(bases[kind], table), table, terms, bases[kind]).body
-        assert isinstance(body, ExtendedBody)
-        found = np.concatenate([effect.coefficients for effect in body.effects])
-        sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in body.effects])
+        predictor = extend(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
+        assert isinstance(predictor, ExtendedPredictor)
+        found = np.concatenate([effect.coefficients for effect in predictor.effects])
+        sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in predictor.effects])
         away.append((found - [0.15, 0.1, 0.05]) / sd)
     # In units of their own deviations: Student's t with 25 blocks, its root mean square known to 0.2 here.
     assert 0.6 < np.sqrt(np.mean(np.square(away))) < 1.5
@@ -403,12 +407,12 @@ def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushM
 
 def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushModel]) -> None:
     table = pushes(100, 4, slippery(0.2))
-    alike = Form("quadratic", ("elapsed_time",), (500.0,), (300.0,))
+    alike = DriverBasis("quadratic", ("elapsed_time",), (500.0,), (300.0,))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
-    body = extend(refit_base(bases["analytical"], table), table, terms).body
-    assert isinstance(body, ExtendedBody)
+    predictor = extend(refit_base(bases["analytical"], table), table, terms).predictor
+    assert isinstance(predictor, ExtendedPredictor)
     push = Push(table.inputs, table.duration, table.covariates)
-    shift, _ = body.shift(push)
+    shift, _ = predictor.shift(push)
     planted, _ = slippery(0.2).shift(physics(), push)
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
 
@@ -449,14 +453,14 @@ def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushMod
     table, held_out = pushes(60, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))
     model = extended(bases[kind], slippery(0.3))
     refit = refit_base(model, table)
-    assert isinstance(refit.body, ExtendedBody) and isinstance(model.body, ExtendedBody)
-    assert refit.body.effects == model.body.effects
+    assert isinstance(refit.predictor, ExtendedPredictor) and isinstance(model.predictor, ExtendedPredictor)
+    assert refit.predictor.effects == model.predictor.effects
     plain = refit_base(bases[kind], table)
     assert gain(plain, refit, held_out)[1].high < 0.0
     more = extend(refit, table, [GRAIN])
-    assert isinstance(more.body, ExtendedBody)
-    assert [effect.mechanism for effect in more.body.effects] == ["contact_friction", "anisotropic_friction"]
-    assert np.all(np.abs(more.body.effects[1].coefficients) < 0.1)
+    assert isinstance(more.predictor, ExtendedPredictor)
+    assert [effect.mechanism for effect in more.predictor.effects] == ["contact_friction", "anisotropic_friction"]
+    assert np.all(np.abs(more.predictor.effects[1].coefficients) < 0.1)
 
 
 def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
@@ -465,8 +469,8 @@ def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: 
     after = extend(refit, table, [(None, "elapsed_time", DRIFT)])
     assert gain(refit, after, held_out)[1].high < 0.0
     design = design_of(None, DRIFT, physics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
-    assert isinstance(after.body, ExtendedBody)
-    assert after.body.effects[0].coefficients.shape == (design.shape[2],)
+    assert isinstance(after.predictor, ExtendedPredictor)
+    assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 
 # --- the command line, the shelf, the service -------------------------------------------------------------------
@@ -526,7 +530,7 @@ def test_validate_takes_from_the_windows_what_it_needs_or_names_it(
 
 
 def test_the_shelf_lists_what_a_request_must_bring(model_file: Path) -> None:
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     shelf.load(model_file)
     assert "covariates=elapsed_time;" in shelf.describe("extended")
 
@@ -557,7 +561,7 @@ def test_the_service_refuses_a_push_without_the_covariate_by_name(ask: Callable[
 def test_the_service_answers_with_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
     table = pushes(10, 1)
     time = {"elapsed_time": table.covariates["elapsed_time"]}
-    expected = serve(load_model(model_file)).predict(table.inputs, table.duration, time)
+    expected = tabulate(load_model(model_file)).predict(table.inputs, table.duration, time)
     batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", table.inputs, 0.2, time)))
     assert_same(prediction_from_response(batch), expected, rtol=1e-9, atol=1e-15)
     first = {name: float(column[0]) for name, column in time.items()}

@@ -35,7 +35,7 @@ from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameter
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import model_file
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.types import Array
 
@@ -244,19 +244,19 @@ def test_a_loaded_model_has_its_kernels(
     loaded, table = load_model(tmp_path / "m"), noisy_pushes(50, seed=2)
     a, b = (m.predict(table.inputs, table.duration) for m in (models[choice], loaded))
     assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
-    assert [r.parameters.choice for r in loaded.body.regressions] == [choice] * 3
+    assert [r.parameters.choice for r in loaded.predictor.regressions] == [choice] * 3
 
 
 def independent(model: PushModel) -> PushModel:
     """Without the correlation of its outputs, which asks for a later version of the format."""
-    return replace(model, body=replace(model.body, correlation=None))
+    return replace(model, predictor=replace(model.predictor, correlation=None))
 
 
 def test_a_gp_keeps_its_family(tmp_path: Path) -> None:
     model = train_model(noisy_pushes(60), square_rig(), "gp", name="g", choice=KernelChoice("matern52"))
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
-    assert [r.parameters.family for r in loaded.body.regressions] == ["matern52"] * 3
+    assert [r.parameters.family for r in loaded.predictor.regressions] == ["matern52"] * 3
 
 
 def test_a_model_that_version_1_can_hold_is_written_as_one(
@@ -296,11 +296,11 @@ def test_a_family_that_is_not_known_is_refused(
 def test_a_served_model_is_true_to_it_by_a_table_or_without(
     models: dict[KernelChoice, PushModel], choice: KernelChoice
 ) -> None:
-    answers, table = serve(models[choice]), noisy_pushes(60)
-    served, exact = (m.predict(table.inputs, table.duration) for m in (answers, models[choice]))
+    answers, table = tabulate(models[choice]), noisy_pushes(60)
+    tabulated, exact = (m.predict(table.inputs, table.duration) for m in (answers, models[choice]))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
-    assert np.max(np.abs(served.mean - exact.mean) / sd) < 1e-3
-    ratio = np.diagonal(served.covariance, axis1=1, axis2=2) / sd**2
+    assert np.max(np.abs(tabulated.mean - exact.mean) / sd) < 1e-3
+    ratio = np.diagonal(tabulated.covariance, axis1=1, axis2=2) / sd**2
     assert np.max(np.abs(ratio - 1.0)) < 1e-2
     assert answers.tabulated or answers.how.startswith("exact")
 

@@ -110,7 +110,7 @@ def test_a_number_of_rows_is_drawn_by_the_seed() -> None:
 def test_constant_inputs_are_left_out_and_constant_outcomes_refused() -> None:
     table = noisy_pushes(60)
     table.inputs[:, 0] = 0.02
-    assert len(train_model(table, square_rig(), "gp", name="g").body.scaling.columns) == 2
+    assert len(train_model(table, square_rig(), "gp", name="g").predictor.scaling.columns) == 2
     table.outcomes[:, 1] = 0.0
     with pytest.raises(TrainingError, match="dy: does not vary"):
         train_model(table, square_rig(), "gp", name="g")

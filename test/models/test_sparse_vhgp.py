@@ -21,11 +21,11 @@ from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import MOST_DENSE_ROWS, inducing_inputs, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -207,16 +207,16 @@ def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None
 def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) -> None:
     rows = table(400)
     model = train_model(rows, square_rig(), "vhgp", name="sparse", n_train=400, inducing=30)
-    assert isinstance(model.body, LearnedBody)
-    assert all(isinstance(regression, SparseVHGP) for regression in model.body.regressions)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    assert all(isinstance(regression, SparseVHGP) for regression in model.predictor.regressions)
     save_model(model, tmp_path / "sparse.pushmodel")
     again = load_model(tmp_path / "sparse.pushmodel")
     push = rows.inputs[:40], rows.duration[:40]
     np.testing.assert_array_equal(again.predict(*push).covariance, model.predict(*push).covariance)
-    served = serve(again)
-    assert served.domain is not None, served.how
+    tabulated = tabulate(again)
+    assert tabulated.domain is not None, tabulated.how
     variance = np.diagonal(model.predict(*push).covariance, axis1=1, axis2=2)
-    of_table = np.diagonal(served.predict(*push).covariance, axis1=1, axis2=2)
+    of_table = np.diagonal(tabulated.predict(*push).covariance, axis1=1, axis2=2)
     np.testing.assert_allclose(of_table, variance, rtol=1e-2)
     truth = 1e-6 * np.exp(4.0 * rows.inputs[:40, 2] - 2.0)
     assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4

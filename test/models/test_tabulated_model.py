@@ -16,7 +16,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.correlation import Correlation
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import Prediction, PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated import prediction_table
@@ -25,10 +25,10 @@ from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
 from push_predictor.models.tabulated.tabulated_model import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
-    ServedModel,
-    TableError,
+    TableAccuracy,
+    TabulatedModel,
     relative_error,
-    serve,
+    tabulate,
 )
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
@@ -68,28 +68,28 @@ KINDS = ("gp", "vhgp", "coupled vhgp")
 
 
 @cache
-def served(shape: str, kind: str) -> ServedModel:
+def tabulated(shape: str, kind: str) -> TabulatedModel:
     """Trained on pushes at all velocities, contacts and angles; coupled: with a correlation that changes its sign."""
     model = trained(OUTLINES[shape], kind.split()[-1], *WIDE, n=200 if shape == "triangle" else 100)
-    return serve(coupled(model) if "coupled" in kind else independent(model))
+    return tabulate(coupled(model) if "coupled" in kind else independent(model))
 
 
 def independent(model: PushModel) -> PushModel:
-    assert isinstance(model.body, LearnedBody)
-    return replace(model, body=replace(model.body, correlation=None))
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    return replace(model, predictor=replace(model.predictor, correlation=None))
 
 
 def coupled(model: PushModel, bandwidth: float = 0.5) -> PushModel:
-    assert isinstance(model.body, LearnedBody)
-    return replace(model, body=replace(model.body, correlation=sign_change(model, bandwidth)))
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    return replace(model, predictor=replace(model.predictor, correlation=sign_change(model, bandwidth)))
 
 
 def sign_change(model: PushModel, bandwidth: float) -> Correlation:
     """dx and dtheta go together at angles above zero, against each other below, dy goes with neither."""
-    assert isinstance(model.body, LearnedBody)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
     z = np.random.default_rng(7).standard_normal((len(model.training), 3))
     z[:, 2] = 0.2 * z[:, 2] + np.sign(model.training.inputs[:, 2]) * z[:, 0]
-    return Correlation(model.body.regressions[0].inputs, z.astype(np.float32).astype(float), bandwidth, 2.0)
+    return Correlation(model.predictor.regressions[0].inputs, z.astype(np.float32).astype(float), bandwidth, 2.0)
 
 
 def inside(model: PushModel, n: int, seed: int = 5) -> Array:
@@ -101,7 +101,7 @@ def inside(model: PushModel, n: int, seed: int = 5) -> Array:
     return chosen
 
 
-def of(model: PushModel | ServedModel, inputs: Array) -> Prediction:
+def of(model: PushModel | TabulatedModel, inputs: Array) -> Prediction:
     return model.predict(inputs, np.full(len(inputs), 0.2))
 
 
@@ -116,7 +116,7 @@ def assert_close(alone: Prediction, among: Prediction, row: int, precision: floa
         np.testing.assert_allclose(one, other, rtol=precision, atol=precision * size)
 
 
-def assert_true_to_the_model(answers: ServedModel, n: int = 400) -> None:
+def assert_true_to_the_model(answers: TabulatedModel, n: int = 400) -> None:
     inputs = inside(answers.model, n)
     table, exact = of(answers, inputs), of(answers.model, inputs)
     assert answers.tabulated, answers.how
@@ -130,11 +130,11 @@ def assert_true_to_the_model(answers: ServedModel, n: int = 400) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
 def test_the_table_is_true_to_the_model(shape: str, kind: str) -> None:
-    assert_true_to_the_model(served(shape, kind))
+    assert_true_to_the_model(tabulated(shape, kind))
 
 
 def test_the_made_up_correlation_is_a_strong_one_of_either_sign() -> None:
-    answers = served("square", "coupled vhgp")
+    answers = tabulated("square", "coupled vhgp")
     covariance = of(answers, inside(answers.model, 200)).process_covariance
     correlation = covariance[:, 0, 2] / np.sqrt(covariance[:, 0, 0] * covariance[:, 2, 2])
     assert correlation.max() > 0.7 and correlation.min() < -0.7
@@ -142,7 +142,7 @@ def test_the_made_up_correlation_is_a_strong_one_of_either_sign() -> None:
 
 def test_independent_outputs_have_no_covariance() -> None:
     for count in (1, 50):
-        table = of(served("square", "vhgp"), inside(served("square", "vhgp").model, count))
+        table = of(tabulated("square", "vhgp"), inside(tabulated("square", "vhgp").model, count))
         for covariance in (table.covariance, table.process_covariance):
             assert np.all(covariance - variances(covariance)[:, :, None] * np.eye(3) == 0.0)
 
@@ -155,15 +155,15 @@ def test_a_covariance_errs_by_what_it_says_of_the_worst_combination_of_outputs()
     assert relative_error(found[None], exact[None]) == pytest.approx(1.0)
     both = (turned @ matrix @ turned.T for matrix in (found, exact))
     assert relative_error(*(matrix[None] for matrix in both)) == pytest.approx(1.0)
-    assert not TableError(0.0, 0.006).accepted and TableError(0.0, 0.004).accepted
+    assert not TableAccuracy(0.0, 0.006).accepted and TableAccuracy(0.0, 0.004).accepted
 
 
 def test_a_table_refines_until_it_resolves_the_correlation(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = coupled(served("circle", "gp").model, bandwidth=0.2)
+    model = coupled(tabulated("circle", "gp").model, bandwidth=0.2)
     monkeypatch.setattr(prediction_table, "COUPLING_CELLS", 1.5)
-    assert isinstance(model.body, LearnedBody)
-    first = tabulated_domain(model, model.body).table.knots
-    answers = serve(model)
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    first = tabulated_domain(model, model.predictor).table.knots
+    answers = tabulate(model)
     assert answers.domain is not None and answers.domain.table.knots > first
     assert_true_to_the_model(answers)
 
@@ -182,7 +182,7 @@ NARROW = {
 def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
     low, high = (np.array(limit) for limit in NARROW[narrow])
     model = trained(OUTLINES[shape], "gp", low, high, n=60)
-    assert_true_to_the_model(serve(coupled(model)), n=200)
+    assert_true_to_the_model(tabulate(coupled(model)), n=200)
 
 
 @settings(max_examples=60, deadline=None)
@@ -196,7 +196,7 @@ def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
 def test_a_push_gets_the_same_answer_alone_and_among_others(
     shape: str, kind: str, velocity: float, contact: float, angle: float
 ) -> None:
-    model, push = served(shape, kind), np.array([[velocity, contact, angle]])
+    model, push = tabulated(shape, kind), np.array([[velocity, contact, angle]])
     others = inside(model.model, 20)
     alone, among = of(model, push), of(model, np.concatenate([others[:10], push, others[10:]]))
     # Outside the domain the model itself answers, whose solver takes one row or many in a different order.
@@ -209,21 +209,21 @@ def test_a_push_gets_the_same_answer_alone_and_among_others(
 def test_sides_that_symmetry_makes_one_are_one(fraction: float, angle: float, kind: str) -> None:
     for shape, order in (("square", 4), ("ellipse", 2)):
         turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
-        prediction = of(served(shape, kind), turned)
+        prediction = of(tabulated(shape, kind), turned)
         for k in range(1, order):
-            assert_close(of(served(shape, kind), turned[k : k + 1]), prediction, 0, 1e-9)
+            assert_close(of(tabulated(shape, kind), turned[k : k + 1]), prediction, 0, 1e-9)
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_a_circle_does_not_tell_contacts_apart(kind: str) -> None:
     contact = np.linspace(0.0, 0.999, 7)
     inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
-    assert np.ptp(of(served("circle", kind), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
+    assert np.ptp(of(tabulated("circle", kind), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_outside_the_domain_the_model_itself_answers(shape: str) -> None:
-    model = served(shape, "coupled gp")
+    model = tabulated(shape, "coupled gp")
     out = inside(model.model, 30)
     out[::2, 0] = 0.2
     out[1::2, 2] = 1.4
@@ -237,7 +237,7 @@ def test_outside_the_domain_the_model_itself_answers(shape: str) -> None:
 
 
 def test_the_rim_of_the_domain_belongs_to_it() -> None:
-    for model in (served(shape, kind) for shape in OUTLINES for kind in ("gp", "vhgp")):
+    for model in (tabulated(shape, kind) for shape in OUTLINES for kind in ("gp", "vhgp")):
         rim = np.array([[v, 0.3, a] for v in (0.0, 1.0) for a in (0.0, 1.0)])
         known = model.model.training.inputs
         rim[:, [0, 2]] = known.min(axis=0)[[0, 2]] + rim[:, [0, 2]] * np.ptp(known, axis=0)[[0, 2]]
@@ -249,20 +249,20 @@ def test_the_rim_of_the_domain_belongs_to_it() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_covariances_are_symmetric_and_positive_definite(kind: str) -> None:
     for shape in ("square", "ellipse", "circle"):
-        prediction = of(served(shape, kind), inside(served(shape, kind).model, 300))
+        prediction = of(tabulated(shape, kind), inside(tabulated(shape, kind).model, 300))
         assert np.array_equal(prediction.covariance, prediction.covariance.transpose(0, 2, 1))
         assert np.all(np.linalg.eigvalsh(prediction.process_covariance) > 0.0)
         assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > 0.0)
 
 
 def test_no_rows_give_no_predictions() -> None:
-    prediction = of(served("square", "vhgp"), np.empty((0, 3)))
+    prediction = of(tabulated("square", "vhgp"), np.empty((0, 3)))
     assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
 
 
 def test_the_analytical_model_answers_itself() -> None:
     model = trained(OUTLINES["square"], "analytical", *WIDE)
-    answers, inputs = serve(model), inside(model, 5)
+    answers, inputs = tabulate(model), inside(model, 5)
     assert not answers.tabulated and answers.error is None and answers.how.startswith("exact")
     for count in (1, 5):  # in plain numbers
         np.testing.assert_allclose(of(answers, inputs[:count]).mean, of(model, inputs[:count]).mean, rtol=1e-12)
@@ -272,18 +272,18 @@ def test_a_table_that_would_be_too_large_is_not_made(monkeypatch: pytest.MonkeyP
     for limit in ("MOST_KNOTS", "MOST_NODES"):
         with monkeypatch.context() as patch:
             patch.setattr(prediction_table, limit, 100)
-            answers = serve(served("square", "gp").model)
+            answers = tabulate(tabulated("square", "gp").model)
         assert not answers.tabulated
         assert "at most 100" in answers.how
 
 
 def test_a_table_that_is_not_true_to_the_model_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = served("square", "vhgp").model
+    model = tabulated("square", "vhgp").model
     for name in ("SIGNAL", "NOISE"):
         monkeypatch.setattr(prediction_table, name, prediction_table.Density(nodes=0.3, cells=0.3))
     for name in ("FEWEST_NODES", "FEWEST_CELLS"):
         monkeypatch.setattr(prediction_table, name, 4)
-    answers, inputs = serve(model), inside(model, 5)
+    answers, inputs = tabulate(model), inside(model, 5)
     assert not answers.tabulated
     assert "too far off" in answers.how
     assert np.array_equal(of(answers, inputs).covariance, of(model, inputs).covariance)
@@ -334,15 +334,15 @@ def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
         query_to_batch_request,
         query_to_request,
     )
-    from push_predictor.models.store.model_registry import ModelShelf
+    from push_predictor.models.store.model_registry import ModelRegistry
     from push_predictor.nodes.server.answers import answer_batch, answer_load, answer_push
     from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
     model = coupled(trained(OUTLINES["square"], "vhgp", *WIDE))
     save_model(model, tmp_path / "m.model")
-    shelf, loaded = ModelShelf(), LoadModel.Response()
+    shelf, loaded = ModelRegistry(), LoadModel.Response()
     answer_load(shelf, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
-    expected = serve(model)
+    expected = tabulate(model)
     assert expected.tabulated and expected.how in loaded.message and shelf.answering == [f"a vhgp: {expected.how}"]
     inputs = inside(model, 40)
     inputs[0, 0] = 0.2  # outside the domain

@@ -28,7 +28,7 @@ from msg_adapters.slider_poses import FLAT, fill_slider_response, query_from_sli
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.pose_answers import answer_slider_pose
 from push_predictor.nodes.server.request_frames import RequestFrames
@@ -398,7 +398,7 @@ def analytical() -> Any:
 
 
 def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_path: Any) -> None:
-    shelf, frames = ModelShelf(), RequestFrames(object(), "world")
+    shelf, frames = ModelRegistry(), RequestFrames(object(), "world")
     save_model(analytical(), tmp_path / "square.model")
     shelf.load(tmp_path / "square.model")
     here, there = PredictSliderPose.Response(), PredictSliderPose.Response()
@@ -413,7 +413,7 @@ def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_
 
 
 def test_a_refusal_leaves_no_number_behind(no_tf: None, tmp_path: Any) -> None:
-    shelf, response = ModelShelf(), PredictSliderPose.Response()
+    shelf, response = ModelRegistry(), PredictSliderPose.Response()
     with pytest.raises(PushPredictorError):
         answer_slider_pose(RequestFrames(object(), "world"), shelf, slider_request(), response)
     assert response == PredictSliderPose.Response()

@@ -35,8 +35,8 @@ from msg_adapters.predictions import (
 )
 from push_predictor.errors import RequestError
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.store.model_registry import ModelShelf
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.runtime import Stop
@@ -157,7 +157,7 @@ def server(folder):
 
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
 def test_it_answers_what_the_model_says(server, folder, kind):
-    model = serve(load_model(folder / f"{kind}.model"))
+    model = tabulate(load_model(folder / f"{kind}.model"))
     expected = model.predict(MANY, np.full(len(MANY), 0.2))
     answered = prediction_from_response(server.batch(MANY, model=kind))
     for k, push in enumerate(MANY):
@@ -260,7 +260,7 @@ def test_arrays_of_unequal_length_are_refused(server):
 def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
     request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MOST_PUSHES + 1))))
     with pytest.raises(RequestError) as caught:
-        answer_batch(lambda: None, ModelShelf(), request, PredictPushBatch.Response())
+        answer_batch(lambda: None, ModelRegistry(), request, PredictPushBatch.Response())
     assert str(caught.value) == "velocity length: 1000001 is not accepted, give at most 1000000 pushes a call"
 
 
@@ -329,7 +329,7 @@ def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
 
 
 def test_a_long_batch_stops_when_the_node_ends(folder):
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     shelf.load(folder / "analytical.model")
     inputs = np.tile(GOOD, (3 * answers.ROWS_AT_ONCE, 1))
     asked = []
@@ -346,7 +346,7 @@ def test_a_long_batch_stops_when_the_node_ends(folder):
 
 
 def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folder):
-    shelf = ModelShelf()
+    shelf = ModelRegistry()
     shelf.load(folder / "analytical.model")
     request = query_to_batch_request(PushQuery("", np.tile(GOOD, (answers.MOST_EXACT + 1, 1)), 0.2, {}))
     with pytest.raises(RequestError, match="50001 pushes without a table"):
@@ -529,13 +529,13 @@ def test_diagnostics_count_what_was_served_and_refused(server):
     _, before = server.next_status()
     server.push()
     server.push([np.nan, 0.1, 0.1])
-    served, refused = int(before["requests_served"]) + 1, int(before["requests_refused"]) + 1
+    tabulated, refused = int(before["requests_served"]) + 1, int(before["requests_refused"]) + 1
     status, values = server.next_status(
         lambda s: {p.key: p.value for p in s.values}["requests_refused"] == str(refused)
     )
     assert status.level == b"\0"
     assert "push_predictor" in status.name
-    assert values["requests_served"] == str(served)
+    assert values["requests_served"] == str(tabulated)
     assert values["last_refusal"].startswith("velocity: nan")
     assert values["models"] == "analytical, gp, vhgp"
     assert values["default_model"] == "gp"

@@ -18,7 +18,7 @@ from push_predictor.geometry.frames import quaternion_of_yaw, yaw_of_quaternion
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_turn
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.rollout import PARTICLES, rollout
 from push_predictor.types import Array
@@ -84,7 +84,7 @@ def planar(pose: PoseWithCovariance) -> tuple[Array, Array]:
 def test_it_answers_what_the_library_says(ask: Ask, folder: Path) -> None:
     response = ask(particles=7, seed=11)
     assert response.success, response.message
-    expected = rollout(serve(load_model(folder / "gp.model")), SLIDER, COVARIANCE, STEPS, PARTICLES, 11)
+    expected = rollout(tabulate(load_model(folder / "gp.model")), SLIDER, COVARIANCE, STEPS, PARTICLES, 11)
     for pose, mean, covariance in zip(response.poses, expected.mean, expected.covariance, strict=True):
         found, matrix = planar(pose)
         np.testing.assert_allclose(found, mean, atol=1e-9)

@@ -24,13 +24,13 @@ from std_msgs.msg import Float32, Float64, String
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from msg_adapters.residual_schema import RESIDUAL_TYPE
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import AnalyticalBody, ExtendedBody
+from push_predictor.models.push_model import AnalyticalPredictor, ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.validator.scalar_subscriber import ScalarInlet
+from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
@@ -84,12 +84,12 @@ def model(recording: Path) -> Path:
     """A model that lacks nothing but the warmth, which changes the contact friction."""
     rig = load_rig_for([recording])
     base = train_model(load_data([recording]), rig, "analytical", name="warm")
-    form = Form("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
+    form = DriverBasis("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
     effect = Effect("contact_friction", f"topic:{WARMTH}", form, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
-    assert isinstance(base.body, AnalyticalBody)
-    body = ExtendedBody(base.body, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3))
+    assert isinstance(base.predictor, AnalyticalPredictor)
+    predictor = ExtendedPredictor(base.predictor, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3))
     path = recording.parent / "warm.pushmodel"
-    save_model(replace(base, body=body), path)
+    save_model(replace(base, predictor=predictor), path)
     return path
 
 
@@ -195,7 +195,7 @@ def speaking(domain: int) -> Iterator[Node]:
 class Gathered:
     """What an inlet has taken of one topic."""
 
-    def __init__(self, inlet: ScalarInlet, name: str, near: int | None = None) -> None:
+    def __init__(self, inlet: ScalarSubscriber, name: str, near: int | None = None) -> None:
         self._inlet, self._name, self._near = inlet, name, near
         self.stamp: list[int] = []
         self.value: list[float] = []
@@ -227,7 +227,7 @@ def kept() -> QoSProfile:
 def test_a_topic_that_appears_later_is_heard_as_its_publisher_offers_it(
     hearing: Node, speaking: Node, profile: QoSProfile
 ) -> None:
-    inlet = ScalarInlet(hearing, ["warmth"])
+    inlet = ScalarSubscriber(hearing, ["warmth"])
     assert inlet.names == ["/warmth"] and "nobody publishes" in inlet.problems()[0]
     gathered = Gathered(inlet, "/warmth")
     with offered(speaking, String, QoSProfile(depth=10)):
@@ -264,7 +264,7 @@ def speaks(publisher: Any, message: Any, value: float) -> Callable[[Gathered], b
 
 
 def test_without_a_clock_the_time_is_when_it_was_sent(hearing: Node, speaking: Node) -> None:
-    inlet, publisher = ScalarInlet(hearing, ["/cell/warmth"]), speaking.create_publisher(Float64, "warmth", kept())
+    inlet, publisher = ScalarSubscriber(hearing, ["/cell/warmth"]), speaking.create_publisher(Float64, "warmth", kept())
     begin = speaking.get_clock().now().nanoseconds
     publisher.publish(Float64(data=1.0))
     end = speaking.get_clock().now().nanoseconds
@@ -274,7 +274,7 @@ def test_without_a_clock_the_time_is_when_it_was_sent(hearing: Node, speaking: N
 
 
 def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Node) -> None:
-    inlet = ScalarInlet(hearing, ["warmth"])
+    inlet = ScalarSubscriber(hearing, ["warmth"])
     clock = speaking.create_publisher(Clock, "/clock", kept())
     publisher = speaking.create_publisher(Float32, "warmth", kept())
     for second in range(5):
@@ -289,7 +289,7 @@ def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Nod
 
 
 def test_what_another_clock_has_stamped_or_is_no_number_is_counted_not_used(hearing: Node, speaking: Node) -> None:
-    inlet = ScalarInlet(hearing, ["warmth"])
+    inlet = ScalarSubscriber(hearing, ["warmth"])
     publisher = speaking.create_publisher(Temperature, "warmth", kept())
     for sec, value in ((100, 1.0), (100_000, 2.0), (101, float("nan"))):
         message: Any = Temperature(temperature=value)

@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from synthetic import square_pushes
 
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.tabulated.tabulated_model import serve
+from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor_interfaces.srv import PredictSliderPose
@@ -70,7 +70,7 @@ def filled(message: Any, values: dict[str, Any]) -> Any:
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_it_answers_what_the_library_says(ask: Any, folder: Path, kind: str) -> None:
     response = ask(model=kind)
-    expected = slider_after(serve(load_model(folder / f"{kind}.model")), PUSH)
+    expected = slider_after(tabulate(load_model(folder / f"{kind}.model")), PUSH)
     assert response.success, response.message
     assert response.in_domain == expected.in_domain
     pose = response.slider_after.pose

@@ -14,7 +14,7 @@ from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
 from msg_adapters import streams
-from msg_adapters.streams import SLIDER, TIP, Inbox, slider_stream, tip_stream, wrench_stream
+from msg_adapters.streams import SLIDER, TIP, MessageBuffer, slider_stream, tip_stream, wrench_stream
 from push_predictor.nodes.validator import sensor_subscriber as sensor_inlet
 from push_predictor.recordings.read import read_recording
 
@@ -37,14 +37,14 @@ def wrench(*numbers: float) -> bytes:
     return serialize_message(message)
 
 
-def filled(inbox: Inbox, *messages: bytes) -> Inbox:
+def filled(inbox: MessageBuffer, *messages: bytes) -> MessageBuffer:
     for message in messages:
         inbox.put(message)
     return inbox
 
 
 def test_good_messages_become_a_stream_in_order():
-    inbox = filled(Inbox(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
+    inbox = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
     stream = slider_stream(*inbox.take())
     assert stream.stamp.tolist() == [7_000_000_005, 7_000_000_009]
     assert (stream.x[0], stream.y[0], stream.z[0]) == (0.1, -0.2, 0.03)
@@ -67,30 +67,30 @@ def test_good_messages_become_a_stream_in_order():
     ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
 )
 def test_a_useless_slider_pose_is_counted_by_kind_and_the_others_are_taken(message: bytes, kind: str):
-    inbox = filled(Inbox(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
+    inbox = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
     assert len(inbox.take()[0]) == 2
     assert dict(inbox.rejected) == {kind: 1}
 
 
 def test_a_message_with_two_faults_is_counted_once():
-    inbox = filled(Inbox(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
+    inbox = filled(MessageBuffer(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
     inbox.take()
     assert inbox.rejected.total() == 1
 
 
 def test_an_empty_frame_id_accepts_any_frame():
-    assert len(filled(Inbox(SLIDER, ""), pose(*GOOD, frame="map"), pose(*GOOD)).take()[0]) == 2
+    assert len(filled(MessageBuffer(SLIDER, ""), pose(*GOOD, frame="map"), pose(*GOOD)).take()[0]) == 2
 
 
 def test_the_tip_is_a_point_its_orientation_does_not_matter():
-    stream = tip_stream(*filled(Inbox(TIP, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
+    stream = tip_stream(*filled(MessageBuffer(TIP, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
     assert stream.x.tolist() == [0.1]
-    assert len(filled(Inbox(TIP, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
+    assert len(filled(MessageBuffer(TIP, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
 
 
 def test_of_a_wrench_the_planar_part_must_be_finite():
     inbox = filled(
-        Inbox(streams.WRENCH, "world"),
+        MessageBuffer(streams.WRENCH, "world"),
         wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
         wrench(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
@@ -101,7 +101,7 @@ def test_of_a_wrench_the_planar_part_must_be_finite():
 
 def test_a_full_inbox_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(streams, "LIMIT", 100)
-    inbox = Inbox(SLIDER, "world")
+    inbox = MessageBuffer(SLIDER, "world")
     for k in range(305):
         inbox.put(pose(*GOOD, nanosec=k))
     assert len(inbox) <= 100 and len(inbox) + inbox.dropped == 305
@@ -119,9 +119,9 @@ def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Pa
     messages += [("/pusher/pose", POSE, START + k, data) for k, data in enumerate(poses)]
     messages += [("/pusher/wrench", WRENCH, START + k, data) for k, data in enumerate(forces)]
     read = read_recording(write_bag(tmp_path / "some.mcap", messages))
-    slider = slider_stream(*filled(Inbox(SLIDER, "world"), *poses).take())
-    tip = tip_stream(*filled(Inbox(TIP, "world"), *poses).take())
-    force = wrench_stream(*filled(Inbox(streams.WRENCH, "world"), *forces).take())
+    slider = slider_stream(*filled(MessageBuffer(SLIDER, "world"), *poses).take())
+    tip = tip_stream(*filled(MessageBuffer(TIP, "world"), *poses).take())
+    force = wrench_stream(*filled(MessageBuffer(streams.WRENCH, "world"), *forces).take())
     for name in ("stamp", "x", "y", "z", "heading"):
         assert np.array_equal(getattr(slider, name), getattr(read.slider, name)), name
     for name in ("stamp", "x", "y", "z"):
@@ -138,7 +138,7 @@ def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_sec
     wrench: list[bytes] = []
     inlet: Any = SimpleNamespace(_inboxes={"slider": slider, "wrench": wrench}, _empty=0.0)
     inlet._scalars = SimpleNamespace(waiting=lambda: True)
-    complete = sensor_inlet.SensorInlet.complete
+    complete = sensor_inlet.SensorSubscriber.complete
     assert not complete(inlet), "nothing has come"
     slider.append(b"pose")
     now[0] += 0.9

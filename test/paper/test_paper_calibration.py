@@ -135,7 +135,7 @@ def test_the_exact_transform_is_the_distribution_function_of_the_exact_density()
     pushes = made_up_set()
     model = train_model(pushes.table, pushes.rig, "vhgp", name="v", n_train=60)
     table, k = pushes.table.take(np.arange(1)), 1
-    latent, scaling = model.body.latent(table.inputs)[k], model.body.scaling
+    latent, scaling = model.predictor.latent(table.inputs)[k], model.predictor.scaling
     scaled = float((table.outcomes[0, k] - scaling.outcome_mean[k]) / scaling.outcome_sd[k])
     sd = float(np.sqrt(latent.outcome_variance[0]))
     below = np.linspace(min(scaled, float(latent.mean[0])) - 15.0 * sd, scaled, 10_001)

@@ -22,20 +22,20 @@ from push_predictor_paper.fits.curves import Curves
 from push_predictor_paper.fits.fits import SPLITS, Fit, Score
 from push_predictor_paper.fits.held_out import HeldOut
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 
 CORPUS = made_up_corpus()
 SIZES = (10, 100, 1000)
 
 
-def tally(nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: float = 0.01, fold: int = 0) -> Tally:
+def tally(nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: float = 0.01, fold: int = 0) -> PushScores:
     """40 pushes of about these totals."""
     rng = np.random.default_rng(fold)
     one = np.ones((40, 3))
     error = one * nmse / 3 * (1.0 + noise * rng.standard_normal((40, 1)))
     nats, precise = (one * v / 3 for v in (nlpd, nlpd if exact is None else exact))
     names = np.array([f"{fold}-{k}" for k in range(40)])
-    return Tally(names, np.ones(40), error, one, nats, precise, np.ones((40, 3, 3)))
+    return PushScores(names, np.ones(40), error, one, nats, precise, np.ones((40, 3, 3)))
 
 
 def curves_of(**kinds) -> Curves:

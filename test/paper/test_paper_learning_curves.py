@@ -15,7 +15,7 @@ from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
 from push_predictor_paper.fits.fits import SPLITS, Fit, Score
 from push_predictor_paper.study import Study
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 
 SHAPES, SURFACES = ("rect1", "ellip1", "ellip2"), ("plywood", "abs", "pu")
 TABLE = made_up_corpus().sets["rect1", "plywood"].table
@@ -30,7 +30,7 @@ CORPUS = Corpus(
 def score(fit: Fit, nmse: float, nlpd: float) -> Score:
     """A score of 6 pushes with these totals."""
     one = np.ones((6, 3))
-    tally = Tally(
+    tally = PushScores(
         np.array(list("abcdef")), np.ones(6), one * nmse / 3, one, one * nlpd / 3, one * nlpd / 3, np.ones((6, 3, 3))
     )
     return Score(fit, tally, 0.1)

@@ -128,7 +128,7 @@ def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -
     variance = np.diagonal(prediction.covariance, axis1=1, axis2=2)
     expected = -0.5 * (np.log(2.0 * np.pi * variance) + (rows - prediction.mean) ** 2 / variance)
     np.testing.assert_allclose(found.gaussian, expected, atol=1e-9)
-    exact = model.body.exact_log_density(Push(inputs, np.full(len(rows), 0.2), {}), rows)
+    exact = model.predictor.exact_log_density(Push(inputs, np.full(len(rows), 0.2), {}), rows)
     assert exact is not None
     np.testing.assert_allclose(found.exact, exact)
     with pytest.raises(TypeError, match="analytical"):

@@ -35,7 +35,7 @@ from push_predictor_paper.data.time_scaled import (
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.plan import Plan
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -56,13 +56,13 @@ def windows_at(number: int, inertia: float) -> PushTable:
     return PushTable(inputs, np.full(pushes, TRAVEL / speed), outcomes, names)
 
 
-def tally_of(error: dict[int, float], pushes: int = 40) -> Tally:
+def tally_of(error: dict[int, float], pushes: int = 40) -> PushScores:
     """Pushes of several speeds (numbers) with squared errors about these, in units of their spread, summed over 3."""
     names = np.array([f"{number:02d}-{k:05d}" for number in error for k in range(pushes)])
     rng = np.random.default_rng(0)
     scale = np.repeat(list(error.values()), pushes)[:, None] / 3.0
     ones = np.ones((len(names), 3))
-    return Tally(
+    return PushScores(
         names, ones[:, 0], scale * rng.uniform(0.8, 1.2, ones.shape), ones, ones, ones, np.ones((len(names), 3, 3))
     )
 

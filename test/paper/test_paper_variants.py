@@ -25,7 +25,7 @@ from push_predictor_paper.plan import FULL, QUICK
 from push_predictor_paper.study import Study
 from push_predictor_paper.work import Work
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE
 from push_predictor.recordings.rig import Rig
@@ -47,13 +47,13 @@ def corpus(pushes: int = 60, origin: str = "simulated") -> Corpus:
     return Corpus(origin, f"{origin}: made up", {PAIR: PushSet(table, rig)}, PAIR)  # type: ignore[arg-type]  # text
 
 
-def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02) -> Tally:
+def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02) -> PushScores:
     """A tally with that exact NLPD by output, a little different from push to push."""
     jitter = noise * np.random.default_rng(abs(int(1000 * nlpd))).standard_normal((pushes, 3))
     rows = np.ones((pushes, 3))
     density = nlpd * rows + jitter - jitter.mean(axis=0)
     covered = np.ones((pushes, 3, 3))
-    return Tally(np.arange(pushes).astype(str), np.ones(pushes), nmse * rows, rows, density, density, covered)
+    return PushScores(np.arange(pushes).astype(str), np.ones(pushes), nmse * rows, rows, density, density, covered)
 
 
 def made_up(gains: dict[tuple[int, str, str], float], noise: float = 0.02, nmse: float = 0.2) -> Variants:

@@ -14,10 +14,10 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.push_model import Prediction
 from push_predictor.planning.choose import choose_push
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.repertoire import Pushes, Repertoire, every_line, repertoire
-from push_predictor.planning.unscented import Tip
+from push_predictor.planning.repertoire import Pushes, Repertoire, push_grid, repertoire
+from push_predictor.planning.unscented import PusherGeometry
 
-SQUARE = Tip(shape_outline("rect1"), 0.00475, 0.2)
+SQUARE = PusherGeometry(shape_outline("rect1"), 0.00475, 0.2)
 AT_ORIGIN = np.zeros(3)
 
 
@@ -186,9 +186,9 @@ def test_windows_follow_each_other():
     np.testing.assert_allclose(does.mean, [[0.004, 0.0, 0.0], [0.016, 0.0, 0.0]], atol=1e-12)
 
 
-@pytest.mark.parametrize(("lasting", "power"), [(0.0, 1), (1.0, 2)])
-def test_scatter_adds_up_as_it_lasts(lasting, power):
-    does = repertoire(moving(1e-4), SQUARE, np.array([[0.02, 0.125, 0.0]]), (1, 4), lasting)
+@pytest.mark.parametrize(("persistent_fraction", "power"), [(0.0, 1), (1.0, 2)])
+def test_scatter_adds_up_as_it_lasts(persistent_fraction, power):
+    does = repertoire(moving(1e-4), SQUARE, np.array([[0.02, 0.125, 0.0]]), (1, 4), persistent_fraction)
     np.testing.assert_allclose(does.covariance[:, 1, 1], [1e-8, 4.0**power * 1e-8], rtol=1e-6)
 
 
@@ -203,7 +203,7 @@ def test_the_tip_takes_back_what_scatters_along_the_normal():
 
 
 def test_all_sides_of_a_square_are_one():
-    lines = every_line([0.02], np.array([0.1, 0.35, 0.6, 0.85]), np.array([0.3]))
+    lines = push_grid([0.02], np.array([0.1, 0.35, 0.6, 0.85]), np.array([0.3]))
     does = repertoire(moving(1e-4), SQUARE, lines, (3,), 0.4)
     for side in range(4):
         np.testing.assert_allclose(
@@ -214,7 +214,7 @@ def test_all_sides_of_a_square_are_one():
 def test_pushes_outside_the_domain_are_never_chosen():
     """Only they would reach the goal at once."""
     known = moving(1e-5, lambda inputs: np.abs(inputs[:, 2]) < 0.5)
-    lines = every_line([0.02], np.array([0.125]), np.array([-0.2, 0.2, 0.7]))
+    lines = push_grid([0.02], np.array([0.125]), np.array([-0.2, 0.2, 0.7]))
     does = repertoire(known, SQUARE, lines, (1, 2, 3))
     assert len(does) == 6 and np.abs(does.pushes.inputs[:, 2]).max() < 0.5
     goal = Goal(0.004 * np.array([np.cos(0.7), np.sin(0.7), 0.0]), 0.0002, 0.05)
@@ -239,7 +239,7 @@ def test_a_push_that_leaves_the_domain_on_its_way_is_kept_short():
 def test_the_model_is_asked_for_pushes_only():
     asked: list[np.ndarray] = []
     predict = moving(2e-3, asked=asked)
-    repertoire(predict, SQUARE, every_line([0.02], np.linspace(0.0, 0.99, 40), np.linspace(-1.4, 1.4, 9)), (1, 2, 5))
+    repertoire(predict, SQUARE, push_grid([0.02], np.linspace(0.0, 0.99, 40), np.linspace(-1.4, 1.4, 9)), (1, 2, 5))
     assert max(np.abs(inputs[:, 2]).max() for inputs in asked) < np.pi / 2.0
 
 

@@ -15,11 +15,11 @@ from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, Provenance, PushModel
+from push_predictor.models.push_model import AnalyticalPredictor, ExtendedPredictor, Provenance, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.planning.particles import Deviations
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
@@ -49,8 +49,8 @@ def rows(count: int = 40) -> PushTable:
 def model_with(covariance: Array, shape: str = "rect1") -> PushModel:
     """The analytical model of a shape, every window of 0.2 s with one covariance (3, 3)."""
     rig = Rig(shape, shape_outline(shape), RADIUS, "abs", 0.837)
-    body = AnalyticalBody(AnalyticalPush(rig.outline, RADIUS), covariance)
-    return PushModel("made", "analytical", rig, body, rows(), Provenance((), 8, 0, "0"))
+    predictor = AnalyticalPredictor(AnalyticalPush(rig.outline, RADIUS), covariance)
+    return PushModel("made", "analytical", rig, predictor, rows(), Provenance((), 8, 0, "0"))
 
 
 def heading_of(contact: float, angle: float, model: PushModel) -> float:
@@ -63,8 +63,8 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
     """Where the analytical model has the slider (3,) after one push from rest, integrated at once."""
     velocity, contact, angle, duration = step
     heading = np.array([heading_of(contact, angle, model)])
-    assert isinstance(model.body, AnalyticalBody)
-    moved = model.body.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
+    assert isinstance(model.predictor, AnalyticalPredictor)
+    moved = model.predictor.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
     return displaced(AT_REST[None], heading, moved)[0]
 
 
@@ -88,10 +88,10 @@ def test_every_step_starts_where_the_slider_then_is() -> None:
 
 def test_one_window_is_the_prediction() -> None:
     model, particles = model_with(NOISY), 40_000
-    model = replace(model, body=replace(model.body, covariance=np.diag(SD) @ CORRELATED @ np.diag(SD)))
+    model = replace(model, predictor=replace(model.predictor, covariance=np.diag(SD) @ CORRELATED @ np.diag(SD)))
     rolled = rollout(model, AT_REST, CERTAIN, [[0.02, 0.1, 0.2, 0.2]], particles)
     heading = heading_of(0.1, 0.2, model)
-    expected = covariance_in_world(model.body.covariance[None], np.array([heading]))[0]
+    expected = covariance_in_world(model.predictor.covariance[None], np.array([heading]))[0]
     error = np.sqrt(np.diagonal(expected) / particles)
     off = rolled.mean[0] - after_one_push(model, [0.02, 0.1, 0.2, 0.2])
     assert np.all(np.abs(off) < 4.0 * error)
@@ -167,9 +167,9 @@ def test_a_slider_that_the_tip_has_passed_stays() -> None:
 
 def test_pushes_of_one_mode_may_lead_to_two() -> None:
     """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
-    lasting = Persistence(np.ones(3), np.zeros(3), np.ones(3))
+    persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     short, long = (
-        rollout(model_with(np.diag([1e-8, 1e-7, 1e-4])), AT_REST, CERTAIN, [step], 150, persistence=lasting)
+        rollout(model_with(np.diag([1e-8, 1e-7, 1e-4])), AT_REST, CERTAIN, [step], 150, persistence=persistent_fraction)
         for step in ([0.02, 0.125, 0.0, 0.2], [0.02, 0.125, 0.0, 12.0])
     )
     assert np.all(np.abs(short.samples[:, 2]) < 0.05)
@@ -243,10 +243,10 @@ def test_few_pushes_show_little_and_pushes_of_one_window_nothing() -> None:
 
 
 def test_what_lasts_widens_the_end_of_a_long_push() -> None:
-    lasting = Persistence(np.ones(3), np.zeros(3), np.ones(3))
+    persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     turned = [
         rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.05, 0.0, 3.0]], 1000, persistence=each).covariance[0]
-        for each in (INDEPENDENT, lasting)
+        for each in (INDEPENDENT, persistent_fraction)
     ]
     assert turned[1][2, 2] > 2.0 * turned[0][2, 2]
 
@@ -356,12 +356,12 @@ class Attentive:
 
 
 def test_covariates_of_the_pose_are_those_of_each_sample() -> None:
-    body = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))
-    model = replace(model_with(CERTAIN), body=body)  # type: ignore[arg-type]  # a body of the test's own
+    predictor = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))
+    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a body of the test's own
     start = np.array([0.1, 0.2, 3.1])
     rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.3, 0.2]] * 2, 3, persistence=INDEPENDENT)
-    first, second = (push.covariates for push in body.seen)
-    np.testing.assert_allclose([first[name] for name in body.needs[:3]], np.tile(start[:, None], 3))
+    first, second = (push.covariates for push in predictor.seen)
+    np.testing.assert_allclose([first[name] for name in predictor.needs[:3]], np.tile(start[:, None], 3))
     np.testing.assert_allclose(first["push_heading"], wrap_angle(np.array(3.1 + heading_of(0.125, 0.3, model))))
     np.testing.assert_allclose(second["slider_x"], rolled.mean[0, 0])
     np.testing.assert_allclose(second["slider_heading"], 3.2 - 2.0 * np.pi)
@@ -371,10 +371,10 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
     table = rows(100)
     table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
     base = train_model(table, square_rig(), "gp", name="learnt")
-    form, size = Form("constant"), np.array([0.4, 0.2])
+    form, size = DriverBasis("constant"), np.array([0.4, 0.2])
     effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
     physics = AnalyticalPush(base.rig.outline, RADIUS)
-    model = replace(base, body=ExtendedBody(base.body, physics, (effect,), np.ones(3)))
+    model = replace(base, predictor=ExtendedPredictor(base.predictor, physics, (effect,), np.ones(3)))
     assert model.needs == ("slider_heading",)
     moved = []
     for heading in (0.0, 0.8):
@@ -392,8 +392,8 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
 
 
 def test_a_covariate_that_no_pose_tells_is_refused_by_name() -> None:
-    body = Attentive(("slider_heading", "elapsed_time"))
-    model = replace(model_with(CERTAIN), body=body)  # type: ignore[arg-type]  # a body of the test's own
+    predictor = Attentive(("slider_heading", "elapsed_time"))
+    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a body of the test's own
     with pytest.raises(RequestError, match=r"made.*this one needs elapsed_time$"):
         rollout(model, AT_REST, CERTAIN, [PUSH], 3)
 

@@ -17,11 +17,11 @@ from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import ExtendedBody, PushModel
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import DEEPEST, LARGEST_GAP, SliderAfter, WorldPush, slider_after
 from push_predictor.recordings.read import read_recording
@@ -162,19 +162,19 @@ def test_a_covariance_off_the_diagonal_is_carried_over() -> None:
             return replace(super().predict(inputs, duration, covariates), covariance=full[None])
 
     base = model_of("rect1")
-    model = Correlated(base.name, base.kind, base.rig, base.body, base.training, base.provenance)
+    model = Correlated(base.name, base.kind, base.rig, base.predictor, base.training, base.provenance)
     push = push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, np.pi / 2.0))  # pushed along the world's y
     expected = np.array([[1e-8, -1e-8, -2e-7], [-1e-8, 4e-8, 3e-7], [-2e-7, 3e-7, 3e-5]])
     np.testing.assert_allclose(slider_after(model, push).covariance, expected, atol=1e-20)
 
 
 def test_a_served_model_answers_as_its_table_does() -> None:
-    served = serve(model_of("rect1", "gp"))
-    assert isinstance(served, ServedModel) and served.tabulated
+    tabulated = tabulate(model_of("rect1", "gp"))
+    assert isinstance(tabulated, TabulatedModel) and tabulated.tabulated
     push = push_at("rect1", 0.1, 0.3)
-    ours = served.predict(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
+    ours = tabulated.predict(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
     heading = np.arctan2(push.velocity[1:], push.velocity[:1])
-    after = slider_after(served, push)
+    after = slider_after(tabulated, push)
     np.testing.assert_allclose(after.pose, displaced(push.slider[None], heading, ours.mean)[0], atol=1e-9)
     np.testing.assert_allclose(after.covariance, covariance_in_world(ours.covariance, heading)[0], rtol=1e-6)
 
@@ -227,10 +227,10 @@ def test_at_a_corner_moving_off_is_refused(driving: float) -> None:
 
 def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
     """The tip's line at a window's start leads to the window's contact and to the same outcome."""
-    recording, served = read_recording(BAGS / "square_abs_test"), serve(model_of("rect1", "vhgp"))
+    recording, tabulated = read_recording(BAGS / "square_abs_test"), tabulate(model_of("rect1", "vhgp"))
     windows = find_windows(recording, recording.rig)[::4]
     table = windows_to_table(windows)
-    shown = served.predict(table.inputs, table.duration, table.covariates)
+    shown = tabulated.predict(table.inputs, table.duration, table.covariates)
     headings = np.array([window.push_heading for window in windows])
     poses = displaced(np.array([window.slider_start for window in windows]), headings, shown.mean)
     spreads = covariance_in_world(shown.covariance, headings)
@@ -240,7 +240,7 @@ def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
     for window, pose, spread, in_domain in zip(windows, poses, spreads, shown.in_domain, strict=True):
         line = pusher_line(pusher, (window.start - origin) * NANOSECOND)
         push = WorldPush(window.slider_start, line.position, line.velocity, window.duration, window.covariates)
-        after = slider_after(served, push)
+        after = slider_after(tabulated, push)
         np.testing.assert_allclose(after.pose, pose, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(after.covariance, spread, rtol=1e-5, atol=1e-15)
         assert after.in_domain == in_domain
@@ -253,11 +253,11 @@ def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
 def leaning(covariate: str) -> PushModel:
     """A model in which dx grows with a covariate."""
     base = model_of("rect1")
-    form = Form("linear", (covariate,), (0.0,), (1.0,))
+    form = DriverBasis("linear", (covariate,), (0.0,), (1.0,))
     effect = Effect("contact_friction", covariate, form, np.array([0.1]), np.array([[1e-4]]), np.ones(3))
     training = replace(base.training, covariates={covariate: np.linspace(-4.0, 4.0, len(base.training))})
-    body = ExtendedBody(base.body, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
-    return replace(base, body=body, training=training)
+    predictor = ExtendedPredictor(base.predictor, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
+    return replace(base, predictor=predictor, training=training)
 
 
 @pytest.mark.parametrize("name", TOLD)

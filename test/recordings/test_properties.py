@@ -18,11 +18,20 @@ from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
 from msg_adapters.poses import PlanarPose, PlanarWrench, pose_to_message, wrench_to_message
-from msg_adapters.streams import SLIDER, TIP, WRENCH, Inbox, SensorKind, slider_stream, tip_stream, wrench_stream
+from msg_adapters.streams import (
+    SLIDER,
+    TIP,
+    WRENCH,
+    MessageBuffer,
+    SensorKind,
+    slider_stream,
+    tip_stream,
+    wrench_stream,
+)
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import Prediction, PushModel
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor.recordings.rig import Rig
@@ -67,7 +76,7 @@ def poses(stream: PoseStream) -> list[PoseStamped]:
 
 
 def received(kind: SensorKind, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
-    inbox = Inbox(kind, "world")
+    inbox = MessageBuffer(kind, "world")
     for message in messages:
         inbox.put(serialize_message(message))
     return inbox.take()
@@ -163,8 +172,8 @@ def model_of(shape: str, kind: str) -> PushModel:
 
 
 @cache
-def served(shape: str, kind: str) -> ServedModel:
-    return serve(model_of(shape, kind))
+def tabulated(shape: str, kind: str) -> TabulatedModel:
+    return tabulate(model_of(shape, kind))
 
 
 @settings(max_examples=60, deadline=None)
@@ -190,7 +199,7 @@ def test_a_slider_turned_onto_itself_ends_where_it_would_have_ended(
     outline = shape_outline(shape)
     order = outline.rotational_symmetry
     turned = turn if order == 0 else 2.0 * np.pi / order * round(turn)
-    predictor = served(shape, kind) if from_table else model_of(shape, kind)
+    predictor = tabulated(shape, kind) if from_table else model_of(shape, kind)
     x, y, heading = slider
     here = tip_at(outline.point(np.array([contact]))[0], outline.inward_normal(np.array([contact]))[0], slider, angle)
     there = replace(here, slider=np.array([x, y, heading + turned]))
@@ -221,7 +230,7 @@ def tip_at(point: Array, normal: Array, slider: tuple[float, float, float], angl
 def test_covariances_are_symmetric_and_positive_definite_in_and_out_of_the_domain(
     shape: str, kind: str, from_table: bool, velocity: float, contact: float, angle: float
 ) -> None:
-    predictor = served(shape, kind) if from_table else model_of(shape, kind)
+    predictor = tabulated(shape, kind) if from_table else model_of(shape, kind)
     if kind == "analytical":
         velocity = min(velocity, 0.2)  # mechanics is integrated along the way: metres take minutes, and are refused
     prediction: Prediction = predictor.predict(np.array([[velocity, contact, angle]]), np.array([0.2]))

@@ -16,17 +16,17 @@ from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.report.map_conditions import covariates_of_map, held_covariates, held_in_words
 from push_predictor.evaluation.report.maps import fine_cells, push_map
 from push_predictor.geometry.frames import wrap_angle
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, PushModel
+from push_predictor.models.push_model import AnalyticalPredictor, ExtendedPredictor, PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
 
 BAG = BAGS / "hexagon_delrin"
-DRIFT = Form("linear", ("elapsed_time",), (30.0,), (20.0,))
-AHEAD = Form("periodic", ("push_heading",))
+DRIFT = DriverBasis("linear", ("elapsed_time",), (30.0,), (20.0,))
+AHEAD = DriverBasis("periodic", ("push_heading",))
 
 
 def slippery() -> Effect:
@@ -35,8 +35,8 @@ def slippery() -> Effect:
 
 
 def grain() -> Effect:
-    body = "anisotropic_friction", "push_heading", Form("constant")
-    return Effect(*body, np.array([0.2, 0.1]), 1e-3 * np.eye(2), np.ones(3))
+    predictor = "anisotropic_friction", "push_heading", DriverBasis("constant")
+    return Effect(*predictor, np.array([0.2, 0.1]), 1e-3 * np.eye(2), np.ones(3))
 
 
 def headed() -> Effect:
@@ -55,9 +55,9 @@ def base(table: PushTable) -> PushModel:
 
 
 def extended(base: PushModel, *effects: Effect) -> PushModel:
-    assert isinstance(base.body, AnalyticalBody)
-    body = ExtendedBody(base.body, base.body.physics, effects, np.ones(3))
-    return replace(base, name="extended", body=body)
+    assert isinstance(base.predictor, AnalyticalPredictor)
+    predictor = ExtendedPredictor(base.predictor, base.predictor.physics, effects, np.ones(3))
+    return replace(base, name="extended", predictor=predictor)
 
 
 def test_a_map_is_drawn_at_the_middle_of_the_covariates(base: PushModel, table: PushTable) -> None:

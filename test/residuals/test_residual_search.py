@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import design_of
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import LIBRARY
@@ -57,15 +57,15 @@ def pushes(n: int, seed: int, scatter: np.ndarray = SCATTER) -> PushTable:
     return PushTable(inputs, duration, outcomes, np.array([f"{seed} {k}" for k in push]), covariates)
 
 
-def with_effect(table: PushTable, mechanism: str | None, form: Form, *coefficients: float) -> PushTable:
+def with_effect(table: PushTable, mechanism: str | None, form: DriverBasis, *coefficients: float) -> PushTable:
     push = evidence_of(ANALYTICAL, table, PHYSICS).push
     design = design_of(mechanism, form, PHYSICS, push, np.ones(3))
     return replace(table, outcomes=table.outcomes + design @ np.array(coefficients))
 
 
-def linear(table: PushTable, name: str) -> Form:
+def linear(table: PushTable, name: str) -> DriverBasis:
     values = table.covariates[name]
-    return Form("linear", (name,), (float(values.mean()),), (float(values.std()),))
+    return DriverBasis("linear", (name,), (float(values.mean()),), (float(values.std()),))
 
 
 ANALYTICAL = train_model(pushes(60, 1), RIG, "analytical", name="textbook")
@@ -126,12 +126,14 @@ class TestNothingThere:
 
     def test_what_the_base_lacks_is_no_news_where_training_shows_it_as_well(self) -> None:
         """A slider whose sides differ, learnt by a model that folds them: as many pushes later it is the same one."""
-        shift = Form("constant"), 0.003, -0.002
+        shift = DriverBasis("constant"), 0.003, -0.002
         base = train_model(with_effect(pushes(150, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
         same = searched(base, with_effect(pushes(150, 3), "centre_of_friction", *shift))
         assert not same.terms
         assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.standing)
-        other = searched(base, with_effect(pushes(150, 3), "centre_of_friction", Form("constant"), -0.003, 0.002))
+        other = searched(
+            base, with_effect(pushes(150, 3), "centre_of_friction", DriverBasis("constant"), -0.003, 0.002)
+        )
         assert other.terms[0].best.label == ("centre_of_friction", "edge")
 
     def test_a_driver_that_goes_with_the_inputs_is_not_tried(self, learnt) -> None:
@@ -194,16 +196,16 @@ class TestNames:
         assert first.p_value <= 0.01
 
     def test_a_grain_of_the_table_is_driven_by_the_heading(self, learnt) -> None:
-        table = with_effect(pushes(200, 201), "anisotropic_friction", Form("constant"), 0.2, 0.1)
+        table = with_effect(pushes(200, 201), "anisotropic_friction", DriverBasis("constant"), 0.2, 0.1)
         first = searched(learnt, table).terms[0]
         assert first.best.label == ("anisotropic_friction", "push_heading")
 
     def test_a_shift_in_the_body_is_told_by_the_sides_that_the_base_folds(self, learnt) -> None:
-        table = with_effect(pushes(200, 202), "centre_of_friction", Form("constant"), 0.003, 0.002)
+        table = with_effect(pushes(200, 202), "centre_of_friction", DriverBasis("constant"), 0.003, 0.002)
         assert searched(learnt, table).terms[0].best.label == ("centre_of_friction", "edge")
 
     def test_a_change_without_a_driver_lies_in_the_models_own_inputs(self, learnt) -> None:
-        table = with_effect(pushes(200, 203), "contact_friction", Form("constant"), 0.2)
+        table = with_effect(pushes(200, 203), "contact_friction", DriverBasis("constant"), 0.2)
         assert searched(learnt, table).terms[0].best.label == ("contact_friction", "model_inputs")
 
     def test_contact_friction_other_than_the_textbooks_is_found_by_the_textbook_model(self) -> None:
@@ -233,7 +235,7 @@ class TestForm:
     def test_a_step_is_told_with_its_place(self, learnt) -> None:
         plain = pushes(200, 300)
         place = 1200.0
-        table = with_effect(plain, "contact_friction", Form("step", ("elapsed_time",), place=place), 0.25)
+        table = with_effect(plain, "contact_friction", DriverBasis("step", ("elapsed_time",), place=place), 0.25)
         form = searched(learnt, table).terms[0].best.form
         assert form.name == "step"
         assert form.place == pytest.approx(place, abs=150.0)

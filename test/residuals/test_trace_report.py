@@ -15,7 +15,7 @@ import pytest
 from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, planted, slippery, told
 
 from push_predictor.evaluation.report.maps import Cells, PushMap
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals import outcome
 from push_predictor.residuals.extension.advice import separating_words
 from push_predictor.residuals.outcome import Gain, Sized, Trace
@@ -249,7 +249,7 @@ def test_an_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
 
 
 def test_a_constant_effect_is_shown_over_the_angle_by_contact() -> None:
-    trace = made_up_trace(planted("contact_friction", "model_inputs", Form("constant"), -0.08), count=200)
+    trace = made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08), count=200)
     rows, effect = analysis_rows(trace), trace.terms[0]
     course = course_of(effect, trace.model.rig.outline, rows)
     assert len(course.groups) == 3 and "angle" in course.label

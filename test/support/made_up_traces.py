@@ -9,11 +9,11 @@ import numpy as np
 from synthetic import square_rig
 
 from push_predictor.geometry.frames import wrap_angle
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import ExtendedBody, PushModel
+from push_predictor.models.push_model import ExtendedPredictor, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.residuals import evidence_of
@@ -22,10 +22,10 @@ from push_predictor.residuals.extension.extension import Term, compared, extend,
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
-DRIFT = Form("linear", ("elapsed_time",), (500.0,), (300.0,))
-JUMP = Form("step", ("elapsed_time",), place=620.0)
-PLACE = Form("map", ("slider_x", "slider_y"), (0.0, 0.0), (0.1, 0.1))
-GRAIN: Term = ("anisotropic_friction", "push_heading", Form("constant"))
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+JUMP = DriverBasis("step", ("elapsed_time",), place=620.0)
+PLACE = DriverBasis("map", ("slider_x", "slider_y"), (0.0, 0.0), (0.1, 0.1))
+GRAIN: Term = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 DRIVERS = ("elapsed_time", "push_index", "slider_x", "slider_heading", "push_heading", "topic:/warmth")
 TESTED = tuple(
     Tested(mechanism, driver, float(p))
@@ -74,7 +74,7 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 
 
-def planted(mechanism: str | None, covariate: str, form: Form, *coefficients: float) -> Effect:
+def planted(mechanism: str | None, covariate: str, form: DriverBasis, *coefficients: float) -> Effect:
     """An effect of exactly this size."""
     size = np.array(coefficients)
     return Effect(mechanism, covariate, form, size, np.zeros((len(size), len(size))), np.ones(3))
@@ -98,7 +98,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
     refit = refit_base(model, analysis)
     terms_of = [(e.mechanism, e.covariate, e.form) for e in effects]
     after = extend(refit, analysis, terms_of, model) if effects else refit
-    terms = after.body.effects if isinstance(after.body, ExtendedBody) else ()
+    terms = after.predictor.effects if isinstance(after.predictor, ExtendedPredictor) else ()
     nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
     before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))
     return Trace(

@@ -28,7 +28,7 @@ from push_predictor.models.gaussian_process.cross_validation import moments_left
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
-from push_predictor.models.predictors import AnalyticalBody, ExtendedBody, LearnedBody
+from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array
@@ -130,9 +130,11 @@ def held_out(model: PushModel) -> tuple[Array, Array]:
     """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their fold of pushes."""
     table = model.training
     push = Push(table.inputs, table.duration, table.covariates)
-    base, folds = model.base.body, push_folds(table, FOLDS)
-    moments = moments_left_out(base, folds) if isinstance(base, LearnedBody) else base.moments(push)
-    mean, covariance, _ = model.body.extended(moments, push) if isinstance(model.body, ExtendedBody) else moments
+    base, folds = model.base.predictor, push_folds(table, FOLDS)
+    moments = moments_left_out(base, folds) if isinstance(base, GaussianProcessPredictor) else base.moments(push)
+    mean, covariance, _ = (
+        model.predictor.extended(moments, push) if isinstance(model.predictor, ExtendedPredictor) else moments
+    )
     return mean, covariance
 
 
@@ -157,9 +159,9 @@ def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, c
 
 
 def _physics(model: PushModel) -> AnalyticalPush:
-    body = model.base.body
-    if isinstance(body, AnalyticalBody):
-        return body.physics
+    predictor = model.base.predictor
+    if isinstance(predictor, AnalyticalPredictor):
+        return predictor.physics
     return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
 
 

@@ -11,7 +11,7 @@ from push_predictor.types import Array
 
 
 @dataclass(frozen=True)
-class Form:
+class DriverBasis:
     """A form of one driver: name is one of FORMS; centre and scale of the driver, and the place of a step.
 
     drivers: names of the covariates it takes: one, or two for a map; none for a constant. levels: of a category, the
@@ -28,56 +28,56 @@ class Form:
     def values(self, covariates: Mapping[str, Array], n: int) -> Array:
         """The form's columns (n, m) at n pushes; a constant is one column of ones."""
         columns = [np.asarray(covariates[name], dtype=np.float64) for name in self.drivers]
-        return FORMS[self.name](self, columns, n)
+        return BASES[self.name](self, columns, n)
 
 
-def _scaled(form: Form, columns: list[Array]) -> list[Array]:
+def _scaled(form: DriverBasis, columns: list[Array]) -> list[Array]:
     return [(column - c) / s for column, c, s in zip(columns, form.centre, form.scale, strict=True)]
 
 
-def _constant(form: Form, columns: list[Array], n: int) -> Array:
+def _constant(form: DriverBasis, columns: list[Array], n: int) -> Array:
     return np.ones((n, 1))
 
 
-def _linear(form: Form, columns: list[Array], n: int) -> Array:
+def _linear(form: DriverBasis, columns: list[Array], n: int) -> Array:
     return _scaled(form, columns)[0][:, None]
 
 
-def _logarithmic(form: Form, columns: list[Array], n: int) -> Array:
+def _logarithmic(form: DriverBasis, columns: list[Array], n: int) -> Array:
     """Logarithm of the way from the start of the driver's range, in units of its scale."""
     return np.log1p(np.maximum((columns[0] - form.place) / form.scale[0], 0.0))[:, None]
 
 
-def _quadratic(form: Form, columns: list[Array], n: int) -> Array:
+def _quadratic(form: DriverBasis, columns: list[Array], n: int) -> Array:
     x = _scaled(form, columns)[0]
     return np.column_stack([x, x**2])
 
 
-def _step(form: Form, columns: list[Array], n: int) -> Array:
+def _step(form: DriverBasis, columns: list[Array], n: int) -> Array:
     return (columns[0] >= form.place).astype(np.float64)[:, None]
 
 
-def _periodic(form: Form, columns: list[Array], n: int) -> Array:
+def _periodic(form: DriverBasis, columns: list[Array], n: int) -> Array:
     """Once around per turn of a heading."""
     return np.column_stack([np.cos(columns[0]), np.sin(columns[0])])
 
 
-def _periodic_twice(form: Form, columns: list[Array], n: int) -> Array:
+def _periodic_twice(form: DriverBasis, columns: list[Array], n: int) -> Array:
     """Twice around per turn of a heading: alike for opposite headings."""
     return np.column_stack([np.cos(2.0 * columns[0]), np.sin(2.0 * columns[0])])
 
 
-def _category(form: Form, columns: list[Array], n: int) -> Array:
+def _category(form: DriverBasis, columns: list[Array], n: int) -> Array:
     return np.column_stack([(columns[0] == level).astype(np.float64) for level in form.levels[1:]])
 
 
-def _map(form: Form, columns: list[Array], n: int) -> Array:
+def _map(form: DriverBasis, columns: list[Array], n: int) -> Array:
     """A second-order map over two drivers."""
     x, y = _scaled(form, columns)
     return np.column_stack([x, y, x * y, x**2, y**2])
 
 
-FORMS: dict[str, Callable[[Form, list[Array], int], Array]] = {
+BASES: dict[str, Callable[[DriverBasis, list[Array], int], Array]] = {
     "constant": _constant,
     "linear": _linear,
     "logarithmic": _logarithmic,
@@ -90,6 +90,6 @@ FORMS: dict[str, Callable[[Form, list[Array], int], Array]] = {
 }
 
 
-def columns_of(form: Form) -> int:
+def columns_of(form: DriverBasis) -> int:
     """How many columns a form has."""
     return form.values({name: np.zeros(1) for name in form.drivers}, 1).shape[1]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.models.mechanisms.mechanism import Mechanism
@@ -25,7 +25,7 @@ class Effect:
 
     mechanism: str | None
     covariate: str
-    form: Form
+    form: DriverBasis
     coefficients: Array
     covariance: Array
     outcome_scale: Array
@@ -46,7 +46,9 @@ class Effect:
         return design @ self.coefficients, design @ self.covariance @ np.transpose(design, (0, 2, 1))
 
 
-def design_of(mechanism: str | None, form: Form, physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+def design_of(
+    mechanism: str | None, form: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
+) -> Array:
     """Columns (n, 3, p * m) of an effect: what its coefficients multiply."""
     n = len(push.inputs)
     responses = (

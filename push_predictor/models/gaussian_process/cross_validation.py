@@ -22,18 +22,19 @@ from push_predictor.models.gaussian_process.sparse.cross_validation import spars
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
-from push_predictor.models.predictors import LearnedBody
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 
 
-def moments_left_out(body: LearnedBody, block: IntArray) -> tuple[Array, Array, Array]:
+def moments_left_out(predictor: GaussianProcessPredictor, block: IntArray) -> tuple[Array, Array, Array]:
     """What `body.moments` would be at each training row (n,) had the body not seen the row's block; see left_out.
 
     The correlation of the outputs at a row is that of the other blocks' rows.
     """
-    latent = [left_out(regression, block) for regression in body.regressions]
-    return body.moments_of(
-        latent, body.correlation.left_out(body.regressions[0].inputs, block) if body.correlation else None
+    latent = [left_out(regression, block) for regression in predictor.regressions]
+    return predictor.moments_of(
+        latent,
+        predictor.correlation.left_out(predictor.regressions[0].inputs, block) if predictor.correlation else None,
     )
 
 

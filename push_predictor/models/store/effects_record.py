@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import FORMS, Form, columns_of
+from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, generic_width, mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.predictors import Cross
@@ -96,10 +96,10 @@ def _effect(record: dict[str, Any], covariance: Array) -> Effect:
     )
 
 
-def _form(record: dict[str, Any]) -> Form:
+def _form(record: dict[str, Any]) -> DriverBasis:
     name, drivers = record["name"], tuple(record["drivers"])
-    if name not in FORMS:
-        raise ValueError(f"form {name!r}, known are {', '.join(FORMS)}")
+    if name not in BASES:
+        raise ValueError(f"form {name!r}, known are {', '.join(BASES)}")
     if len(drivers) != DRIVERS.get(name, 1) or not all(isinstance(driver, str) for driver in drivers):
         raise ValueError(f"form {name!r} with drivers {drivers!r}")
     scaled = len(drivers) if name in SCALED else None
@@ -107,7 +107,7 @@ def _form(record: dict[str, Any]) -> Form:
     if np.any(scale == 0.0):
         raise ValueError(f"form {name!r} with a scale of zero")
     place, levels = float(_numbers(record, "place", 1)[0]), _numbers(record, "levels", None)
-    return Form(name, drivers, tuple(centre.tolist()), tuple(scale.tolist()), place, tuple(levels.tolist()))
+    return DriverBasis(name, drivers, tuple(centre.tolist()), tuple(scale.tolist()), place, tuple(levels.tolist()))
 
 
 def _numbers(record: dict[str, Any], name: str, count: int | None) -> Array:

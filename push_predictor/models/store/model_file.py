@@ -26,9 +26,9 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.push_model import (
     KINDS,
-    AnalyticalBody,
-    ExtendedBody,
-    LearnedBody,
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
     Provenance,
     PushModel,
     Scaling,
@@ -113,27 +113,27 @@ def _read_header(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    body = _body_header(model.body, arrays)
+    predictor = _body_header(model.predictor, arrays)
     return {
         "format": FORMAT,
-        "format_version": 5 if has_inducing(0, arrays) else _version(body),
+        "format_version": 5 if has_inducing(0, arrays) else _version(predictor),
         "written_by": __version__,
         "name": model.name,
         "kind": model.kind,
         "rig": model.rig.to_record(),
         "provenance": {**vars(model.provenance), "sources": list(model.provenance.sources)},
         "covariates": list(model.training.covariates),
-        "body": body,
+        "body": predictor,
     }
 
 
-def _version(body: dict[str, Any]) -> int:
+def _version(predictor: dict[str, Any]) -> int:
     """The lowest version whose readers understand a body."""
-    if "correlation" in body.get("base", body):
+    if "correlation" in predictor.get("base", predictor):
         return 5
-    if "effects" in body:
-        return 4 if "cross" in body else 3
-    return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in body.get("regressions", ())) else 1
+    if "effects" in predictor:
+        return 4 if "cross" in predictor else 3
+    return 2 if any({"family", "log_nugget_sd"} & r.keys() for r in predictor.get("regressions", ())) else 1
 
 
 def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -> PushModel:
@@ -143,8 +143,8 @@ def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -
     training = _table(header, arrays)
     found = header["provenance"]
     provenance = Provenance(tuple(found["sources"]), int(found["pushes"]), int(found["seed"]), str(found["version"]))
-    body = _body(header["body"], header["kind"], rig, training, arrays)
-    return PushModel(str(header["name"]), str(header["kind"]), rig, body, training, provenance)
+    predictor = _predictor(header["body"], header["kind"], rig, training, arrays)
+    return PushModel(str(header["name"]), str(header["kind"]), rig, predictor, training, provenance)
 
 
 def _check_answers(model: PushModel) -> None:
@@ -196,29 +196,31 @@ def _finite(arrays: dict[str, np.ndarray], name: str) -> Array:
 # --- the bodies -----------------------------------------------------------------------------------------------------
 
 
-def _body_header(body: LearnedBody | AnalyticalBody | ExtendedBody, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    if isinstance(body, ExtendedBody):
-        if isinstance(body.base, LearnedBody):
-            arrays["base_outcomes"] = body.base.outcomes  # those of the training rows less the effects
+def _body_header(
+    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor, arrays: dict[str, np.ndarray]
+) -> dict[str, Any]:
+    if isinstance(predictor, ExtendedPredictor):
+        if isinstance(predictor.base, GaussianProcessPredictor):
+            arrays["base_outcomes"] = predictor.base.outcomes  # those of the training rows less the effects
         return {
-            "base": _body_header(body.base, arrays),
-            "physics": _physics_header(body.physics),
-            "effects": effects_record(body.effects, arrays),
-            "scale": body.scale.tolist(),
-            **({"cross": cross_record(body.cross, arrays)} if body.cross else {}),
+            "base": _body_header(predictor.base, arrays),
+            "physics": _physics_header(predictor.physics),
+            "effects": effects_record(predictor.effects, arrays),
+            "scale": predictor.scale.tolist(),
+            **({"cross": cross_record(predictor.cross, arrays)} if predictor.cross else {}),
         }
-    if isinstance(body, AnalyticalBody):
-        return {**_physics_header(body.physics), "covariance": body.covariance.tolist()}
-    for k, regression in enumerate(body.regressions):
+    if isinstance(predictor, AnalyticalPredictor):
+        return {**_physics_header(predictor.physics), "covariance": predictor.covariance.tolist()}
+    for k, regression in enumerate(predictor.regressions):
         if isinstance(regression, VHGP | SparseVHGP):
             arrays[f"site_precisions_{k}"] = regression.site_precisions
         if isinstance(regression, SparseVHGP):
             put_inducing(regression, k, arrays)
-    scaling = {key: np.asarray(value).tolist() for key, value in vars(body.scaling).items()}
+    scaling = {key: np.asarray(value).tolist() for key, value in vars(predictor.scaling).items()}
     return {
         "scaling": scaling,
-        "regressions": [_parameters_header(r) for r in body.regressions],
-        **({"correlation": correlation_record(body.correlation, arrays)} if body.correlation else {}),
+        "regressions": [_parameters_header(r) for r in predictor.regressions],
+        **({"correlation": correlation_record(predictor.correlation, arrays)} if predictor.correlation else {}),
     }
 
 
@@ -240,9 +242,9 @@ def _parameters_header(regression: GaussianProcess | VHGP | SparseVHGP) -> dict[
     return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
 
 
-def _body(
+def _predictor(
     header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
-) -> LearnedBody | AnalyticalBody | ExtendedBody:
+) -> GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor:
     if "effects" in header:
         return _extended_body(header, kind, rig, training, arrays)
     return _base_body(header, kind, rig, training, arrays)
@@ -250,7 +252,7 @@ def _body(
 
 def _base_body(
     header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
-) -> LearnedBody | AnalyticalBody:
+) -> GaussianProcessPredictor | AnalyticalPredictor:
     if kind == "analytical":
         return _analytical_body(header, rig)
     return _learned_body(header, kind, rig, training, arrays)
@@ -258,17 +260,17 @@ def _base_body(
 
 def _extended_body(
     header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
-) -> ExtendedBody:
+) -> ExtendedPredictor:
     effects, scale = effects_of(header["effects"], arrays), np.array(header["scale"], dtype=np.float64)
     if scale.shape != (3,) or not np.all(np.isfinite(scale)) or np.any(scale <= 0.0):
         raise ValueError(f"scale {header['scale']!r}, three finite numbers above 0 are needed")
     rows = training if kind == "analytical" else replace(training, outcomes=_finite(arrays, "base_outcomes"))
     base = _base_body(header["base"], kind, rig, rows, arrays)
     cross = cross_of(header.get("cross", []), effects, arrays)
-    body = ExtendedBody(base, _physics(header["physics"], rig), effects, scale, cross)
-    if missing := [name for name in body.needs if name not in training.covariates]:
+    predictor = ExtendedPredictor(base, _physics(header["physics"], rig), effects, scale, cross)
+    if missing := [name for name in predictor.needs if name not in training.covariates]:
         raise ValueError(f"an effect needs the covariate {missing[0]}, which the training rows do not hold")
-    return body
+    return predictor
 
 
 def _physics(header: dict[str, Any], rig: Rig) -> AnalyticalPush:
@@ -281,16 +283,16 @@ def _physics(header: dict[str, Any], rig: Rig) -> AnalyticalPush:
     return AnalyticalPush(rig.outline, rig.pusher_radius, float(header["contact_friction"]), support)
 
 
-def _analytical_body(header: dict[str, Any], rig: Rig) -> AnalyticalBody:
+def _analytical_body(header: dict[str, Any], rig: Rig) -> AnalyticalPredictor:
     physics = _physics(header, rig)
     covariance = np.array(header["covariance"], dtype=np.float64)
     np.linalg.cholesky(covariance)  # a damaged covariance must not be served
-    return AnalyticalBody(physics, covariance)
+    return AnalyticalPredictor(physics, covariance)
 
 
 def _learned_body(
     header: dict[str, Any], kind: str, rig: Rig, training: PushTable, arrays: dict[str, np.ndarray]
-) -> LearnedBody:
+) -> GaussianProcessPredictor:
     found = header["scaling"]
     columns = tuple(int(c) for c in found.pop("columns"))
     scaling = Scaling(columns, **{key: np.array(value, dtype=np.float64) for key, value in found.items()})
@@ -303,7 +305,7 @@ def _learned_body(
     if len(regressions) != training.outcomes.shape[1]:
         raise ValueError(f"{len(regressions)} regressions, three are needed")
     correlation = correlation_of(header["correlation"], features, arrays) if "correlation" in header else None
-    return LearnedBody(rig, scaling, tuple(regressions), correlation)
+    return GaussianProcessPredictor(rig, scaling, tuple(regressions), correlation)
 
 
 def _regression(

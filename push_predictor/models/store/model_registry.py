@@ -9,19 +9,19 @@ import numpy as np
 
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
 from push_predictor.models.store.model_file import is_model_file, load_model
-from push_predictor.models.tabulated.tabulated_model import ServedModel, serve
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
 SHIPPED = "default"  # stands for the model that ships with the package
 
 
-class ModelShelf:
+class ModelRegistry:
     """Loaded models in the order of their arrival. A model is taken up only when its file has been read whole and its
     table is made, so that it never answers in two ways.
     """
 
     def __init__(self) -> None:
-        self._models: dict[str, ServedModel] = {}
+        self._models: dict[str, TabulatedModel] = {}
         self._files: dict[str, Path] = {}
         self._chosen = ""
 
@@ -47,7 +47,7 @@ class ModelShelf:
         """Let an empty name stand for this model, loaded by now or not; empty goes back to the first."""
         self._chosen = name
 
-    def get(self, name: str) -> ServedModel:
+    def get(self, name: str) -> TabulatedModel:
         """A model by name, the default one for an empty name. Raises RequestError if it is not loaded."""
         model = self._models.get(name or self.default)
         if model is None:
@@ -62,19 +62,19 @@ class ModelShelf:
         if `replace` is false.
         """
         path = _located(path)
-        served = _served(path)
-        name = name or served.model.name
+        tabulated = _tabulated(path)
+        name = name or tabulated.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
         # A new dictionary: requests are answered by other threads, which may be going through the old one.
         self._files[name] = path
-        self._models = {**self._models, name: served}
+        self._models = {**self._models, name: tabulated}
         return name
 
     @property
     def answering(self) -> list[str]:
         """For each model how it answers, a line each."""
-        return [f"{name}: {served.how}" for name, served in self._models.items()]
+        return [f"{name}: {tabulated.how}" for name, tabulated in self._models.items()]
 
     def load_all(self, places: Iterable[str]) -> list[str]:
         """Load files, folders of files, and for SHIPPED the shipped model.
@@ -124,17 +124,17 @@ def _located(path: Path) -> Path:
         raise ModelFileError(f"{str(path)!r}: no such file ({error})") from None
 
 
-def _served(path: Path) -> ServedModel:
+def _tabulated(path: Path) -> TabulatedModel:
     """The model of a file, ready to answer. Raises ModelFileError, whatever the file makes the mathematics do."""
     model = load_model(path)
     try:
-        served = serve(model)
+        tabulated = tabulate(model)
         # The first prediction fills what is left of caches; no request should wait for that.
         first = model.training.take(np.arange(1))
-        served.predict(first.inputs, first.duration, first.covariates)
+        tabulated.predict(first.inputs, first.duration, first.covariates)
     except Exception as error:
         raise ModelFileError(f"{path}: the model cannot be served ({type(error).__name__}: {error})") from None
-    return served
+    return tabulated
 
 
 def model_files(place: Path) -> list[Path]:

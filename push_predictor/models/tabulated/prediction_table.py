@@ -20,7 +20,7 @@ from push_predictor.models.correlation import Correlation, correlations, covaria
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.push_model import LearnedBody
+from push_predictor.models.push_model import GaussianProcessPredictor
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
 from push_predictor.models.tabulated.push_chart import Chart, Whole
@@ -85,7 +85,9 @@ class PredictionTable:
         return [*mean, a, ab, ac, ab, b, bc, ac, bc, c, p, pq, pr, pq, q, qr, pr, qr, r]
 
 
-def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinement: float = 1.0) -> PredictionTable:
+def tabulate(
+    predictor: GaussianProcessPredictor, chart: Chart, low: Array, high: Array, refinement: float = 1.0
+) -> PredictionTable:
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
     refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError, also for kernels
@@ -93,31 +95,35 @@ def tabulate(body: LearnedBody, chart: Chart, low: Array, high: Array, refinemen
     """
     regressions = [
         sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
-        for regression in body.regressions
+        for regression in predictor.regressions
     ]
     if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in regressions):
         raise TooFineError("only squared exponential kernels are products over the axes of a table")
-    sides = table_sides(body.scaling, chart, low, high)
-    resolved = _resolved(regressions, body.correlation)
+    sides = table_sides(predictor.scaling, chart, low, high)
+    resolved = _resolved(regressions, predictor.correlation)
     axes = [Axis(side.low, side.high, _cells(side, resolved, refinement)) for side in sides]
     knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
     if knots > MOST_KNOTS:
         raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are taken")
-    values = _values(_Grid(sides, axes, refinement), body, regressions)
+    values = _values(_Grid(sides, axes, refinement), predictor, regressions)
     values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
-    least = body.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
+    least = predictor.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
     columns = _as_slice([side.column for side in sides])
     return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
 
 
-def _values(grid: _Grid, body: LearnedBody, regressions: Sequence[GridRegression]) -> Array:
+def _values(grid: _Grid, predictor: GaussianProcessPredictor, regressions: Sequence[GridRegression]) -> Array:
     """At the knots: means, variances of f, log process variances, SI units, and the correlation's three numbers."""
     outputs = [grid.outputs(regression) for regression in regressions]
     values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
-    sd, zero = body.scaling.outcome_sd, np.zeros(3)
+    sd, zero = predictor.scaling.outcome_sd, np.zeros(3)
     values *= np.concatenate([sd, sd**2, np.ones(3)])
-    values += np.concatenate([body.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
-    return values if body.correlation is None else np.concatenate([values, grid.coupling(body.correlation)], axis=-1)
+    values += np.concatenate([predictor.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
+    return (
+        values
+        if predictor.correlation is None
+        else np.concatenate([values, grid.coupling(predictor.correlation)], axis=-1)
+    )
 
 
 def _as_slice(columns: Sequence[int]) -> slice:

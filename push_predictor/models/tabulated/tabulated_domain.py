@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.features import push_features
-from push_predictor.models.push_model import DOMAIN_MARGIN, LearnedBody, Prediction, PushModel
+from push_predictor.models.push_model import DOMAIN_MARGIN, GaussianProcessPredictor, Prediction, PushModel
 from push_predictor.models.tabulated.prediction_table import PredictionTable, tabulate
 from push_predictor.models.tabulated.push_chart import Chart, push_chart
 from push_predictor.types import Array, BoolArray
@@ -52,7 +52,7 @@ class TabulatedDomain:
         return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
 
-def tabulated_domain(model: PushModel, body: LearnedBody, refinement: float = 1.0) -> TabulatedDomain:
+def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refinement: float = 1.0) -> TabulatedDomain:
     """The domain of a model with this body; refinement: of the table. Raises TooFineError."""
     inputs, chart = model.training.inputs, push_chart(model.rig.outline)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
@@ -60,4 +60,4 @@ def tabulated_domain(model: PushModel, body: LearnedBody, refinement: float = 1.
     features = push_features(model.rig.outline, inputs)
     least, most = features.min(axis=0), features.max(axis=0)
     margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
-    return TabulatedDomain(chart, least - margin, most + margin, tabulate(body, chart, low, high, refinement))
+    return TabulatedDomain(chart, least - margin, most + margin, tabulate(predictor, chart, low, high, refinement))

@@ -18,7 +18,13 @@ import numpy as np
 
 from push_predictor.models.mechanics.analytical_scalar import single_push
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, LearnedBody, Prediction, PushModel
+from push_predictor.models.push_model import (
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    Prediction,
+    PushModel,
+)
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
 from push_predictor.types import Array, BoolArray
@@ -30,7 +36,7 @@ REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 
 @dataclass(frozen=True)
-class TableError:
+class TableAccuracy:
     """The largest differences found between table and model: of a mean, in predicted standard deviations, and of the
     variance that outcome or process covariance give any combination of outputs, relative: the largest eigenvalue of
     L^-1 T L^-T - I, of either sign, where T is the table's and L L' the model's.
@@ -49,7 +55,7 @@ class TableError:
 
 
 @dataclass(frozen=True, eq=False)
-class ServedModel:
+class TabulatedModel:
     """A model and, in words, how it is answered for. domain and error are None where there is no table.
 
     A push gets the same answer alone as among others, to rounding. Made by `serve`.
@@ -58,7 +64,7 @@ class ServedModel:
     model: PushModel
     how: str
     domain: TabulatedDomain | None = None
-    error: TableError | None = None
+    error: TableAccuracy | None = None
 
     @property
     def tabulated(self) -> bool:
@@ -72,11 +78,11 @@ class ServedModel:
         """
         if self.domain is None:
             return self._quick.predict(inputs, duration, covariates)
-        prediction, body = self._of_base(self.domain, inputs, duration), self._quick.body
-        if not isinstance(body, ExtendedBody):
+        prediction, predictor = self._of_base(self.domain, inputs, duration), self._quick.predictor
+        if not isinstance(predictor, ExtendedPredictor):
             return prediction
         push = Push(inputs, duration, covariates or {})
-        moments = body.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
+        moments = predictor.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
     def exact_count(self, inputs: Array) -> int:
@@ -86,7 +92,7 @@ class ServedModel:
     @cached_property
     def _quick(self) -> PushModel:
         """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""
-        return replace(self.model, body=_quick_body(self.model.body))
+        return replace(self.model, predictor=_quick_body(self.model.predictor))
 
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         base = self.model.base
@@ -101,34 +107,36 @@ class ServedModel:
         return _merged(inside, self._of_base(domain, inputs[inside], duration[inside]), exact)
 
 
-def serve(model: PushModel) -> ServedModel:
+def tabulate(model: PushModel) -> TabulatedModel:
     """A model with a table, where there can be one; takes about a second for a VHGP of 1000 rows."""
     base = model.base
-    if not isinstance(base.body, LearnedBody):
-        return ServedModel(model, "exact: only learnt models have a table")
+    if not isinstance(base.predictor, GaussianProcessPredictor):
+        return TabulatedModel(model, "exact: only learnt models have a table")
     how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(base, base.body, refinement)
+            domain = tabulated_domain(base, base.predictor, refinement)
         except TooFineError as too_fine:
-            return ServedModel(model, f"exact: {how}{too_fine}")
+            return TabulatedModel(model, f"exact: {how}{too_fine}")
         error = _error(base, domain)
         if error.accepted:
-            return ServedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
+            return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "
-    return ServedModel(model, f"exact: {how}too far off")
+    return TabulatedModel(model, f"exact: {how}too far off")
 
 
-def _quick_body(body: LearnedBody | AnalyticalBody | ExtendedBody) -> LearnedBody | AnalyticalBody | ExtendedBody:
-    if isinstance(body, LearnedBody):
-        return body
-    quick = replace(body, physics=single_push(body.physics))
-    if isinstance(quick, ExtendedBody) and isinstance(quick.base, AnalyticalBody):
+def _quick_body(
+    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor,
+) -> GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor:
+    if isinstance(predictor, GaussianProcessPredictor):
+        return predictor
+    quick = replace(predictor, physics=single_push(predictor.physics))
+    if isinstance(quick, ExtendedPredictor) and isinstance(quick.base, AnalyticalPredictor):
         return replace(quick, base=replace(quick.base, physics=single_push(quick.base.physics)))
     return quick
 
 
-def _error(model: PushModel, domain: TabulatedDomain) -> TableError:
+def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:
     inputs = _probes(model)
     inside, table = domain.predict(inputs)
     assert table is not None, inputs[~inside]
@@ -137,7 +145,7 @@ def _error(model: PushModel, domain: TabulatedDomain) -> TableError:
     of_mean = np.max(np.abs(table.mean - exact.mean) / sd)
     of_outcome = relative_error(table.covariance, exact.covariance)
     of_process = relative_error(table.process_covariance, exact.process_covariance)
-    return TableError(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+    return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
 
 
 def relative_error(found: Array, exact: Array) -> Array:

@@ -20,8 +20,8 @@ from msg_adapters.predictions import (
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import Prediction
 from push_predictor.models.request import check_request, check_requests
-from push_predictor.models.store.model_registry import ModelShelf
-from push_predictor.models.tabulated.tabulated_model import ServedModel
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 
 MOST_PUSHES = 1_000_000  # of a batch: the server takes up to 0.6 kB for each while it answers
 MOST_EXACT = 50_000  # of them outside a table: up to a millisecond each
@@ -32,18 +32,18 @@ class PredictionError(PushPredictorError):
     """A push was accepted, but what a model says of it is no number."""
 
 
-def answer_push(shelf: ModelShelf, request: Any, response: Any) -> None:
+def answer_push(shelf: ModelRegistry, request: Any, response: Any) -> None:
     """Answer PredictPush. Raises RequestError."""
     query = query_from_request(request)
-    served = shelf.get(query.model)
+    tabulated = shelf.get(query.model)
     covariates = {name: float(column[0]) for name, column in query.covariates.items()}
-    check_request(served.model, request.velocity, request.contact, request.angle, query.duration, covariates)
-    prediction = served.predict(query.inputs, np.array([query.duration]), query.covariates)
-    _check_finite(served, prediction, 0)
+    check_request(tabulated.model, request.velocity, request.contact, request.angle, query.duration, covariates)
+    prediction = tabulated.predict(query.inputs, np.array([query.duration]), query.covariates)
+    _check_finite(tabulated, prediction, 0)
     fill_response(response, prediction)
 
 
-def answer_batch(go_on: Callable[[], None], shelf: ModelShelf, request: Any, response: Any) -> None:
+def answer_batch(go_on: Callable[[], None], shelf: ModelRegistry, request: Any, response: Any) -> None:
     """Answer PredictPushBatch; one bad push refuses all. go_on is called now and then and may raise.
 
     Raises RequestError.
@@ -51,22 +51,22 @@ def answer_batch(go_on: Callable[[], None], shelf: ModelShelf, request: Any, res
     if (count := len(request.velocity)) > MOST_PUSHES:
         raise RequestError("velocity length", count, f"at most {MOST_PUSHES} pushes a call")
     query = query_from_batch_request(request)
-    served = shelf.get(query.model)
-    check_requests(served.model, query.inputs, query.duration, query.covariates)
-    if count > MOST_EXACT and (slow := served.exact_count(query.inputs)) > MOST_EXACT:
+    tabulated = shelf.get(query.model)
+    check_requests(tabulated.model, query.inputs, query.duration, query.covariates)
+    if count > MOST_EXACT and (slow := tabulated.exact_count(query.inputs)) > MOST_EXACT:
         accepted = f"at most {MOST_EXACT} pushes that no table answers (docs/services.md) a call"
         raise RequestError("velocity length", f"{slow} pushes without a table", accepted)
     for start in range(0, len(query.inputs), ROWS_AT_ONCE):
         go_on()
         rows = slice(start, start + ROWS_AT_ONCE)
         inputs, covariates = query.inputs[rows], {name: column[rows] for name, column in query.covariates.items()}
-        prediction = served.predict(inputs, np.full(len(inputs), query.duration), covariates)
-        _check_finite(served, prediction, start)
+        prediction = tabulated.predict(inputs, np.full(len(inputs), query.duration), covariates)
+        _check_finite(tabulated, prediction, start)
         extend_batch_response(response, prediction)
     response.success = True
 
 
-def _check_finite(served: ServedModel, prediction: Prediction, start: int) -> None:
+def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:
     """Raise PredictionError for a push of which the model makes no number; start: the index of the first."""
     if prediction.in_domain.all():
         return  # between pushes that it was trained on a model has an answer
@@ -74,19 +74,19 @@ def _check_finite(served: ServedModel, prediction: Prediction, start: int) -> No
     if not known.all():
         index = start + int(np.flatnonzero(~known)[0])
         raise PredictionError(
-            f"push {index}: {served.model.name} has no finite answer, its velocity or a covariate is too far from what "
-            "the model was trained on"
+            f"push {index}: {tabulated.model.name} has no finite answer, its velocity or a covariate is too far "
+            "from what the model was trained on"
         )
 
 
-def answer_list(shelf: ModelShelf, response: Any) -> None:
+def answer_list(shelf: ModelRegistry, response: Any) -> None:
     """Answer ListModels."""
     response.names = shelf.names
     response.descriptions = [shelf.describe(name) for name in response.names]
     response.default_model = shelf.default
 
 
-def answer_load(shelf: ModelShelf, request: Any, response: Any) -> None:
+def answer_load(shelf: ModelRegistry, request: Any, response: Any) -> None:
     """Answer LoadModel; the shelf changes only if the file is good. Raises ModelFileError or RequestError."""
     if not request.path:
         raise RequestError("path", request.path, "the path of a model file on the server's machine")

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from typing import Any
 
 from msg_adapters.rollouts import fill_rollout_response, query_from_rollout_request, world_slider
-from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.planning.rollout import PARTICLES, rollout
 
 
 def answer_rollout(
-    go_on: Callable[[], None], frames: RequestFrames, shelf: ModelShelf, request: Any, response: Any
+    go_on: Callable[[], None], frames: RequestFrames, shelf: ModelRegistry, request: Any, response: Any
 ) -> None:
     """Answer RolloutPushes, in the frame of the request. go_on is called now and then and may raise.
 
@@ -20,9 +20,9 @@ def answer_rollout(
     Raises RequestError.
     """
     query = query_from_rollout_request(request)
-    served = shelf.get(query.model)
+    tabulated = shelf.get(query.model)
     frame = frames.located(request.header)
     slider = world_slider(query, frame)
     particles = max(PARTICLES, query.samples)
-    rolled = rollout(served, slider.planar, slider.covariance, query.steps, particles, query.seed, go_on=go_on)
+    rolled = rollout(tabulated, slider.planar, slider.covariance, query.steps, particles, query.seed, go_on=go_on)
     fill_rollout_response(response, frame, slider, rolled, query.samples)

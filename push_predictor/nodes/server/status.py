@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from msg_adapters.diagnostics import Level, diagnostic_status
-from push_predictor.models.store.model_registry import ModelShelf
+from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.nodes.server.request_log import RequestLog
 
 NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
 
 
 def server_status(
-    node_name: str, state: str, shelf: ModelShelf, problems: Sequence[str], log: RequestLog
+    node_name: str, state: str, shelf: ModelRegistry, problems: Sequence[str], log: RequestLog
 ) -> DiagnosticStatus:
     """The status of a node in a lifecycle state; problems: what could not be loaded, a line each."""
     level, message = _health(state, shelf, problems)
@@ -29,7 +29,7 @@ def server_status(
     return diagnostic_status(f"{node_name}: predictions", level, message, values)
 
 
-def _health(state: str, shelf: ModelShelf, problems: Sequence[str]) -> tuple[Level, str]:
+def _health(state: str, shelf: ModelRegistry, problems: Sequence[str]) -> tuple[Level, str]:
     if not shelf.names:
         return Level.ERROR, NO_MODEL
     if state != "active":

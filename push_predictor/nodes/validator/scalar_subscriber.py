@@ -78,7 +78,7 @@ class _Topic:
     inbox: ScalarInbox | None = None
 
 
-class ScalarInlet:
+class ScalarSubscriber:
     """Subscribes to scalar topics. names: relative or absolute; topic:/NAME is the covariate, as the name was given.
 
     `look` and `take` are called in the executor's thread, `drain` in any. Raises RequestError for a name that is none.

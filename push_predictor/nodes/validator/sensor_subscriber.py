@@ -14,9 +14,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from msg_adapters.streams import SLIDER, TIP, WRENCH, Inbox, slider_stream, tip_stream, wrench_stream
+from msg_adapters.streams import SLIDER, TIP, WRENCH, MessageBuffer, slider_stream, tip_stream, wrench_stream
 from push_predictor.nodes.polling import PolledGroup, take_all
-from push_predictor.nodes.validator.scalar_subscriber import ScalarInlet
+from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 
 DEPTH = 5000  # the most that Fast DDS keeps, of more the newest are turned away; memory is taken as they fill
@@ -43,7 +43,7 @@ class Samples:
         return len(self.slider) + len(self.pusher) + len(self.wrench)
 
 
-class SensorInlet:
+class SensorSubscriber:
     """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides say otherwise.
 
     frame_id: what the headers must name, empty for any. scalars: the scalar topics beside them. A thread empties the
@@ -52,9 +52,9 @@ class SensorInlet:
 
     def __init__(self, node: Node, frame_id: str, scalars: Sequence[str] = ()) -> None:
         self._node = node
-        self._scalars = ScalarInlet(node, scalars)
+        self._scalars = ScalarSubscriber(node, scalars)
         self._newest: int | None = None  # stamp (ns) of the poses
-        self._inboxes = {name: Inbox(kind, frame_id) for name, _, _, kind in TOPICS}
+        self._inboxes = {name: MessageBuffer(kind, frame_id) for name, _, _, kind in TOPICS}
         self.lost: Counter[str] = Counter()
         self._last: dict[str, int] = {}
         self._empty = monotonic()  # when nothing waited

@@ -10,7 +10,7 @@ from msg_adapters.diagnostics import Level, diagnostic_status
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.nodes.validator.sensor_subscriber import SensorInlet
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import PushAlarm
 from push_predictor.recordings.windows.stream_faults import fault_words
@@ -20,7 +20,7 @@ def validator_status(
     name: str,
     state: str,
     run: ValidationRun | None,
-    inlet: SensorInlet,
+    inlet: SensorSubscriber,
     client: PredictionClient,
     problems: Sequence[str],
     failure: str,

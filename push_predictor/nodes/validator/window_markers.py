@@ -39,8 +39,8 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
 def tip_of(rig: Rig, window: PushWindow) -> Array:
     """The pusher's centre (2,), m, at the window's start: that of a disc that touches the outline at the contact."""
     contact = np.array([window.contact])
-    body = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
-    return to_world(body, window.slider_start)[0]
+    predictor = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
+    return to_world(predictor, window.slider_start)[0]
 
 
 def error_in_sd(window: PushWindow, prediction: Prediction) -> float:

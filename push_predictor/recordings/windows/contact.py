@@ -21,7 +21,7 @@ SHORTEST_SPAN = 1e-3  # s; below it a difference says nothing about a speed
 
 
 @dataclass(frozen=True)
-class Judged:
+class ContactSample:
     """One slider sample. stamp ns, time s, gap m between pusher and outline, height m of the tip above the slider.
 
     closing: how fast the gap shrinks after the sample, m/s. force: (fx, fy) N as the sensor says, None where unknown.
@@ -43,7 +43,9 @@ class Judged:
     jumped: bool
 
 
-def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: int, last: int) -> Iterator[Judged]:
+def judge(
+    rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: int, last: int
+) -> Iterator[ContactSample]:
     """Judge slider samples first to last - 1 (indices into the track)."""
     time, stamp = slider.time[first:last], slider.stamp[first:last]
     height = pusher.at(time)[:, 2] - slider.values[first:last, 2]
@@ -54,7 +56,7 @@ def judge(rig: Rig, slider: Track, pusher: Track, wrench: Track | None, first: i
     underway = _underway(pusher, time)
     speed, forces, jumped = np.minimum(around, after), _forces(wrench, time), _jumps(slider, pusher, first, last)
     for k in range(len(time)):
-        yield Judged(
+        yield ContactSample(
             stamp=int(stamp[k]),
             time=float(time[k]),
             gap=float(gap[k]),

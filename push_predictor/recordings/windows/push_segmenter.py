@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from push_predictor.recordings.windows.contact import Judged
+from push_predictor.recordings.windows.contact import ContactSample
 from push_predictor.recordings.windows.cut import PushContext
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
 from push_predictor.recordings.windows.track import NANOSECOND
@@ -45,7 +45,7 @@ class PushTracker:
         """Start (ns) of the window that is being filled."""
         return self._start
 
-    def step(self, sample: Judged) -> list[tuple[int, int]]:
+    def step(self, sample: ContactSample) -> list[tuple[int, int]]:
         """Take one sample; returns the windows that end by it."""
         self._note_interruptions(sample)
         self._note_free_force(sample)
@@ -57,7 +57,7 @@ class PushTracker:
         self._not_pushing(sample, touching)
         return []
 
-    def _note_interruptions(self, sample: Judged) -> None:
+    def _note_interruptions(self, sample: ContactSample) -> None:
         lapse, self._last_time = sample.time - self._last_time, sample.time
         if sample.broken:
             self._start = None
@@ -71,7 +71,7 @@ class PushTracker:
             self.counts["resets"] += sample.jumped
             self._end_push()
 
-    def _note_free_force(self, sample: Judged) -> None:
+    def _note_free_force(self, sample: ContactSample) -> None:
         if sample.force is None or sample.blind:
             return
         if sample.height > self.options.lift or sample.gap > FREE_GAP:
@@ -79,7 +79,7 @@ class PushTracker:
         elif sample.speed < self.options.least_speed and self.push is None:
             self._resting_force.append(sample.force)
 
-    def _touches(self, sample: Judged) -> bool:
+    def _touches(self, sample: ContactSample) -> bool:
         if sample.height > self.options.lift:
             return False
         pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
@@ -89,7 +89,7 @@ class PushTracker:
         near = sample.gap <= self.options.touch_gap_alone
         return (near and self._stays(sample)) or (self._touching and pressed)
 
-    def _stays(self, sample: Judged) -> bool:
+    def _stays(self, sample: ContactSample) -> bool:
         """Whether the gap shrinks no more, as it does before the touch; without any force, nor grows, as after it."""
         limit = max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
         parts = sample.force is None and sample.closing < -limit
@@ -108,7 +108,7 @@ class PushTracker:
         readings = np.array(seen)
         return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
 
-    def _pushing(self, sample: Judged) -> list[tuple[int, int]]:
+    def _pushing(self, sample: ContactSample) -> list[tuple[int, int]]:
         if self.push is None or self._idle > self.options.push_pause:
             self._begin_push(sample)
         self._idle = 0.0
@@ -126,13 +126,13 @@ class PushTracker:
             self._start += stride
         return done
 
-    def _not_pushing(self, sample: Judged, touching: bool) -> None:
+    def _not_pushing(self, sample: ContactSample, touching: bool) -> None:
         if sample.time - self._last_good > self.options.bounce:
             self._start = None
         if not touching and self._idle > self.options.push_pause:
             self._first_touch = None
 
-    def _begin_push(self, sample: Judged) -> None:
+    def _begin_push(self, sample: ContactSample) -> None:
         first = self._first_touch if self._first_touch is not None else sample.stamp
         if self.push is not None and first == self.push.first_touch:
             first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again

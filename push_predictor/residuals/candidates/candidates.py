@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, screening_forms
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind
 from push_predictor.residuals.evidence.residuals import Evidence, whitened_response
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array
 
 HEADED = "push_heading"  # drives what has a direction in the world by itself
@@ -37,7 +37,7 @@ class Candidate:
 
     mechanism: str | None
     covariate: str
-    form: Form
+    form: DriverBasis
     response: Array
     values: Array | None = None
     beside: Array | None = None
@@ -88,7 +88,10 @@ def candidates_of(
     Drivers that go with the inputs are left out, see entangled.
     """
     apart = set() if basis is None else set(entangled(evidence, names, basis))
-    forms = [(CONSTANT, Form("constant")), *(f for f in screening_forms(evidence.table, names) if f[0] not in apart)]
+    forms = [
+        (CONSTANT, DriverBasis("constant")),
+        *(f for f in screening_forms(evidence.table, names) if f[0] not in apart),
+    ]
     values = [form.values(evidence.table.covariates, len(evidence.table)) for _, form in forms]
     responses = {mechanism: whitened_response(evidence, mechanism) for mechanism in usable(evidence)}
     found: list[Candidate] = []
@@ -113,7 +116,7 @@ def entangled(evidence: Evidence, names: Sequence[str] | None, basis: InputsBasi
 
     What a base gets wrong in its own inputs would be put down to them.
     """
-    found, out = [], Without(basis.columns)
+    found, out = [], Residualizer(basis.columns)
     for name in dict.fromkeys(name for name, _ in screening_forms(evidence.table, names)):
         if name in (SIDES, SPEED):
             continue  # functions of the inputs, judged as such
@@ -130,7 +133,7 @@ def usable(evidence: Evidence) -> list[str | None]:
     return [*(m.name for m in LIBRARY if all(need in recorded for need in m.needs)), None]
 
 
-def candidate(evidence: Evidence, mechanism: str | None, covariate: str, form: Form) -> Candidate:
+def candidate(evidence: Evidence, mechanism: str | None, covariate: str, form: DriverBasis) -> Candidate:
     """One candidate on these windows."""
     values = form.values(evidence.table.covariates, len(evidence.table))
     return Candidate(mechanism, covariate, form, whitened_response(evidence, mechanism), values)
@@ -141,7 +144,7 @@ def _constant_driver(mechanism: str | None, response: Array, basis: InputsBasis 
         return HEADED
     if basis is None or not basis.folds:
         return CONSTANT
-    outside = np.sum(Without(basis.columns)(response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
+    outside = np.sum(Residualizer(basis.columns)(response) ** 2) / max(np.sum(response**2), np.finfo(float).tiny)
     return SIDES if outside > OUTSIDE else CONSTANT
 
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.residuals import blocks_of
-from push_predictor.residuals.selection.screening import Screened, Without, block_scores, screen, sums_by
+from push_predictor.residuals.selection.screening import Residualizer, Screened, block_scores, screen, sums_by
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000
@@ -32,7 +32,7 @@ class Tried:
 
     mechanism: str
     covariate: str
-    form: Form
+    form: DriverBasis
     columns: Array
     shared: Array
 
@@ -113,7 +113,7 @@ def estimated(
     z: Array, columns: Array, basis: Array, shared: Array, block: IntArray, seed: int = 0
 ) -> tuple[Array, Array]:
     """Coefficients (p,) of columns (n, k, p) for z (n, k), and draws (DRAWS, p) of them: blocks drawn anew."""
-    without = Without(np.column_stack([basis, shared]))
+    without = Residualizer(np.column_stack([basis, shared]))
     left, flat = without(z), without(columns)
     p = flat.shape[2]
     square = sums_by(block, np.einsum("nkp,nkq->npq", flat, flat).reshape(len(z), -1)).reshape(-1, p, p)
@@ -125,7 +125,7 @@ def estimated(
 
 def tells(each: Tried, basis: Array) -> bool:
     """Whether every column of it holds something that the basis (n, m) and what is shared do not."""
-    without = Without(np.column_stack([basis, each.shared]))
+    without = Residualizer(np.column_stack([basis, each.shared]))
     size, left = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, without(each.columns)))
     return bool(np.all(left > COLLINEAR * size) and np.all(size > 0.0))
 
@@ -137,8 +137,8 @@ def robust_deviation(values: Array) -> float:
 
 def _gains(z: Array, each: Tried, basis: Array, block: IntArray) -> Array:
     """Gain (b,) in nats of each block, fitted on the folds that it is not in."""
-    without = Without(np.column_stack([basis, each.shared]))
-    left, flat = Without(basis)(z), without(each.columns)
+    without = Residualizer(np.column_stack([basis, each.shared]))
+    left, flat = Residualizer(basis)(z), without(each.columns)
     gains = np.zeros((len(z), 1))
     for fold in range(FOLDS):
         test = block % FOLDS == fold

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals.evidence.drivers import SETTLED
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, inputs_of
 from push_predictor.residuals.evidence.residuals import Evidence, whitened_response
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array
 
 TOUCHED = ("time_since_contact", "contact_gap")  # differ between the window that begins with the touch and later ones
@@ -34,7 +34,7 @@ class Nuisance:
     response: Callable[[str | None], Array]
     known: dict[Key, Array | None] = field(default_factory=dict)
 
-    def beside(self, mechanism: str | None, covariate: str, form: Form, kind: Kind) -> Array | None:
+    def beside(self, mechanism: str | None, covariate: str, form: DriverBasis, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) that go out of those of a candidate, the inputs taken out of them; or None."""
         return self._out_of(mechanism if form.name == "constant" else None, covariate, kind)
 
@@ -53,7 +53,7 @@ class Nuisance:
         if undriven:
             parts += [self.response(name) for name in self.mechanisms if name != alone]
         columns = np.concatenate(parts, axis=2) if parts else np.empty((len(self.evidence.table), 3, 0))
-        return _orthonormal(columns, Without(inputs_of(kind, self.basis)))
+        return _orthonormal(columns, Residualizer(inputs_of(kind, self.basis)))
 
     def _late_touch(self) -> Array:
         since = self.evidence.table.covariates.get("time_since_contact")
@@ -63,7 +63,7 @@ class Nuisance:
         return whitened_response(self.evidence, "pusher_travel") * first[:, None, None]
 
 
-def _orthonormal(columns: Array, out: Without) -> Array | None:
+def _orthonormal(columns: Array, out: Residualizer) -> Array | None:
     before = columns.reshape(3 * len(columns), -1)
     size = np.linalg.norm(before, axis=0)
     kept = size > 0.0

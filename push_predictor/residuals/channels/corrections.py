@@ -21,7 +21,7 @@ NO_STREAMS = "a push table keeps no streams: the error can be told but not corre
 def correct(recording: Recording, mechanism: str, values: Sequence[float]) -> Recording:
     """The recording without an error of measurement.
 
-    values: the error's parameters as MeasurementError.values gives them. clock_offset (s): the slider's stamps come
+    values: the error's parameters as MeasurementFault.values gives them. clock_offset (s): the slider's stamps come
     late; frame_rotation (rad): the tracker's frame shows the slider turned about the world's origin; frame_shift (m,
     m): it shows it shifted; tool_offset (m, m): the pusher's stream shows the tip shifted; wrench_bias (N, N): the
     sensor reads too much, in world axes. Raises KeyError for another mechanism.

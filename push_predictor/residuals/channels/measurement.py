@@ -19,7 +19,7 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.contrast import (
@@ -36,7 +36,7 @@ from push_predictor.residuals.candidates.contrast import (
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array, BoolArray, IntArray
 
 NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")
@@ -53,7 +53,7 @@ LEAST_SIZE = 1.0  # of an effect on the gap, root mean square, in units of the g
 
 
 @dataclass(frozen=True)
-class MeasurementError:
+class MeasurementFault:
     """One error with its parameters (the slider's stream against the robot's), family-wise p, and the names of what
     these data cannot tell from it. size: root mean square of what it does to the gap, m (to the force, N)."""
 
@@ -77,7 +77,7 @@ class MeasurementFinding:
     subtracted.
     """
 
-    errors: tuple[MeasurementError, ...]
+    errors: tuple[MeasurementFault, ...]
     tested: tuple[Tested, ...]
     noise: float
     against_training: bool
@@ -139,7 +139,7 @@ def _gap_of(both: Stacked, outline: Outline) -> _Gap:
         basis = np.column_stack([basis, *stack.values()])
     nothing = np.zeros((len(both.new), 0))
     tried = [
-        Tried(name, CONSTANT, Form("constant"), (column * both.new[:, None])[:, None, :], nothing)
+        Tried(name, CONSTANT, DriverBasis("constant"), (column * both.new[:, None])[:, None, :], nothing)
         for name, column in stack.items()
     ]
     z = both.joined([table.covariates["contact_gap"] for table in both.tables])[:, None]
@@ -215,10 +215,10 @@ def _names(alike: Sequence[Tried]) -> tuple[str, ...]:
     return tuple(name for each in names for name in (each, *ALIKE.get(each, ())) if name != names[0])
 
 
-def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementError, ...], float]:
+def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementFault, ...], float]:
     """Estimates of all errors together; those that are lost in the noise of a single window are left out."""
     columns = [f.what.columns for f in found]
-    without = Without(np.column_stack([gap.basis, *(c[:, 0] for c in columns)]))
+    without = Residualizer(np.column_stack([gap.basis, *(c[:, 0] for c in columns)]))
     noise = robust_deviation(without(gap.z)[:, 0])
     if not found:
         return (), noise
@@ -230,7 +230,7 @@ def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[Measure
         size = float(np.sqrt(np.mean((each.what.columns[gap.new, 0] @ values[part]) ** 2)))
         if size >= LEAST_SIZE * noise:
             parameters = _parameters(each.what.mechanism, values[part], draws[:, part])
-            errors.append(MeasurementError(each.what.mechanism, parameters, each.p_value, each.rivals, size))
+            errors.append(MeasurementFault(each.what.mechanism, parameters, each.p_value, each.rivals, size))
     return tuple(errors), noise
 
 

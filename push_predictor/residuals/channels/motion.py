@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.candidates.candidates import Candidate, candidates_of, entangled
@@ -20,7 +20,7 @@ from push_predictor.residuals.extension.experiment import separating_pushes
 from push_predictor.residuals.extension.extension import physics_of
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
-from push_predictor.residuals.selection.screening import Screened, Without
+from push_predictor.residuals.selection.screening import Residualizer, Screened
 from push_predictor.residuals.selection.search import Search, Term, search
 from push_predictor.residuals.selection.selection import fit
 from push_predictor.types import Array
@@ -39,7 +39,7 @@ class MotionTerm:
 
     mechanism: str | None
     covariate: str
-    form: Form
+    form: DriverBasis
     outputs: tuple[str, ...]
     p_value: float
     share: float
@@ -161,6 +161,6 @@ def _experiment(first: Term | None, evidence: Evidence, basis: InputsBasis) -> t
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
-    out = Without(basis.columns)
+    out = Residualizer(basis.columns)
     left = out(evidence.z)
     return separating_pushes(evidence, [(c, fit(out(c.columns), left)) for c in rivals.values()])

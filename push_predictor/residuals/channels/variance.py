@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -18,7 +18,7 @@ from push_predictor.residuals.evidence.baseline import Baseline
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_forms
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residuals import Evidence
-from push_predictor.residuals.selection.screening import Scores, Screened, Without, block_scores, screen
+from push_predictor.residuals.selection.screening import Residualizer, Scores, Screened, block_scores, screen
 from push_predictor.types import Array
 
 TINY = 1e-12
@@ -35,7 +35,7 @@ class Scatter:
     """
 
     covariate: str
-    form: Form
+    form: DriverBasis
     outputs: tuple[str, ...]
     p_value: float
     ratio: float
@@ -56,7 +56,7 @@ class VarianceFinding:
 @dataclass(frozen=True, eq=False)
 class _Trial:
     covariate: str
-    form: Form
+    form: DriverBasis
     output: str
     score: Scores
     ratio: float
@@ -107,7 +107,7 @@ def _tested(
     baseline: Baseline | None,
 ) -> VarianceFinding:
     basis = inputs_basis(model, evidence.table).columns
-    size = _log_squares(Without(basis)(left))
+    size = _log_squares(Residualizer(basis)(left))
     trials = [t for name, form in _forms(evidence, names) for t in _along(evidence, size, basis, name, form)]
     there = 0
     if baseline is not None:
@@ -121,11 +121,11 @@ def _log_squares(residual: Array) -> Array:
     return np.asarray(np.log(residual**2 + TINY))
 
 
-def _forms(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, Form]]:
+def _forms(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, DriverBasis]]:
     return [(name, form) for name, form in screening_forms(evidence.table, names) if name not in LOCAL]
 
 
-def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: Form) -> list[_Trial]:
+def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: DriverBasis) -> list[_Trial]:
     """A driver against the scatter of each output, and against that of all."""
     values = form.values(evidence.table.covariates, len(size))
     z, block = normal_scores(size), evidence.block
@@ -145,9 +145,12 @@ def _constant(model: PushModel, evidence: Evidence, left: Array, baseline: Basel
     z, new = normal_scores(np.vstack(parts)), np.arange(len(basis)) < len(left)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
-    return [_Trial(CONSTANT, Form("constant"), output, block_scores(z, (on * new[:, None])[:, :, None], basis, block),
-                   float(np.prod(ratio ** (on[0] / on[0].sum()))))
-            for output, on in _outputs(len(basis))]  # fmt: skip
+    trials = []
+    for output, on in _outputs(len(basis)):
+        scores = block_scores(z, (on * new[:, None])[:, :, None], basis, block)
+        strength = float(np.prod(ratio ** (on[0] / on[0].sum())))
+        trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
+    return trials
 
 
 def _inputs_of(tables: tuple[PushTable, PushTable]) -> PushTable:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.contrast import (
@@ -34,7 +34,7 @@ from push_predictor.residuals.candidates.contrast import (
 from push_predictor.residuals.candidates.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL, PLACE, screening_forms
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
@@ -127,7 +127,7 @@ def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
     z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
     most = max(FEWEST_INPUTS, sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT)
     basis = stack.joined([inputs_of(table, physics, most) for table in stack.tables])
-    unit = np.maximum([robust_deviation(column) for column in Without(basis)(z).T], 1e-12)
+    unit = np.maximum([robust_deviation(column) for column in Residualizer(basis)(z).T], 1e-12)
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
     tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))
     rows = inliers(z / unit, np.zeros((len(z), 2, 0)), basis)
@@ -143,17 +143,17 @@ def _level(stack: Stacked) -> Array:
     return stack.new[:, None].astype(np.float64)[:, : len(stack.tables) - 1]
 
 
-def _drivers(stack: Stacked) -> list[tuple[str, Form]]:
+def _drivers(stack: Stacked) -> list[tuple[str, DriverBasis]]:
     """Drivers of the surface's friction; level and place only where there are others to compare them with."""
     table, before = stack.tables[-1], stack.tables[:-1]
     known = [name for name in COMPARED if all(name in t.covariates for t in before) and before]
     left_out = (*OWN, *(name for name in COMPARED if name not in known))
     kept = {name: column for name, column in table.covariates.items() if name not in left_out}
     forms = screening_forms(replace(table, covariates=kept))
-    return [(CONSTANT, Form("constant")), *forms] if before else forms
+    return [(CONSTANT, DriverBasis("constant")), *forms] if before else forms
 
 
-def _of_friction(stack: Stacked, unit: Array, covariate: str, form: Form) -> Tried:
+def _of_friction(stack: Stacked, unit: Array, covariate: str, form: DriverBasis) -> Tried:
     """A change of the load, not of its direction, over the new windows; about their mean unless it is the level."""
     table = stack.tables[-1]
     values = form.values(table.covariates, len(table))
@@ -171,7 +171,7 @@ def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Tried:
     columns = bias / unit[:, None]
     in_both = columns.reshape(len(columns), -1) if len(stack.tables) > 1 else np.zeros((len(columns), 0))
     own = columns * stack.new[:, None, None]
-    return Tried(WRENCH_BIAS, CONSTANT, Form("constant"), own, np.column_stack([_level(stack), in_both]))
+    return Tried(WRENCH_BIAS, CONSTANT, DriverBasis("constant"), own, np.column_stack([_level(stack), in_both]))
 
 
 def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
@@ -195,7 +195,7 @@ def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
         )
         z = z - best.columns @ values
         left = [t for t in left if t is not best]
-    scatter = float(force.unit[0] * robust_deviation(Without(force.levelled)(z)[:, 0]))
+    scatter = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
     return WrenchFinding(tuple(effects), tested, scatter, force.against_training)
 
 

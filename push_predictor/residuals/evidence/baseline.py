@@ -15,7 +15,7 @@ import numpy as np
 from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedBody, LearnedBody, with_independent_outputs
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, with_independent_outputs
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidates import Candidate, usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
@@ -23,7 +23,7 @@ from push_predictor.residuals.evidence.drivers import LOCAL, STANDING
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis, inputs_of
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residuals import Evidence, push_order, whitened_response, whitener_of
-from push_predictor.residuals.selection.screening import TINY, Scores, Without, raw_scores
+from push_predictor.residuals.selection.screening import TINY, Residualizer, Scores, raw_scores
 from push_predictor.types import Array
 
 
@@ -64,7 +64,7 @@ class Baseline:
             values=candidate.form.values(evidence.table.covariates, len(response)),
             beside=self._nuisance.beside(*candidate.label, candidate.form, candidate.kind),
         )
-        out = Without(inputs_of(candidate.kind, self.basis))
+        out = Residualizer(inputs_of(candidate.kind, self.basis))
         return raw_scores(out.left(evidence.z, evidence.block).apart(there.beside), out(there.columns))
 
     def _response(self, mechanism: str | None) -> Array:
@@ -84,11 +84,13 @@ class Baseline:
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
     """The baseline of a model, from the training windows that it keeps, each push left out of what it is judged by."""
-    table, body = with_inputs(model.training), with_independent_outputs(model.body)
+    table, predictor = with_inputs(model.training), with_independent_outputs(model.predictor)
     push = Push(table.inputs, table.duration, table.covariates)
-    base = body.base if isinstance(body, ExtendedBody) else body
-    moments = moments_left_out(base, push_order(table)) if isinstance(base, LearnedBody) else base.moments(push)
-    mean, covariance, _ = body.extended(moments, push) if isinstance(body, ExtendedBody) else moments
+    base = predictor.base if isinstance(predictor, ExtendedPredictor) else predictor
+    moments = (
+        moments_left_out(base, push_order(table)) if isinstance(base, GaussianProcessPredictor) else base.moments(push)
+    )
+    mean, covariance, _ = predictor.extended(moments, push) if isinstance(predictor, ExtendedPredictor) else moments
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
     return Baseline(evidence, inputs_basis(model, table))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from push_predictor.models.effects.covariate_range import HEADINGS
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -23,9 +23,9 @@ MOST_LEVELS = 12
 SETTLED = 0.03  # s of contact after which tip and slider move together
 
 
-def screening_forms(table: PushTable, names: Sequence[str] | None = None) -> list[tuple[str, Form]]:
+def screening_forms(table: PushTable, names: Sequence[str] | None = None) -> list[tuple[str, DriverBasis]]:
     """(covariate, form) pairs by which each driver enters the screen. names: drivers to try, all that vary if None."""
-    forms: list[tuple[str, Form]] = []
+    forms: list[tuple[str, DriverBasis]] = []
     for name in driver_names(table) if names is None else names:
         forms += [(name, form) for form in _forms_of(name, table.covariates[name])]
     if all(name in dict(forms) for name in PLACE):
@@ -38,24 +38,24 @@ def driver_names(table: PushTable) -> list[str]:
     return [name for name, column in table.covariates.items() if name not in (*OUTCOMES, *FOLDED) and _varies(column)]
 
 
-def two_dimensional(table: PushTable) -> Form:
+def two_dimensional(table: PushTable) -> DriverBasis:
     """A map over the place on the table."""
     x, y = (table.covariates[name] for name in PLACE)
-    return Form("map", PLACE, (float(x.mean()), float(y.mean())), (float(x.std()), float(y.std())))
+    return DriverBasis("map", PLACE, (float(x.mean()), float(y.mean())), (float(x.std()), float(y.std())))
 
 
-def standard_form(name: str, driver: str, values: Array) -> Form:
+def standard_form(name: str, driver: str, values: Array) -> DriverBasis:
     """A form of a scalar driver, centred and scaled on its values (n,)."""
     scale = float(np.ptp(values)) / 3.0 if name == "logarithmic" else float(values.std())
-    return Form(name, (driver,), (float(values.mean()),), (scale,), place=float(values.min()))
+    return DriverBasis(name, (driver,), (float(values.mean()),), (scale,), place=float(values.min()))
 
 
-def _forms_of(name: str, values: Array) -> list[Form]:
+def _forms_of(name: str, values: Array) -> list[DriverBasis]:
     if name in HEADINGS:
-        return [Form("periodic", (name,)), Form("periodic, twice around", (name,))]
+        return [DriverBasis("periodic", (name,)), DriverBasis("periodic, twice around", (name,))]
     if name in CATEGORIES:
         levels = tuple(float(level) for level in np.unique(values))
-        return [Form("category", (name,), levels=levels)] if 1 < len(levels) <= MOST_LEVELS else []
+        return [DriverBasis("category", (name,), levels=levels)] if 1 < len(levels) <= MOST_LEVELS else []
     return [standard_form("linear", name, values), standard_form("quadratic", name, values)]
 
 

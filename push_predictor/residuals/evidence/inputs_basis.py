@@ -10,7 +10,7 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.features import EDGE_SPACING, push_features
-from push_predictor.models.predictors import AnalyticalBody
+from push_predictor.models.predictors import AnalyticalPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -43,7 +43,7 @@ def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
     most = len(table.pushes) // PUSHES_PER_COLUMN
     bases = (_of_degree(outline, table.inputs, degree) for degree in DEGREES)
     columns, still = next((b for b in bases if b[0].shape[1] <= most), _of_degree(outline, table.inputs, 1))
-    learnt = not isinstance(base.body, AnalyticalBody)
+    learnt = not isinstance(base.predictor, AnalyticalPredictor)
     speed = _log_speed(base.training.inputs)
     return InputsBasis(
         columns, still, learnt, learnt and outline.rotational_symmetry != 1, learnt and float(speed.std()) > VARIES

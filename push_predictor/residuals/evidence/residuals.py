@@ -57,8 +57,8 @@ def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush) -> 
     The outputs of a learnt model are judged one by one. Where its correlation leaves little scatter, small parts of the
     residual weigh most: in the recording of the demo the second order of an effect was found before the effect.
     """
-    body = with_independent_outputs(model.body)
-    mean, covariance, _ = body.moments(Push(table.inputs, table.duration, table.covariates))
+    predictor = with_independent_outputs(model.predictor)
+    mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
     return Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
 
 

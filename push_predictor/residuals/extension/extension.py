@@ -19,25 +19,31 @@ from push_predictor import __version__
 from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import tally
 from push_predictor.evaluation.validation import Comparison, compare
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import Cross
-from push_predictor.models.push_model import AnalyticalBody, ExtendedBody, LearnedBody, Provenance, PushModel
+from push_predictor.models.push_model import (
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    Provenance,
+    PushModel,
+)
 from push_predictor.models.train import train_model, training_rows
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidates import candidate
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residuals import Evidence, evidence_of, evidence_scale
 from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.residuals.selection.selection import RIDGE
 from push_predictor.types import Array, IntArray
 
-Term: TypeAlias = tuple[str | None, str, Form]  # mechanism (None: the generic one), covariate, form
+Term: TypeAlias = tuple[str | None, str, DriverBasis]  # mechanism (None: the generic one), covariate, form
 
 
 def refit_base(model: PushModel, table: PushTable) -> PushModel:
@@ -47,12 +53,12 @@ def refit_base(model: PushModel, table: PushTable) -> PushModel:
     analytical one only the covariance is estimated anew. Effects that the model has already stay as they are.
     Raises TrainingError for too few rows.
     """
-    body = model.body
-    if not isinstance(body, ExtendedBody):
+    predictor = model.predictor
+    if not isinstance(predictor, ExtendedPredictor):
         return _retrained(model, table, table.outcomes)
-    shift, _ = body.shift(_push(table))
+    shift, _ = predictor.shift(_push(table))
     base = _retrained(model.base, table, table.outcomes - shift)
-    return _wrapped(base, table, replace(body, base=_base_body(base)))
+    return _wrapped(base, table, replace(predictor, base=_base_body(base)))
 
 
 def extend(base: PushModel, table: PushTable, terms: Sequence[Term], deployed: PushModel | None = None) -> PushModel:
@@ -71,14 +77,14 @@ def extend(base: PushModel, table: PushTable, terms: Sequence[Term], deployed: P
 def estimate(
     evidence: Evidence, terms: Sequence[Term], own_inputs: Array | None = None
 ) -> tuple[tuple[Effect, ...], Cross]:
-    """The effects of these terms on the residuals, and what their coefficients share (see ExtendedBody).
+    """The effects of these terms on the residuals, and what their coefficients share (see ExtendedPredictor).
 
     own_inputs (n, m): what goes out of residuals and responses first.
     """
     scale, designs = evidence_scale(evidence), [candidate(evidence, *term).columns for term in terms]
-    columns, rest = np.concatenate(designs, axis=2), Without(np.empty((len(evidence.table), 0)))
+    columns, rest = np.concatenate(designs, axis=2), Residualizer(np.empty((len(evidence.table), 0)))
     if own_inputs is not None:
-        rest = Without(own_inputs)
+        rest = Residualizer(own_inputs)
     # Of all of a column, not of what is left of it: what the inputs explain away must not be blown up.
     ridge = RIDGE * np.sum(columns**2, axis=(0, 1)) + 1e-12
     coefficients, covariance = _least_squares(rest(columns), rest(evidence.z), evidence.block, ridge)
@@ -115,8 +121,8 @@ def compared(model: PushModel, table: PushTable, training_mean: Array) -> Compar
 
 def physics_of(model: PushModel) -> AnalyticalPush:
     """The analytical model of a push model's slider: its own, or the textbook's for a learnt one."""
-    if isinstance(model.body, AnalyticalBody | ExtendedBody):
-        return model.body.physics
+    if isinstance(model.predictor, AnalyticalPredictor | ExtendedPredictor):
+        return model.predictor.physics
     return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
 
 
@@ -124,38 +130,40 @@ def _extended(
     base: PushModel, table: PushTable, effects: tuple[Effect, ...], cross: Cross, physics: AnalyticalPush
 ) -> PushModel:
     """The base with these effects beside those it has: a learnt one trained anew without them, the other rescaled."""
-    body = _beside(base.body, physics, effects, cross)
-    shift, _ = body.shift(_push(table))
+    predictor = _beside(base.predictor, physics, effects, cross)
+    shift, _ = predictor.shift(_push(table))
     if base.kind != "analytical":
         trained = _retrained(base.base, table, table.outcomes - shift)
-        return _wrapped(trained, table, replace(body, base=_base_body(trained)))
-    mean, covariance, _ = body.base.moments(_push(table))
+        return _wrapped(trained, table, replace(predictor, base=_base_body(trained)))
+    mean, covariance, _ = predictor.base.moments(_push(table))
     left = table.outcomes - mean - shift
     scale = np.sqrt(np.mean(left**2, axis=0) / np.diagonal(covariance, axis1=1, axis2=2).mean(axis=0))
-    return _wrapped(base, table, replace(body, scale=scale))
+    return _wrapped(base, table, replace(predictor, scale=scale))
 
 
 def _beside(
-    body: LearnedBody | AnalyticalBody | ExtendedBody,
+    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor,
     physics: AnalyticalPush,
     effects: tuple[Effect, ...],
     cross: Cross,
-) -> ExtendedBody:
+) -> ExtendedPredictor:
     """The base of a body with its effects and these behind them, unscaled."""
-    if not isinstance(body, ExtendedBody):
-        return ExtendedBody(body, physics, effects, np.ones(3), cross)
-    had = len(body.effects)
+    if not isinstance(predictor, ExtendedPredictor):
+        return ExtendedPredictor(predictor, physics, effects, np.ones(3), cross)
+    had = len(predictor.effects)
     moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
-    return ExtendedBody(body.base, physics, (*body.effects, *effects), np.ones(3), {**body.cross, **moved})
+    return ExtendedPredictor(
+        predictor.base, physics, (*predictor.effects, *effects), np.ones(3), {**predictor.cross, **moved}
+    )
 
 
-def _base_body(model: PushModel) -> LearnedBody | AnalyticalBody:
-    return model.body.base if isinstance(model.body, ExtendedBody) else model.body
+def _base_body(model: PushModel) -> GaussianProcessPredictor | AnalyticalPredictor:
+    return model.predictor.base if isinstance(model.predictor, ExtendedPredictor) else model.predictor
 
 
-def _wrapped(base: PushModel, table: PushTable, body: ExtendedBody) -> PushModel:
+def _wrapped(base: PushModel, table: PushTable, predictor: ExtendedPredictor) -> PushModel:
     """A model of this body; its training rows are those of the table that the base was trained on, as observed."""
-    return replace(base, body=body, training=_training(base, table), provenance=_provenance(base, table))
+    return replace(base, predictor=predictor, training=_training(base, table), provenance=_provenance(base, table))
 
 
 def _training(model: PushModel, table: PushTable) -> PushTable:
@@ -163,19 +171,19 @@ def _training(model: PushModel, table: PushTable) -> PushTable:
 
 
 def _retrained(model: PushModel, table: PushTable, outcomes: Array) -> PushModel:
-    rows, body, seed = replace(table, outcomes=outcomes), model.body, model.provenance.seed
-    if isinstance(body, LearnedBody):
-        choice, sources = _choice(body), model.provenance.sources
+    rows, predictor, seed = replace(table, outcomes=outcomes), model.predictor, model.provenance.seed
+    if isinstance(predictor, GaussianProcessPredictor):
+        choice, sources = _choice(predictor), model.provenance.sources
         return train_model(rows, model.rig, model.kind, name=model.name, sources=sources, seed=seed, choice=choice)
-    assert isinstance(body, AnalyticalBody)
-    residual = outcomes - body.physics.displacement(table.inputs, table.duration)
+    assert isinstance(predictor, AnalyticalPredictor)
+    residual = outcomes - predictor.physics.displacement(table.inputs, table.duration)
     covariance = residual.T @ residual / len(residual)
     provenance = _provenance(model, table)
-    return replace(model, body=replace(body, covariance=covariance), training=rows, provenance=provenance)
+    return replace(model, predictor=replace(predictor, covariance=covariance), training=rows, provenance=provenance)
 
 
-def _choice(body: LearnedBody) -> KernelChoice:
-    parameters = body.regressions[0].parameters
+def _choice(predictor: GaussianProcessPredictor) -> KernelChoice:
+    parameters = predictor.regressions[0].parameters
     return parameters.choice if isinstance(parameters, VhgpParameters) else KernelChoice(parameters.family)
 
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidates import Candidate
 from push_predictor.residuals.evidence.drivers import CATEGORIES, HEADINGS, PLACE, standard_form, two_dimensional
-from push_predictor.residuals.selection.screening import Without
+from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.residuals.selection.selection import Judged, gains_of
 from push_predictor.types import Array, IntArray
 
@@ -26,25 +26,25 @@ SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "peri
 
 def best_form(candidate: Candidate, table: PushTable, z: Array, basis: Array, block: IntArray) -> Judged:
     """The candidate in the simplest form whose gain is within one standard error of the best form's."""
-    out = Without(basis)
+    out = Residualizer(basis)
     left = out(z)
     forms = forms_for(candidate, table)
     tried = [Judged(c, gains_of(left, out(c.columns), block)) for c in (_in_form(candidate, f, table) for f in forms)]
     return simplest(tried)
 
 
-def forms_for(candidate: Candidate, table: PushTable) -> list[Form]:
+def forms_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:
     """The forms in which a candidate's driver may enter."""
     name, form = candidate.covariate, candidate.form
     if form.name == "constant" or name in CATEGORIES:
         return [form]
     if name in HEADINGS:
-        return [Form("periodic", (name,)), Form("periodic, twice around", (name,))]
+        return [DriverBasis("periodic", (name,)), DriverBasis("periodic, twice around", (name,))]
     values = table.covariates[name]
     forms = [standard_form(kind, name, values) for kind in ("linear", "logarithmic", "quadratic")]
     if candidate.grows:
         forms[0] = replace(forms[0], centre=(float(values.min()),))
-    forms += [Form("step", (name,), place=place) for place in _places(values)]
+    forms += [DriverBasis("step", (name,), place=place) for place in _places(values)]
     if name in PLACE and all(p in table.covariates for p in PLACE):
         forms.append(two_dimensional(table))
     return forms
@@ -57,7 +57,7 @@ def simplest(tried: list[Judged]) -> Judged:
     return min(near, key=lambda j: (SIMPLEST_FIRST.index(j.candidate.form.name), -j.gain))
 
 
-def _in_form(candidate: Candidate, form: Form, table: PushTable) -> Candidate:
+def _in_form(candidate: Candidate, form: DriverBasis, table: PushTable) -> Candidate:
     return replace(candidate, form=form, values=form.values(table.covariates, len(table)))
 
 

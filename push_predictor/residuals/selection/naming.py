@@ -13,7 +13,7 @@ import numpy as np
 
 from push_predictor.models.effects.effect import mechanism_named
 from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.selection.screening import Left, Without, raw_scores, screen, unit_scores
+from push_predictor.residuals.selection.screening import ResidualBlocks, Residualizer, raw_scores, screen, unit_scores
 from push_predictor.residuals.selection.selection import Judged, fit, gains_of
 from push_predictor.types import Array, IntArray
 
@@ -58,7 +58,7 @@ def plausible(candidate: Candidate, case: Case) -> bool:
     """Whether the size that fits is one that a rig can have; beyond it a mechanism only mimics another."""
     if candidate.mechanism is None:
         return True
-    out = Without(case.basis)
+    out = Residualizer(case.basis)
     coefficients = fit(out(candidate.columns), out(case.z)).reshape(candidate.response.shape[2], -1)
     values = np.ones((len(case.z), 1)) if candidate.values is None else candidate.values
     values = values - (values.mean(axis=0) if candidate.kind == "driven" and candidate.form.drivers else 0.0)
@@ -68,7 +68,7 @@ def plausible(candidate: Candidate, case: Case) -> bool:
 
 def leaves_over(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:
     """Share of the gain along the driver that a mechanism leaves to the fall-back; 0 where that is chance."""
-    out = Without(case.basis)
+    out = Residualizer(case.basis)
     both = _orthonormal(out(mechanism.candidate.columns))
     left, beside = _apart(out.left(case.z, case.block), both), _apart_from(out(generic.columns), both)
     if _p_value(left, beside, seed) > LEFT_OVER:
@@ -79,13 +79,13 @@ def leaves_over(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0
 
 def _struck_off(best: Judged, other: Judged, case: Case, seed: int) -> bool:
     """Whether the other, taken out with the inputs, leaves over what the best explains."""
-    out = Without(case.basis)
+    out = Residualizer(case.basis)
     taken = _orthonormal(out(other.candidate.columns))
     left, flat = _apart(out.left(case.z, case.block), taken), _apart_from(out(best.candidate.columns), taken)
     return _p_value(left, flat, seed) <= STRUCK_OFF and best.gain > other.gain
 
 
-def _p_value(left: Left, flat: Array, seed: int) -> float:
+def _p_value(left: ResidualBlocks, flat: Array, seed: int) -> float:
     scores = unit_scores(*raw_scores(left, flat))
     return float(screen([scores], seed).p_value[0]) if scores.rows.shape[1] else 1.0
 
@@ -96,8 +96,8 @@ def _orthonormal(flat: Array) -> Array:
     return np.asarray(left[:, values > 1e-6 * max(values[0], np.finfo(float).tiny)])
 
 
-def _apart(left: Left, taken: Array) -> Left:
-    return Left(_apart_from(left.left, taken), _apart_from(left.enlarged, taken), left.block)
+def _apart(left: ResidualBlocks, taken: Array) -> ResidualBlocks:
+    return ResidualBlocks(_apart_from(left.left, taken), _apart_from(left.enlarged, taken), left.block)
 
 
 def _apart_from(values: Array, taken: Array) -> Array:

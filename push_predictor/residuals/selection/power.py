@@ -15,8 +15,8 @@ from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_o
 from push_predictor.residuals.evidence.residuals import Evidence
 from push_predictor.residuals.selection.screening import (
     TINY,
+    Residualizer,
     Scores,
-    Without,
     moments,
     raw_scores,
     sums_by,
@@ -90,7 +90,7 @@ def _size(
     baseline: Baseline | None,
 ) -> float:
     """Norm of the coefficients, in units of the parameter, at which the statistic passes the threshold surely."""
-    out = Without(inputs_of(candidate.kind, basis))
+    out = Residualizer(inputs_of(candidate.kind, basis))
     flat = out(candidate.columns)
     raw = raw_scores(out.left(left, evidence.block), flat)
     against = baseline is not None and (baseline.applies(candidate) or baseline.stands(candidate))

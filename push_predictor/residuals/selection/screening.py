@@ -63,19 +63,19 @@ class Scores:
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class ResidualBlocks:
     """Residuals without the inputs: left (n, 3), and as large as before a fit made them smaller, enlarged (n, 3)."""
 
     left: Array
     enlarged: Array
     block: IntArray
 
-    def apart(self, beside: Array | None) -> Left:
+    def apart(self, beside: Array | None) -> ResidualBlocks:
         """Less what orthonormal columns (3 n, q) explain of them, all outputs together."""
         if beside is None:
             return self
         parts = [flat - beside @ (beside.T @ flat) for flat in (self.left.ravel(), self.enlarged.ravel())]
-        return Left(parts[0].reshape(self.left.shape), parts[1].reshape(self.left.shape), self.block)
+        return ResidualBlocks(parts[0].reshape(self.left.shape), parts[1].reshape(self.left.shape), self.block)
 
 
 def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
@@ -91,7 +91,7 @@ def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
 
 def block_scores(z: Array, columns: Array, basis: Array, block: IntArray) -> Scores:
     """Scores of columns (n, 3, p) for residuals z (n, 3); the basis (n, m) is taken out of both, per output."""
-    out = Without(basis)
+    out = Residualizer(basis)
     return unit_scores(*raw_scores(out.left(z, block), out(columns)))
 
 
@@ -102,7 +102,7 @@ def unit_scores(scores: Scores, information: Array) -> Scores:
     return scores.turned(vectors[:, keep] / np.sqrt(values[keep]))
 
 
-def raw_scores(left: Left, flat: Array) -> tuple[Scores, Array]:
+def raw_scores(left: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
     """Scores of columns (n, 3, p) that are without the inputs, and the columns' information (p, p)."""
     x = flat.reshape(-1, flat.shape[2])
     rows = sums_by(left.block, np.einsum("nkp,nk->np", flat, left.enlarged))
@@ -117,7 +117,7 @@ def sums_by(block: IntArray, values: Array) -> Array:
     return sums
 
 
-class Without:
+class Residualizer:
     """Takes a basis (n, m) out of values, by least squares."""
 
     def __init__(self, basis: Array) -> None:
@@ -129,7 +129,7 @@ class Without:
         flat = values.reshape(len(values), -1)
         return np.asarray(flat - self.q @ (self.q.T @ flat)).reshape(values.shape)
 
-    def left(self, z: Array, block: IntArray) -> Left:
+    def left(self, z: Array, block: IntArray) -> ResidualBlocks:
         """Residuals z (n, 3) without the basis."""
         left = self(z)
         enlarged = left.copy()
@@ -137,7 +137,7 @@ class Without:
             for rows in _rows_of(block):
                 values, vectors = np.linalg.eigh(np.eye(len(rows)) - self.q[rows] @ self.q[rows].T)
                 enlarged[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ left[rows])
-        return Left(left, enlarged, block)
+        return ResidualBlocks(left, enlarged, block)
 
 
 def _rows_of(block: IntArray) -> list[IntArray]:

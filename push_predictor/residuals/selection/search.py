@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals.candidates.candidates import Candidate
 from push_predictor.residuals.evidence.baseline import Baseline, difference
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL
@@ -18,10 +18,10 @@ from push_predictor.residuals.evidence.residuals import Evidence
 from push_predictor.residuals.selection.basis_choice import best_form
 from push_predictor.residuals.selection.naming import MOST_LEFT, Case, Naming, leaves_over, open_rivals, plausible
 from push_predictor.residuals.selection.screening import (
-    Left,
+    ResidualBlocks,
+    Residualizer,
     Scores,
     Screened,
-    Without,
     raw_scores,
     screen,
     unit_scores,
@@ -82,7 +82,7 @@ def search(
     basis: the model's inputs, taken out of residual and candidates. baseline: what a learnt base leaves over in
     training, against which effects in its own inputs are judged; without it they are judged against zero.
     """
-    hunt = _Hunt(evidence, tuple(candidates), basis, seed, alpha, baseline, _training(candidates, baseline))
+    hunt = _ForwardSelection(evidence, tuple(candidates), basis, seed, alpha, baseline, _training(candidates, baseline))
     z, first = evidence.z, None
     terms: list[Term] = []
     while True:
@@ -103,7 +103,7 @@ def _training(candidates: Sequence[Candidate], baseline: Baseline | None) -> dic
 
 
 @dataclass(frozen=True, eq=False)
-class _Hunt:
+class _ForwardSelection:
     """What all rounds of a search share. training: scores there of the candidates that are judged against it."""
 
     evidence: Evidence
@@ -115,9 +115,9 @@ class _Hunt:
     training: dict[int, tuple[Scores, Array]]
 
     @cached_property
-    def outs(self) -> dict[Kind, Without]:
+    def outs(self) -> dict[Kind, Residualizer]:
         """What takes the inputs out, by kind of candidate."""
-        return {kind: Without(inputs_of(kind, self.basis)) for kind in get_args(Kind)}
+        return {kind: Residualizer(inputs_of(kind, self.basis)) for kind in get_args(Kind)}
 
     def screened(self, z: Array) -> Screened:
         """All candidates on residuals z."""
@@ -129,7 +129,7 @@ class _Hunt:
         screened = screen([self._scores(c, left) for c, left in zip(self.candidates, each, strict=True)], self.seed)
         return self._news(screened, each)
 
-    def _news(self, screened: Screened, lefts: Sequence[Left]) -> Screened:
+    def _news(self, screened: Screened, lefts: Sequence[ResidualBlocks]) -> Screened:
         """Where what stands in the rig was found: whether it is other than in training, all of these at once."""
         found = [k for k, c in enumerate(self.candidates) if screened.p_value[k] <= self.alpha and self._stands(c)]
         if not found or self.baseline is None:
@@ -146,7 +146,7 @@ class _Hunt:
     def _stands(self, candidate: Candidate) -> bool:
         return self.baseline is not None and self.baseline.stands(candidate)
 
-    def _scores(self, candidate: Candidate, left: Left) -> Scores:
+    def _scores(self, candidate: Candidate, left: ResidualBlocks) -> Scores:
         """Scores of the blocks of these windows, then of the training windows (zero if not judged against them)."""
         raw = raw_scores(left, self.outs[candidate.kind](candidate.columns))
         if id(candidate) in self.training:
@@ -252,7 +252,7 @@ class _Hunt:
         case = self._case(mechanism, z)
         return max((leaves_over(mechanism, generic, case, self.seed) for generic in generics), default=0.0)
 
-    def _generics(self, driver: str, form: Form | None, z: Array) -> list[Candidate]:
+    def _generics(self, driver: str, form: DriverBasis | None, z: Array) -> list[Candidate]:
         """The fall-back along a driver: in the form of the mechanism, or in all screening forms of the driver."""
         same = [c for c in self.candidates if c.mechanism is None and c.covariate == driver]
         if same and form is not None and form.drivers:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.selection.screening import TINY, Without, sums_by
+from push_predictor.residuals.selection.screening import TINY, Residualizer, sums_by
 from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5
@@ -35,7 +35,7 @@ class Judged:
 
 def judge(candidates: Sequence[Candidate], z: Array, basis: Array, block: IntArray) -> list[Judged]:
     """Judge candidates on residuals z (n, 3), best first; the basis (n, m) of the inputs goes out of both."""
-    out = Without(basis)
+    out = Residualizer(basis)
     left = out(z)
     judged = [Judged(c, gains_of(left, out(c.columns), block)) for c in candidates]
     return sorted(judged, key=lambda j: -j.gain)

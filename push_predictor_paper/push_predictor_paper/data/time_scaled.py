@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally, tally
+from push_predictor.evaluation.push_scores import PushScores, tally
 from push_predictor.evaluation.splits import FOLDS
 from push_predictor.evaluation.validation import compare
 from push_predictor.geometry.frames import rotate
@@ -81,7 +81,7 @@ def equal_travel(plan: Plan, shape: str, surface: str, number: int) -> EqualTrav
     return _first_travel(motion, path)
 
 
-def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> Tally:
+def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> PushScores:
     """Train on the bracket's windows outside a fold of pushes, judge on the fold's windows at all speeds.
 
     Push k at any speed is of fold k % 5: pushes of that number met the same places of the table.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.splits import BOOTSTRAP_DRAWS, push_bootstrap
 from push_predictor.types import Array
 
@@ -42,7 +42,9 @@ class Crossing:
         return f"at most {self.first}" if size <= self.first else f"{size:.3g}"
 
 
-def crossing(sizes: Sequence[int], learnt: Sequence[Sequence[Tally]], baseline: Sequence[Sequence[Tally]]) -> Crossing:
+def crossing(
+    sizes: Sequence[int], learnt: Sequence[Sequence[PushScores]], baseline: Sequence[Sequence[PushScores]]
+) -> Crossing:
     """From where on the learnt model's total NMSE stays below the baseline's, up to the last size.
 
     By size, by seed (fold) the tallies of both on the same windows. The interval draws pushes anew, the same for both
@@ -70,13 +72,13 @@ def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
     return np.where(after > 0, np.where(k == 0, float(sizes[0]), size), np.inf)
 
 
-def _gap(learnt: Sequence[Tally], baseline: Sequence[Tally]) -> Array:
+def _gap(learnt: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
     """Total NMSE of the first less that of the second, (1 + draws,): of all, then of each draw."""
     weights = _weights(learnt)
     return _total(learnt, weights) - _total(baseline, weights)
 
 
-def _weights(tallies: Sequence[Tally]) -> list[Array]:
+def _weights(tallies: Sequence[PushScores]) -> list[Array]:
     """By seed how often each of its pushes counts, (1 + draws, p)."""
     names = np.unique(np.concatenate([tally.push_id for tally in tallies]))
     pushes = push_bootstrap(names)
@@ -86,7 +88,7 @@ def _weights(tallies: Sequence[Tally]) -> list[Array]:
     return [np.vstack([np.ones((1, weights.shape[1])), weights]) for weights in drawn]
 
 
-def _total(tallies: Sequence[Tally], weights: Sequence[Array]) -> Array:
+def _total(tallies: Sequence[PushScores], weights: Sequence[Array]) -> Array:
     error = sum((w @ tally.error for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
     spread = sum((w @ tally.spread for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
     return np.asarray((error / spread).sum(axis=1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally, pooled
+from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.data.corpus import Corpus, Pair
 from push_predictor_paper.estimate import Estimate, over_seeds
 from push_predictor_paper.fits.fits import SPLITS, Fit, Score, SplitName, scores
@@ -49,7 +49,7 @@ class Curves:
         """The mean of a measure over pairs and seeds, with its interval over seeds."""
         return over_seeds(self.values(pairs, kind, split, n, measure))
 
-    def tally(self, pair: Pair, kind: str, split: SplitName, n: int) -> Tally:
+    def tally(self, pair: Pair, kind: str, split: SplitName, n: int) -> PushScores:
         """All seeds' pushes as one."""
         return pooled([score.tally for score in self.cells[pair, kind, split, n]])
 

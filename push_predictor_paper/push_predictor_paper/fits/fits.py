@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally, tally
+from push_predictor.evaluation.push_scores import PushScores, tally
 from push_predictor.evaluation.splits import Split, random_split, split_by_push
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
@@ -47,7 +47,7 @@ class Score:
     """How a fit did on the windows that its split holds back; cpu: s to train it."""
 
     fit: Fit
-    tally: Tally
+    tally: PushScores
     cpu: float
 
     @property

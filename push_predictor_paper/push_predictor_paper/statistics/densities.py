@@ -10,7 +10,7 @@ from scipy.stats import shapiro
 from push_predictor.evaluation.metrics import gaussian_nlpd
 from push_predictor.evaluation.unimodality import dip, holm, p_values, power, uniform_dips
 from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
-from push_predictor.models.push_model import LearnedBody
+from push_predictor.models.push_model import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.fits.fits import Fit, trained
@@ -68,12 +68,15 @@ class LogDensities:
 
 def log_densities(pushes: PushSet, fit: Fit, inputs: Array, outcomes: Array) -> LogDensities:
     """Train a learnt model and ask it for the densities of outcomes (v, 3) of pushes inputs (v, 3)."""
-    body = trained(pushes, fit).body
-    if not isinstance(body, LearnedBody):
+    predictor = trained(pushes, fit).predictor
+    if not isinstance(predictor, GaussianProcessPredictor):
         raise TypeError(f"{fit.kind}: only learnt models have latent predictions")
-    scaled, latent = (outcomes - body.scaling.outcome_mean) / body.scaling.outcome_sd, body.latent(inputs)
+    scaled, latent = (
+        (outcomes - predictor.scaling.outcome_mean) / predictor.scaling.outcome_sd,
+        predictor.latent(inputs),
+    )
     gaussian, exact = (
-        np.column_stack([density(p, scaled[:, k]) for k, p in enumerate(latent)]) - np.log(body.scaling.outcome_sd)
+        np.column_stack([density(p, scaled[:, k]) for k, p in enumerate(latent)]) - np.log(predictor.scaling.outcome_sd)
         for density in (gaussian_log_density, exact_log_density)
     )
     return LogDensities(gaussian, exact)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally, pooled, tally
+from push_predictor.evaluation.push_scores import PushScores, pooled, tally
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.quadrature import exact_cdf
-from push_predictor.models.push_model import LearnedBody, PushModel
+from push_predictor.models.push_model import GaussianProcessPredictor, PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 from push_predictor_paper.data.corpus import PushSet
@@ -34,7 +34,7 @@ class Pits:
     speed: Array
     gaussian: Array
     exact: Array
-    tally: Tally
+    tally: PushScores
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +62,11 @@ def pits(pushes: PushSet, fit: Fit) -> Pits:
 
 def exact_pit(model: PushModel, table: PushTable) -> Array:
     """Probabilities (n, 3) of outcomes below a table's under the exact predictive; for a Gaussian one, `pit`'s."""
-    if not isinstance(model.body, LearnedBody):
+    if not isinstance(model.predictor, GaussianProcessPredictor):
         return pit(compare(model, table))
-    scaling = model.body.scaling
+    scaling = model.predictor.scaling
     scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    latent = model.body.latent(table.inputs)
+    latent = model.predictor.latent(table.inputs)
     return np.column_stack([exact_cdf(prediction, scaled[:, k]) for k, prediction in enumerate(latent)])
 
 

@@ -28,7 +28,7 @@ from push_predictor.evaluation.report.maps import (
     recorded_map,
 )
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.push_model import ExtendedBody, PushModel
+from push_predictor.models.push_model import ExtendedPredictor, PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting.canvas import Picture, draw
@@ -140,7 +140,7 @@ def _held_caption(shown: Validation, condition: Condition) -> str:
     """At which covariates the maps of extended models are drawn; empty if none is extended."""
     alike, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
     told = [held_in_words(model, held_covariates(model, alike)) for model in shown.models]
-    extended = [model.name for model in shown.models if isinstance(model.body, ExtendedBody)]
+    extended = [model.name for model in shown.models if isinstance(model.predictor, ExtendedPredictor)]
     if extended and (sides := fold_order(outline)) > 1:
         told.append(f"Effects may differ between sides: of the outline's {sides} alike parts, the first is drawn.")
     return "".join(f" {text}" for text in told if text)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, grid
 from push_predictor.residuals.outcome import Trace
@@ -38,7 +38,7 @@ def paint_form(figure: Figure, trace: Trace, strength: Strength, analysis: Rows,
     axes[0].legend(loc="best")
 
 
-def bins_of(form: Form, table: PushTable) -> IntArray:
+def bins_of(form: DriverBasis, table: PushTable) -> IntArray:
     """Bin (n,) of each window: of a category by level, of a heading by width, else as many windows in each."""
     values = table.covariates[form.drivers[0]]
     if form.name == "category":
@@ -58,7 +58,7 @@ def beyond(strength: Strength, trace: Trace, rows: Rows) -> str:
     return ", ".join(f"{len(place) - int(n)} of {len(place)}" for n in inside)
 
 
-def driver_label(form: Form) -> str:
+def driver_label(form: DriverBasis) -> str:
     """The driver with its unit."""
     name = form.drivers[0]
     unit = "deg" if form.name in PERIODIC else unit_of(name)
@@ -116,7 +116,7 @@ def _bins(trace: Trace, strength: Strength, rows: Rows) -> Binned:
     return binned(strength, rows, response, _axis(form, rows.table), bins_of(form, rows.table))
 
 
-def _axis(form: Form, table: PushTable) -> Array:
+def _axis(form: DriverBasis, table: PushTable) -> Array:
     values = table.covariates[form.drivers[0]]
     return np.degrees(values) if form.name in PERIODIC else values
 

@@ -11,7 +11,7 @@ import numpy as np
 from push_predictor.evaluation.report.figures.push_maps import ColourScale, contact_label, paint_panel
 from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.driver_basis import Form
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import SYMBOLS
 from push_predictor.residuals.reporting.figures.partial import Strength
@@ -98,7 +98,7 @@ def _cells(outline: Outline, columns: Sequence[Column]) -> Cells:
     return Cells(cells.contact, np.linspace(angle[0], angle[-1], len(cells.angle)))
 
 
-def _names(form: Form, above: BoolArray, table: PushTable) -> tuple[str, str]:
+def _names(form: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str, str]:
     name = form.drivers[0]
     values = table.covariates[name]
     low, high = values[~above], values[above]

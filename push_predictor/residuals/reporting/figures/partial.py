@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.evaluation.splits import push_bootstrap
-from push_predictor.models.effects.driver_basis import Form, columns_of
+from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of, mechanism_named
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import PushTable
@@ -113,7 +113,7 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     """The outcome per unit of each of the q parameters, in units of the prediction, (n, 3, q)."""
     effect = strength.effect
     bare = design_of(
-        effect.mechanism, Form("constant"), physics_of(trace.model), _push(rows.table), effect.outcome_scale
+        effect.mechanism, DriverBasis("constant"), physics_of(trace.model), _push(rows.table), effect.outcome_scale
     )
     return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
 

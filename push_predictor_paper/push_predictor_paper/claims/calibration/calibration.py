@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
-from push_predictor.evaluation.push_scores import Totals
+from push_predictor.evaluation.push_scores import PooledScores
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
@@ -119,7 +119,7 @@ def _density_table(found: Calibrated) -> Table:
     )
 
 
-def _gain_of(output: int, totals: Totals) -> Array:
+def _gain_of(output: int, totals: PooledScores) -> Array:
     return np.asarray(totals.exact_nlpd[:, output] - totals.nlpd[:, output])
 
 

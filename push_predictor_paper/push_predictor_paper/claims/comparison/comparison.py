@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Totals
+from push_predictor.evaluation.push_scores import PooledScores
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
@@ -78,7 +78,7 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
 def output_figure(measure: str, output: int | None) -> Figure:
     """The figure of one output, or summed over them."""
 
-    def figure(totals: Totals) -> Array:
+    def figure(totals: PooledScores) -> Array:
         values: Array = getattr(totals, measure)
         return np.asarray(values.sum(axis=1) if output is None else values[:, output])
 

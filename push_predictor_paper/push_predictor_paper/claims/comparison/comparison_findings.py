@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import (
     Estimate,
@@ -34,7 +34,7 @@ def crossings_of(
 ) -> Mapping[SplitName, Crossings]:
     """From where on GP and VHGP beat the analytical model, on each split."""
 
-    def tallies(kind: str, split: SplitName) -> list[list[Tally]]:
+    def tallies(kind: str, split: SplitName) -> list[list[PushScores]]:
         cells = [found.cells[corpus.reference, kind, split, n] for n in sizes[split]]
         return [[score.tally for score in cell] for cell in cells]
 

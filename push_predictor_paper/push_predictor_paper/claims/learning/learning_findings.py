@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Totals
+from push_predictor.evaluation.push_scores import PooledScores
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus, Pair
 from push_predictor_paper.estimate import Estimate, Figure, of_draws, over_seeds, total_nlpd, total_nmse
@@ -176,10 +176,10 @@ def _gains_by_push(found: Curves, pair: Pair, n: int, more: int) -> tuple[Estima
     before, after = (found.tally(pair, KIND, "push", size) for size in (n, more))
     doublings = float(np.log2(more / n))
 
-    def nmse(a: Totals, b: Totals) -> Array:
+    def nmse(a: PooledScores, b: PooledScores) -> Array:
         return np.asarray(1.0 - (total_nmse(b) / total_nmse(a)) ** (1.0 / doublings))
 
-    def nats(a: Totals, b: Totals) -> Array:
+    def nats(a: PooledScores, b: PooledScores) -> Array:
         return np.asarray((total_nlpd(a) - total_nlpd(b)) / doublings)
 
     all_pushes, drawn = (before.totals(), after.totals()), (before.resampled(), after.resampled())

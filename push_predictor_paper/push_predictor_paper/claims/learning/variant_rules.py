@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from push_predictor.evaluation.push_scores import Tally, pooled
+from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.claims.corrected import corrected
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import (
@@ -38,7 +38,7 @@ class Variants:
     """All variants of one corpus: tallies pooled over seeds and folds, mean CPU time of a training, s."""
 
     corpus: Corpus
-    tallies: Mapping[Cell, Tally]
+    tallies: Mapping[Cell, PushScores]
     cpu: Mapping[Cell, float]
     fits: Mapping[Cell, int]
 

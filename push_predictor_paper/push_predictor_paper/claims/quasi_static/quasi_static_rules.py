@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import Tally
+from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap
 from push_predictor.types import Array
 from push_predictor_paper.data.time_scaled import TURN, EqualTravel, number_of
@@ -28,7 +28,7 @@ class Judged:
 
     speeds: tuple[float, ...]
     numbers: tuple[int, ...]
-    tallies: Mapping[str, Sequence[Tally]]
+    tallies: Mapping[str, Sequence[PushScores]]
 
     def same(self, series: str) -> Array:
         """NMSE (brackets, 1 + draws) of each bracket on held-out pushes of its own speeds; see draws."""
