@@ -3,8 +3,8 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.joint [--data FOLDER] [--bags FOLDER] [--model vhgp|gp] [--quick]
 
 --data: the folder of the measured data, of which mit_square is taken; by whole pushes (5 folds) and on a random split
-(5 seeds). --bags: the standard recordings of `simulate`; trained on square_abs_train, judged on square_abs_test. Makes
-the tables of docs/covariance.md anew. Differences are paired; their intervals come from drawing whole pushes anew.
+(5 seeds). --bags: the standard recordings of `simulate`; trained on square_abs_train, judged on square_abs_test. Prints
+the tables of docs/results/covariance.md. Differences are paired; their intervals come from resampling whole pushes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Models against pushes measured by others: makes the tables of docs/measured.md anew.
+"""Models against pushes measured by others: makes the tables of docs/results/measured.md anew.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
 

@@ -1,7 +1,7 @@
 """predict_server, push_replay and push_validator together, and RViz2 if wanted.
 
 ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
-rviz:=true opens RViz2 beside them (docs/visualisation.md).
+rviz:=true opens RViz2 beside them (docs/how_to/visualisation.md).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ARGUMENTS = (
     ("params_file", "", "YAML file with parameters, such as those in config/; other arguments that are given win."),
     ("use_sim_time", "false", "Nodes take /clock, which the replay publishes, for their time."),
     ("log_level", "info", "debug, info, warn, error or fatal."),
-    ("enclaves", "", "SROS 2: run each node in its enclave below this path, /push_predictor (docs/security.md)."),
+    ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
     ("autostart", "true", "Configure and activate predict_server; false leaves that to a lifecycle manager."),
     ("recording", "", "Recording to replay: rosbag2 folder or .mcap file; empty: none, sensors are live."),
     ("bag", "", "The same as recording."),

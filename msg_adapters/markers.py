@@ -1,4 +1,4 @@
-"""One window as visualization_msgs/MarkerArray: what was predicted beside what was observed (docs/visualisation.md).
+"""One window as visualization_msgs/MarkerArray: predicted next to observed (docs/how_to/visualisation.md).
 
 A window moves a slider of 90 mm by some millimetres and the model is unsure of tenths of one, which at the scale of
 the slider nobody sees. So what concerns the error is drawn twice: as large as it is, and MAGNIFICATION times larger.

@@ -52,7 +52,7 @@ def require_security() -> None:
     if not security_compiled_in():
         raise SecurityError(
             f"{ENABLE}=true, but {get_rmw_implementation_identifier()} was built without DDS security: take one "
-            f"with it, as in the Debian packages of ROS, or unset {ENABLE}; docs/security.md"
+            f"with it, as in the Debian packages of ROS, or unset {ENABLE}; docs/how_to/security.md"
         )
 
 
@@ -62,7 +62,7 @@ def security_hint() -> str:
         return ""
     names = (ENABLE, "ROS_SECURITY_STRATEGY", "ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENCLAVE_OVERRIDE")
     given = ", ".join(f"{name}={os.environ.get(name, '')}" for name in names)
-    return f"; security was asked for ({given}): is there an enclave for the node? docs/security.md"
+    return f"; security was asked for ({given}): is there an enclave for the node? docs/how_to/security.md"
 
 
 def security_compiled_in() -> bool:

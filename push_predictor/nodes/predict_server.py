@@ -1,4 +1,4 @@
-"""The node that serves push models: six services and the action trace_residual (docs/services.md)."""
+"""The node that serves push models: six services and the action trace_residual (docs/reference/predict_server.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The node that compares prediction and outcome while pushes happen, or are replayed (docs/validation.md)."""
+"""The node that compares predictions with live or replayed pushes (docs/reference/push_validator.md)."""
 
 from __future__ import annotations
 

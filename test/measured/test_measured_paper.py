@@ -52,7 +52,7 @@ def test_the_splits_deal_the_rows_that_the_tables_of_the_docs_tell(found: tuple[
         assert not set(push[whole.training].tolist()) & set(push[whole.test].tolist())
 
 
-# NMSE and NLPD at n = 100, all tested rows together: docs/measured.md
+# NMSE and NLPD at n = 100, all tested rows together: docs/results/measured.md
 @pytest.mark.parametrize(
     ("split", "kind", "nmse", "nlpd"),
     [

@@ -304,11 +304,11 @@ def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
     return table.take(np.unique(table.push_id, return_index=True)[1])
 
 
-# --- the worked example of docs/residuals.md --------------------------------------------------------------------------
+# --- the worked example of docs/how_to/new_mechanism.md -------------------------------------------------------------
 
 
 def test_the_worked_example_of_the_docs_is_a_mechanism() -> None:
-    text = (REPOSITORY / "docs" / "residuals.md").read_text()
+    text = (REPOSITORY / "docs" / "how_to" / "new_mechanism.md").read_text()
     space: dict[str, Any] = {}
     exec(text.split("```python\n", 1)[1].split("```", 1)[0], space)
     cable: Mechanism = space["TWISTING_CABLE"]
@@ -318,6 +318,6 @@ def test_the_worked_example_of_the_docs_is_a_mechanism() -> None:
 
 
 def test_the_docs_name_every_mechanism_with_its_limit() -> None:
-    text = (REPOSITORY / "docs" / "residuals.md").read_text()
+    text = (REPOSITORY / "docs" / "reference" / "trace.md").read_text()
     rows = {row.split("|")[1].strip(" `"): row.split("|") for row in text.splitlines() if row.startswith("| `")}
     assert [float(rows[m.name][3]) for m in LIBRARY] == [m.parameters[0].largest for m in LIBRARY]

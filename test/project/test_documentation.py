@@ -25,7 +25,8 @@ NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "push_replay": ("push_replay", tuple(replay_options.PARAMETERS)),
     "push_validator": ("push_validator", tuple(push_validator.PARAMETERS)),
 }
-DOCUMENTS = [REPOSITORY / "README.md", REPOSITORY / "bags" / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+REFERENCE = REPOSITORY / "docs" / "reference"
+DOCUMENTS = [REPOSITORY / "README.md", REPOSITORY / "bags" / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 SERVICES = ("predict_push", "predict_push_batch", "predict_slider_pose", "rollout_pushes", "list_models", "load_model")
 
 
@@ -65,7 +66,7 @@ def test_every_parameter_has_a_description_and_accepts_its_default(node: str):
 
 
 def test_the_table_of_the_validators_parameters_is_that_of_the_code():
-    rows = table(REPOSITORY / "docs" / "validation.md", "Parameters")
+    rows = table(REFERENCE / "push_validator.md", "Parameters")
     written = {name.strip("`"): (yaml.safe_load(value.strip("`")), text) for name, value, text in rows}
     assert written == {row.name: (row.default, row.description) for row in push_validator.PARAMETERS}
 
@@ -74,22 +75,22 @@ def test_the_table_of_the_validators_parameters_is_that_of_the_code():
 
 
 def test_the_table_of_the_validators_topics_names_what_it_uses():
-    code = "".join((REPOSITORY / "push_predictor" / "nodes" / f"{name}.py").read_text() for name in (
-        "push_validator", "prediction_client", "model_source", "sensor_inlet",
-    ))  # fmt: skip
+    nodes = REPOSITORY / "push_predictor" / "nodes"
+    modules = [nodes / "push_validator.py", *sorted((nodes / "validator").rglob("*.py"))]
+    code = "".join(path.read_text() for path in modules)
     calls = (
         r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\"|DeferredTrigger\(self, \"([^\"]+)\""
     )
     used = (
         {first or second for first, second in re.findall(calls, code)} | {topic for _, _, topic, _ in TOPICS} | {CLOCK}
     )
-    rows = table(REPOSITORY / "docs" / "validation.md", "Topics and services")
+    rows = table(REFERENCE / "push_validator.md", "Topics and services")
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row[0])} == used
 
 
 @pytest.mark.parametrize("service", SERVICES)
 def test_every_service_of_the_server_has_a_chapter(service: str):
-    assert re.search(rf"^## `{service}` \(\w+\)$", (REPOSITORY / "docs" / "services.md").read_text(), re.MULTILINE)
+    assert re.search(rf"^## `{service}` \(\w+\)$", (REFERENCE / "predict_server.md").read_text(), re.MULTILINE)
 
 
 # --- commands and links ----------------------------------------------------------------------------------------------
@@ -127,6 +128,6 @@ def test_every_link_to_a_file_leads_somewhere(document: Path):
 
 
 def test_the_names_in_the_documented_files_are_those_that_are_written():
-    names = " ".join(row[0] for row in table(REPOSITORY / "docs" / "validation.md", "What is written"))
+    names = " ".join(row[0] for row in table(REFERENCE / "push_validator.md", "What is written"))
     for name in (MAIN_RESULT, "windows.json", "residuals/", "report.html"):
         assert f"`{name}`" in names

@@ -105,7 +105,12 @@ def test_rviz_shows_each_namespace_of_the_markers_and_no_other():
 
 
 def test_the_document_explains_each_marker():
-    section = (REPOSITORY / "docs" / "visualisation.md").read_text().split("\n## The markers\n")[1].split("\n## ")[0]
+    section = (
+        (REPOSITORY / "docs" / "how_to" / "visualisation.md")
+        .read_text()
+        .split("\n## The markers\n")[1]
+        .split("\n## ")[0]
+    )
     rows = [line.split("`")[1] for line in section.splitlines() if line.startswith("| `")]
     assert sorted(rows) == sorted(shown_namespaces())
 
@@ -172,7 +177,7 @@ def test_the_scene_shows_topics_that_it_can_draw_in_the_frame_of_the_markers(pub
 
 def test_the_evidence_is_plotted_under_the_name_that_the_diagnostics_give_it():
     quoted = [path.split('"')[1] for path in message_paths() if '"' in path]
-    source = (REPOSITORY / "push_predictor" / "nodes" / "validator_status.py").read_text()
+    source = (REPOSITORY / "push_predictor" / "nodes" / "validator" / "status.py").read_text()
     assert quoted == ["alarm log10 evidence"]
     assert all(f'"{name}"' in source for name in quoted)
     summaries = [config for panel, config in FOXGLOVE["configById"].items() if panel.startswith("Diagnostic")]

@@ -2,8 +2,8 @@
 
     y = f(x) + e,  f ~ GP(0, k_f),  e ~ N(0, exp(g(x))),  g ~ GP(mu0, k_g)
 
-The model of Bauza and Rodriguez (ICRA 2017) for planar pushing, derived from first principles; docs/errata.md
-lists where the printed equations differ. Inputs and outputs are standardised by the caller.
+The model of Bauza and Rodriguez (ICRA 2017) for planar pushing, derived from first principles;
+docs/explanation/errata.md lists where the printed equations differ. Inputs and outputs are standardised by the caller.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The variational bound of a VHGP and its derivatives (Lazaro-Gredilla and Titsias 2011, eq. 7; docs/errata.md).
+"""The variational bound of a VHGP and its derivatives (Lazaro-Gredilla and Titsias 2011, equation 7).
+
+Where the printed equations differ from these: docs/explanation/errata.md.
 
     F = log N(y | 0, K_f + R) - 1/4 tr S - KL(N(m, S) || N(mu0, K_g)),     R_ii = exp(m_i - S_ii / 2)
     S^-1 = K_g^-1 + Lambda,     m = mu0 + K_g b,     Lambda diagonal ("site precisions"), b ("mean weights")

@@ -54,7 +54,7 @@ def answer_batch(go_on: Callable[[], None], shelf: ModelRegistry, request: Any, 
     tabulated = shelf.get(query.model)
     check_requests(tabulated.model, query.inputs, query.duration, query.covariates)
     if count > MOST_EXACT and (slow := tabulated.exact_count(query.inputs)) > MOST_EXACT:
-        accepted = f"at most {MOST_EXACT} pushes that no table answers (docs/services.md) a call"
+        accepted = f"at most {MOST_EXACT} pushes that no table answers (docs/reference/predict_server.md) a call"
         raise RequestError("velocity length", f"{slow} pushes without a table", accepted)
     for start in range(0, len(query.inputs), ROWS_AT_ONCE):
         go_on()

@@ -1,4 +1,4 @@
-"""How a predict_server does, as one diagnostic status (docs/services.md, "Diagnostics")."""
+"""How a predict_server does, as one diagnostic status (docs/reference/predict_server.md, "Diagnostics")."""
 
 from __future__ import annotations
 

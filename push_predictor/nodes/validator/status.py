@@ -1,4 +1,4 @@
-"""How a push_validator does, as one diagnostic status (docs/validation.md, "Diagnostics")."""
+"""How a push_validator does, as one diagnostic status (docs/reference/push_validator.md, "Diagnostics")."""
 
 from __future__ import annotations
 

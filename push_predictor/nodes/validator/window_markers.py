@@ -1,4 +1,4 @@
-"""The markers of a window: the push, what was predicted and what was observed, in the world (docs/visualisation.md)."""
+"""The markers of a window in the world: push, prediction, observation (docs/how_to/visualisation.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pushes measured by others: what of a user's folder the paper's tables can use (docs/measured.md)."""
+"""Pushes measured by others: what of a user's folder the paper's tables can use (docs/results/measured.md)."""
 
 from __future__ import annotations
 

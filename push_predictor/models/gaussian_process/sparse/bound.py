@@ -1,4 +1,4 @@
-"""The variational bound of a VHGP that knows f and g by their values at inducing inputs; docs/sparse.md derives it.
+"""The variational bound of a VHGP with inducing inputs for f and g (derived in docs/explanation/sparse.md).
 
 With u = f(Z), v = g(Z') - mu0, q(f, g) = p(f | u) q(u) p(g | v) q(v) and q(u) the best for the noise (Titsias 2009)
 
