@@ -125,7 +125,7 @@ def table_of(spec: SimulationSpec) -> PushTable:
 
 def state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:
     """What the alarm says after all pushes of a table."""
-    prediction = model.predict(table.inputs, table.duration, table.covariates)
+    prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return judged(calibration, table, prediction.mean, prediction.covariance)
 
 

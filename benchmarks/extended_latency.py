@@ -51,7 +51,7 @@ def main() -> None:
     }
     print(f"{'p50, us':24s}{'base':>8s}{'before':>8s}{'now':>8s}{'ratio':>8s}{'was':>8s}{'apart':>10s}")
     for name, model in models.items():
-        first, before, now = _times([tabulate(base).predict, _before(model), tabulate(model).predict], table)
+        first, before, now = _times([tabulate(base).predict_rows, _before(model), tabulate(model).predict_rows], table)
         print(
             f"{name:24s}{first:8.0f}{before:8.0f}{now:8.0f}{now / first:8.1f}{before / first:8.1f}"
             f"{_apart(model, table):10.1e}"
@@ -61,15 +61,15 @@ def main() -> None:
 def _before(model: PushModel) -> Ask:
     """The table for the base, and arrays for the effects."""
     if not isinstance(predictor := model.predictor, ExtendedPredictor):
-        return model.predict
+        return model.predict_rows
     base = tabulate(model.base)
 
-    def predict(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
-        found = base.predict(inputs, duration)
+    def predict_rows(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
+        found = base.predict_rows(inputs, duration)
         moments = found.mean, found.covariance, found.process_covariance
         return Prediction(*predictor.extended(moments, Push(inputs, duration, covariates)), found.in_domain)
 
-    return predict
+    return predict_rows
 
 
 def _times(asks: list[Ask], table: PushTable) -> list[float]:
@@ -89,7 +89,7 @@ def _apart(model: PushModel, table: PushTable) -> float:
     tabulated, before, apart = tabulate(model), _before(model), 0.0
     for k in range(len(table)):
         row = table.take(np.arange(k, k + 1))
-        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (tabulated.predict, before))
+        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (tabulated.predict_rows, before))
         sd = np.sqrt(np.diagonal(theirs.covariance[0]))
         apart = max(apart, float(np.max(np.abs(ours.mean - theirs.mean) / sd)))
     return apart

@@ -94,7 +94,7 @@ def gain(pushes: np.ndarray, windows: Array, sums: Array) -> Estimate:
 
 def _nlpd(model: PushModel, correlation: Correlation | None, test: PushTable) -> Array:
     assert isinstance(model.predictor, GaussianProcessPredictor)
-    prediction = replace(model, predictor=replace(model.predictor, correlation=correlation)).predict(
+    prediction = replace(model, predictor=replace(model.predictor, correlation=correlation)).predict_rows(
         test.inputs, test.duration
     )
     return joint_nlpd(prediction.mean, prediction.covariance, test.outcomes)

@@ -43,7 +43,7 @@ def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool
     start = time.process_time()
     model = train_model(table, rig, kind, name=kind, fit=fit)
     cpu = time.process_time() - start
-    return Fold(model, compare(model, test), model.predict(test.inputs, test.duration).in_domain, cpu)
+    return Fold(model, compare(model, test), model.predict_rows(test.inputs, test.duration).in_domain, cpu)
 
 
 def pooled(folds: Sequence[Fold]) -> PushScores:

@@ -82,9 +82,9 @@ def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
     model = tabulated.model
 
     def predict(inputs: Array) -> Prediction:
-        return tabulated.predict(inputs, np.full(len(inputs), WINDOW))
+        return tabulated.predict_rows(inputs, np.full(len(inputs), WINDOW))
 
-    typical = model.predict(model.training.inputs, model.training.duration).covariance.mean(axis=0)
+    typical = model.predict_rows(model.training.inputs, model.training.duration).covariance.mean(axis=0)
     persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
     tip = PusherGeometry(model.rig.outline, model.rig.pusher_radius, WINDOW)
     edges = len(model.rig.outline.vertices)

@@ -153,7 +153,7 @@ def _model_time(model: PushModel | TabulatedModel) -> float:
     times = []
     for k in range(len(inputs)):
         start = perf_counter()
-        model.predict(inputs[k : k + 1], duration[k : k + 1])
+        model.predict_rows(inputs[k : k + 1], duration[k : k + 1])
         times.append(perf_counter() - start)
     return float(np.median(times)) * 1e6
 

@@ -144,7 +144,7 @@ def _step_of_means(tabulated: TabulatedModel, slider: Array, step: Sequence[floa
             meeting = drive.meet(slider, meeting, window * windows.duration, windows.duration)
         if not meeting.held[0]:
             break
-        prediction = tabulated.predict(meeting.touch.inputs, np.array([windows.asked]))
+        prediction = tabulated.predict_rows(meeting.touch.inputs, np.array([windows.asked]))
         slider = displaced(slider, meeting.touch.heading, meeting.share[:, None] * windows.scale * prediction.mean)
         covariance += covariance_in_world(prediction.covariance, meeting.touch.heading)[0]
     return slider, covariance

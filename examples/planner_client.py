@@ -19,7 +19,7 @@ from std_msgs.msg import Header
 from msg_adapters.predictions import PushQuery, RefusedError, prediction_from_response, query_to_batch_request
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.models.push_model import Prediction
-from push_predictor.planning.repertoire import Pushes
+from push_predictor.planning.repertoire import StraightPushes
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import PredictPushBatch, RolloutPushes
@@ -62,7 +62,7 @@ class PlannerClient:
         request = query_to_batch_request(PushQuery("", inputs, self._window, {}))
         return prediction_from_response(self._call(self._batch, request))
 
-    def outcomes(self, slider: Array, push: Pushes, samples: int, seed: int) -> Array:
+    def outcomes(self, slider: Array, push: StraightPushes, samples: int, seed: int) -> Array:
         """Sampled poses (samples, 3) of a slider at (3,) in the world after a push. Raises RefusedError, SystemExit."""
         velocity, contact, angle = push.inputs[0].tolist()
         duration = self._window * int(push.windows[0])

@@ -47,7 +47,7 @@ def model_predicts(given: Path | None) -> Finding:
         path = given or share_path(*DEFAULT_MODEL)
         model = load_model(path)
         row = model.training.take(np.array([0]))
-        prediction = model.predict(row.inputs, row.duration, row.covariates)
+        prediction = model.predict_rows(row.inputs, row.duration, row.covariates)
         if not (np.isfinite(prediction.mean).all() and np.linalg.eigvalsh(prediction.covariance[0])[0] > 0.0):
             return _broken("model", f"{path} answers {prediction.mean[0]}", _OF_A_MODEL)
     except Exception as error:  # half an installation raises anything

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
     check_request(model, options.velocity, options.contact, options.angle, options.duration, covariates)
     inputs = np.array([[options.velocity, options.contact, options.angle]])
     brought = {name: np.array([value]) for name, value in covariates.items()}
-    prediction = model.predict(inputs, np.array([options.duration]), brought)
+    prediction = model.predict_rows(inputs, np.array([options.duration]), brought)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
     result = {
         "model": model.name,

@@ -70,7 +70,7 @@ def validate_recording(
     """Predict every window of a recording, as a server of the model would; tell as for `recorded_windows`."""
     windows, table = recorded_windows(model, path, rig, tell)
     check_table(model, table)
-    prediction = tabulate(model).predict(table.inputs, table.duration, table.covariates)
+    prediction = tabulate(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 

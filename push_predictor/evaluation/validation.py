@@ -40,7 +40,7 @@ class Comparison:
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
     """Predict every row of a table; the caller has checked it with `check_table`."""
-    prediction = model.predict(table.inputs, table.duration, table.covariates)
+    prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return comparison_of(model, table, prediction.mean, prediction.covariance)
 
 

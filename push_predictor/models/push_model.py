@@ -18,6 +18,8 @@ from push_predictor.models.predictors import (
     Scaling,
     scaled_features,
 )
+from push_predictor.models.pushes import Pushes
+from push_predictor.models.request import check_pushes
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray
@@ -78,10 +80,19 @@ class PushModel:
     training: PushTable
     provenance: Provenance
 
-    def predict(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
-        """Predict n pushes: inputs (n, 3: velocity m/s, contact, angle rad), duration (n,) s, covariates (n,) each.
+    def predict(self, pushes: Pushes) -> Prediction:
+        """Predict the outcomes of n pushes.
 
-        The caller checks requests from outside with `check_requests`; this does not. Raises KeyError where one of the
+        Raises RequestError that names the field, its value and what is accepted, for a push that the model cannot
+        predict or that lacks a covariate the model needs.
+        """
+        check_pushes(self, pushes)
+        return self.predict_rows(pushes.inputs, pushes.duration, pushes.covariates)
+
+    def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
+        """Predict n pushes unchecked: inputs (n, 3: velocity m/s, contact, angle rad), duration (n,) s, covariates.
+
+        `predict` checks them first, `check_requests` those of the services. Raises KeyError where one of the
         covariates that the model needs is missing; others are ignored.
         """
         push = Push(inputs, duration, covariates or {})

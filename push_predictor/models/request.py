@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, isfinite, pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.models.push_model import GaussianProcessPredictor, PushModel
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.pushes import Pushes
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import Array, BoolArray
+from push_predictor.types import Array, BoolArray, IntArray
+
+if TYPE_CHECKING:
+    from push_predictor.models.push_model import PushModel
 
 UNITS = {
     "elapsed_time": "s",
@@ -51,12 +56,13 @@ def check_request(
 
 def check_requests(model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array]) -> None:
     """The same for n pushes (n, 3) of one duration; the field in the error carries the index of the first bad push."""
-    _check(model, inputs, duration, covariates, indexed=True)
+    _check(model, inputs, duration, covariates, places=np.arange(len(inputs)))
 
 
 def _check(
-    model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array], indexed: bool = False
+    model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array], places: IntArray | None = None
 ) -> None:
+    """Places (n,): index of each push in the caller's list, for the error; None for a single push."""
     velocity, contact, angle = inputs.T
     rules: list[tuple[str, Array, BoolArray, str]] = [
         ("velocity", velocity, velocity > 0.0, "a finite number above 0, in m/s"),
@@ -67,14 +73,14 @@ def _check(
     for field, column, accepted, meaning in rules:
         bad = np.flatnonzero(~(accepted & np.isfinite(column)))
         if bad.size:
-            place = f"{field}[{bad[0]}]" if indexed else field
+            place = field if places is None else f"{field}[{places[bad[0]]}]"
             raise RequestError(place, float(column[bad[0]]), meaning)
     for name in model.needs:
         if name not in covariates:
             raise RequestError(f"covariate {name}", "missing", f"{_meaning(name)}: {model.name} needs it")
     _check_duration(model, duration)
     if (too_fast := np.flatnonzero(velocity * duration > _farthest(model))).size:
-        place = f"velocity[{too_fast[0]}]" if indexed else "velocity"
+        place = "velocity" if places is None else f"velocity[{places[too_fast[0]]}]"
         most = f"at most {FARTHEST / duration:.3g} m/s for {duration:g} s: a way of {FARTHEST:g} m"
         raise RequestError(place, float(velocity[too_fast[0]]), most)
 
@@ -94,6 +100,15 @@ def _check_duration(model: PushModel, duration: float) -> None:
         raise RequestError("duration", duration, "a finite number above 0, in s")
     if not low <= duration <= high:
         raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, near what {model.name} was trained on")
+
+
+def check_pushes(model: PushModel, pushes: Pushes) -> None:
+    """The same for pushes that may differ in duration; covariates that the model does not need are ignored."""
+    needed = {name: column for name, column in pushes.covariates.items() if name in model.needs}
+    for duration in np.unique(pushes.duration):
+        rows = np.flatnonzero(pushes.duration == duration)
+        columns = {name: column[rows] for name, column in needed.items()}
+        _check(model, pushes.inputs[rows], float(duration), columns, places=rows if len(pushes) > 1 else None)
 
 
 def check_table(model: PushModel, table: PushTable) -> None:

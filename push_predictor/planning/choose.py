@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 from push_predictor.errors import RequestError
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.repertoire import DRAWS, Pushes, Repertoire
+from push_predictor.planning.repertoire import DRAWS, Repertoire, StraightPushes
 from push_predictor.types import Array, IntArray
 
 DRAWS_AHEAD, OUTCOMES = 32, 16  # of a second push, of what the first may leave; powers of two fill evenly
@@ -45,7 +45,7 @@ class Choice:
     the slider: mean (3,) and covariance (3, 3) in the world.
     """
 
-    push: Pushes
+    push: StraightPushes
     probability: float
     expected: float
     mean: Array

@@ -87,7 +87,7 @@ def _displacements(
         return moved, known
     covariates = {name: column[held] for name, column in _covariates(sliders, meeting.touch.heading).items()}
     asked = np.full(len(held), windows.asked)
-    prediction = predictor.predict(meeting.touch.inputs[held], asked, covariates)
+    prediction = predictor.predict_rows(meeting.touch.inputs[held], asked, covariates)
     root = root_of(prediction.covariance)
     drawn = prediction.mean + np.einsum("pij,pj->pi", root, deviation[held])
     moved[held] = (windows.scale * meeting.share[held])[:, None] * drawn

@@ -25,7 +25,7 @@ DRAWS = 256  # of each outcome
 
 
 @dataclass(frozen=True, eq=False)
-class Pushes:
+class StraightPushes:
     """n straight pushes: inputs (n, 3: velocity m/s, contact, angle rad) at the touch, windows (n,) they last."""
 
     inputs: Array
@@ -34,9 +34,9 @@ class Pushes:
     def __len__(self) -> int:
         return len(self.windows)
 
-    def take(self, rows: IntArray | BoolArray) -> Pushes:
+    def take(self, rows: IntArray | BoolArray) -> StraightPushes:
         """The given rows (indices or mask)."""
-        return Pushes(self.inputs[rows], self.windows[rows])
+        return StraightPushes(self.inputs[rows], self.windows[rows])
 
 
 def push_grid(velocities: Sequence[float], contacts: Array, angles: Array) -> Array:
@@ -52,7 +52,7 @@ class Repertoire:
     mean (n, 3: m, m, rad), covariance (n, 3, 3).
     """
 
-    pushes: Pushes
+    pushes: StraightPushes
     mean: Array
     covariance: Array
 
@@ -92,4 +92,4 @@ def repertoire(
     if not sum(len(of_length) for of_length, *_ in ended):
         raise RequestError("pushes", len(inputs) * len(windows), "at least one that stays in the model's domain")
     order, lengths, poses = (np.concatenate(column) for column in zip(*ended, strict=True))
-    return Repertoire(Pushes(inputs[order], lengths), *moments(poses))
+    return Repertoire(StraightPushes(inputs[order], lengths), *moments(poses))

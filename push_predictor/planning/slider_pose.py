@@ -64,7 +64,7 @@ def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> Slid
     covariates = completed_covariates(push, touch, model.rig)
     check_request(model, velocity, contact, angle, push.duration, covariates)
     columns = {name: np.array([value]) for name, value in covariates.items()}
-    prediction = predictor.predict(touch.inputs, np.array([push.duration]), columns)
+    prediction = predictor.predict_rows(touch.inputs, np.array([push.duration]), columns)
     return SliderAfter(
         displaced(push.slider[None], touch.heading, prediction.mean)[0],
         covariance_in_world(prediction.covariance, touch.heading)[0],

@@ -196,7 +196,7 @@ def test_a_shorter_stride_gives_more_windows_to_train_on(place: Place, run):
 
 def test_predict_is_the_model(place: Place, run):
     model = load_model(Path(place.path("gp.pushmodel")))
-    expected = model.predict(np.array([[0.02, 0.1, 0.3]]), np.array([0.2]))
+    expected = model.predict_rows(np.array([[0.02, 0.1, 0.3]]), np.array([0.2]))
     found = run("predict", place.path("gp.pushmodel"), *PUSH, "--json", "-").json
     assert found["model"] == "gp" and found["in_domain"] is bool(expected.in_domain[0])
     sd = np.sqrt(np.diag(expected.covariance[0]))

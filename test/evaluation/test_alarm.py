@@ -148,7 +148,7 @@ def models() -> dict[str, PushModel]:
 
 
 def alarm_of(model: PushModel, table: PushTable):
-    prediction = model.predict(table.inputs, table.duration, table.covariates)
+    prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return judged(calibrate(model), table, prediction.mean, prediction.covariance)
 
 
@@ -167,7 +167,7 @@ def test_pushes_of_more_or_fewer_windows_than_those_trained_on_are_judged_alike(
 
 def test_training_pushes_are_judged_as_if_they_had_not_been_seen(models: dict[str, PushModel]):
     training, new = models["gp"].training, made_up(200, 4)
-    prediction = models["gp"].predict(new.inputs, new.duration)
+    prediction = models["gp"].predict_rows(new.inputs, new.duration)
     fresh = standardised(prediction.mean, prediction.covariance, new.outcomes).std(axis=0)
     assert standardised(*held_out(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(fresh, rel=0.15)
 
@@ -177,7 +177,7 @@ def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushMod
     model, table = models["analytical"], made_up(6, 5, friction=0.45)
     velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
     table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
-    prediction, calibration = model.predict(table.inputs, table.duration), calibrate(model)
+    prediction, calibration = model.predict_rows(table.inputs, table.duration), calibrate(model)
     judge = PushJudge(calibration)
     for push in table.pushes:
         rows = table.push_id == push
@@ -189,7 +189,7 @@ def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushMod
 
 def test_a_push_that_is_played_again_is_no_news(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 6)
-    judge, prediction = PushJudge(calibrate(model)), model.predict(table.inputs, table.duration)
+    judge, prediction = PushJudge(calibrate(model)), model.predict_rows(table.inputs, table.duration)
     for _ in range(3):
         judge.add(table, prediction.mean, prediction.covariance)
     assert judge.state.pushes == 10
@@ -199,7 +199,7 @@ def test_a_push_without_a_covariate_is_left_out_and_named(models: dict[str, Push
     model, table = models["analytical"], made_up(10, 7)
     heading = table.covariates["slider_heading"].copy()
     heading[4] = np.nan
-    judge, prediction = PushJudge(calibrate(model)), model.predict(table.inputs, table.duration)
+    judge, prediction = PushJudge(calibrate(model)), model.predict_rows(table.inputs, table.duration)
     judge.add(replace(table, covariates={"slider_heading": heading}), prediction.mean, prediction.covariance)
     assert judge.state.pushes == 9
     (reason,) = judge.left_out

@@ -212,7 +212,7 @@ def test_a_predicted_map_is_what_the_model_predicts_at_the_centres_of_its_cells(
         row, column = 20, 7
         contact = cells.contact[column : column + 2].mean() / square.outline.perimeter
         inputs = np.array([[0.02, contact, cells.angle[row : row + 2].mean()]])
-        expected = model.predict(inputs, np.array([0.2]))
+        expected = model.predict_rows(inputs, np.array([0.2]))
         assert expected.in_domain[0]
         np.testing.assert_allclose(shown.mean[row, column], expected.mean[0], rtol=1e-9)
         np.testing.assert_allclose(shown.sd[row, column] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)

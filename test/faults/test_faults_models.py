@@ -56,7 +56,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def told(model: PushModel) -> Prediction:
     rows = pushes(4, seed=9)
-    return model.predict(rows.inputs, rows.duration, rows.covariates)
+    return model.predict_rows(rows.inputs, rows.duration, rows.covariates)
 
 
 def same(one: Prediction, other: Prediction) -> bool:

@@ -142,7 +142,7 @@ def test_answers_come_from_the_server_of_the_namespace(both: Both):
     means = {}
     for cell, path in both.models.items():
         inputs = np.array([[0.02, 0.02 * k, 0.01 * k] for k in range(40)])
-        means[cell] = load_model(path).predict(inputs, np.full(40, 0.2)).mean
+        means[cell] = load_model(path).predict_rows(inputs, np.full(40, 0.2)).mean
         answered = np.array([answer.mean for answer in both.answers[cell]])
         assert np.allclose(answered, means[cell], rtol=0.0, atol=1e-5)
         assert both.listed[cell] == ["robot"]

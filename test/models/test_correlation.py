@@ -68,7 +68,7 @@ def without(model: PushModel) -> PushModel:
 
 def of(model: PushModel, inputs: Array) -> Array:
     """The correlation (n,) of dx and dtheta that a model's process has."""
-    c = model.predict(inputs, np.full(len(inputs), 0.2)).process_covariance
+    c = model.predict_rows(inputs, np.full(len(inputs), 0.2)).process_covariance
     return np.asarray(c[:, 0, 2] / np.sqrt(c[:, 0, 0] * c[:, 2, 2]))
 
 
@@ -159,7 +159,7 @@ def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_pushes_that_it_has_not_seen_are_likelier_with_it(kind: str) -> None:
     model, new = trained(kind), pushes(400, 1, 0.8)
-    with_it, plain = (m.predict(new.inputs, new.duration) for m in (model, without(model)))
+    with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
         with_it.mean, with_it.covariance, new.outcomes
     )

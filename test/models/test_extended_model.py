@@ -84,7 +84,7 @@ def bases() -> dict[str, PushModel]:
 
 
 def predicted(model: Any, table: PushTable) -> Prediction:
-    return model.predict(table.inputs, table.duration, table.covariates)
+    return model.predict_rows(table.inputs, table.duration, table.covariates)
 
 
 def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
@@ -262,9 +262,9 @@ def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]
     told = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
     push = Push(inputs, table.duration, told)
     shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
-    ours, theirs = (m.predict(inputs, table.duration).mean for m in (model, bases["gp"]))
+    ours, theirs = (m.predict_rows(inputs, table.duration).mean for m in (model, bases["gp"]))
     np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
-    np.testing.assert_allclose(tabulate(model).predict(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
+    np.testing.assert_allclose(tabulate(model).predict_rows(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
 
 
 # --- what it asks for -------------------------------------------------------------------------------------------
@@ -561,7 +561,7 @@ def test_the_service_refuses_a_push_without_the_covariate_by_name(ask: Callable[
 def test_the_service_answers_with_the_covariate(ask: Callable[..., Any], model_file: Path) -> None:
     table = pushes(10, 1)
     time = {"elapsed_time": table.covariates["elapsed_time"]}
-    expected = tabulate(load_model(model_file)).predict(table.inputs, table.duration, time)
+    expected = tabulate(load_model(model_file)).predict_rows(table.inputs, table.duration, time)
     batch = ask("predict_push_batch", query_to_batch_request(PushQuery("", table.inputs, 0.2, time)))
     assert_same(prediction_from_response(batch), expected, rtol=1e-9, atol=1e-15)
     first = {name: float(column[0]) for name, column in time.items()}

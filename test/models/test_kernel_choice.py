@@ -242,7 +242,7 @@ def test_a_loaded_model_has_its_kernels(
 ) -> None:
     save_model(models[choice], tmp_path / "m")
     loaded, table = load_model(tmp_path / "m"), noisy_pushes(50, seed=2)
-    a, b = (m.predict(table.inputs, table.duration) for m in (models[choice], loaded))
+    a, b = (m.predict_rows(table.inputs, table.duration) for m in (models[choice], loaded))
     assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
     assert [r.parameters.choice for r in loaded.predictor.regressions] == [choice] * 3
 
@@ -297,7 +297,7 @@ def test_a_served_model_is_true_to_it_by_a_table_or_without(
     models: dict[KernelChoice, PushModel], choice: KernelChoice
 ) -> None:
     answers, table = tabulate(models[choice]), noisy_pushes(60)
-    tabulated, exact = (m.predict(table.inputs, table.duration) for m in (answers, models[choice]))
+    tabulated, exact = (m.predict_rows(table.inputs, table.duration) for m in (answers, models[choice]))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
     assert np.max(np.abs(tabulated.mean - exact.mean) / sd) < 1e-3
     ratio = np.diagonal(tabulated.covariance, axis1=1, axis2=2) / sd**2

@@ -59,7 +59,7 @@ def test_a_model_predicts_pushes_it_has_not_seen(models: dict[str, PushModel], k
 def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
     rng = np.random.default_rng(3)
     inputs = np.column_stack([rng.uniform(1e-3, 2.0, 300), rng.random(300), rng.uniform(-1.57, 1.57, 300)])
-    prediction = models[kind].predict(inputs, np.full(300, 0.2))
+    prediction = models[kind].predict_rows(inputs, np.full(300, 0.2))
     assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
     assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
     assert not np.all(prediction.in_domain)
@@ -72,7 +72,7 @@ def test_the_four_sides_of_a_square_are_one(
 ) -> None:
     one, other = (np.array([[0.02, (k + fraction) / 4.0, angle]]) for k in (0, side))
     for kind in ("vhgp", "gp"):
-        a, b = (models[kind].predict(inputs, np.array([0.2])) for inputs in (one, other))
+        a, b = (models[kind].predict_rows(inputs, np.array([0.2])) for inputs in (one, other))
         assert a.mean == pytest.approx(b.mean, abs=1e-9)
         assert a.covariance == pytest.approx(b.covariance, rel=1e-6, abs=1e-15)
 
@@ -161,7 +161,7 @@ def test_a_loaded_model_predicts_what_the_saved_one_did(
 ) -> None:
     save_model(models[kind], tmp_path / "m")
     loaded, table = load_model(tmp_path / "m"), noisy_pushes(50, seed=2)
-    a, b = (m.predict(table.inputs, table.duration) for m in (models[kind], loaded))
+    a, b = (m.predict_rows(table.inputs, table.duration) for m in (models[kind], loaded))
     assert np.array_equal(a.mean, b.mean) and np.array_equal(a.covariance, b.covariance)
     assert (loaded.name, loaded.kind, loaded.provenance) == (f"a_{kind}", kind, models[kind].provenance)
     assert loaded.training.push_id.tolist() == models[kind].training.push_id.tolist()
@@ -173,7 +173,7 @@ def test_no_damaged_copy_of_a_model_is_served_with_other_numbers(models: dict[st
     save_model(models["gp"], tmp_path / "m")
     whole, rng = (tmp_path / "m").read_bytes(), np.random.default_rng(0)
     probe = np.array([[0.02, 0.1, 0.2]]), np.array([0.2])
-    expected = models["gp"].predict(*probe).mean
+    expected = models["gp"].predict_rows(*probe).mean
     refused = 0
     for k in range(150):
         data = bytearray(whole)
@@ -183,7 +183,7 @@ def test_no_damaged_copy_of_a_model_is_served_with_other_numbers(models: dict[st
             data[int(rng.integers(0, len(data)))] ^= 1 << int(rng.integers(0, 8))
         (tmp_path / "d").write_bytes(data)
         try:
-            found = load_model(tmp_path / "d").predict(*probe).mean
+            found = load_model(tmp_path / "d").predict_rows(*probe).mean
         except ModelFileError as error:
             refused += 1
             assert str(tmp_path / "d") in str(error)

@@ -212,11 +212,11 @@ def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) 
     save_model(model, tmp_path / "sparse.pushmodel")
     again = load_model(tmp_path / "sparse.pushmodel")
     push = rows.inputs[:40], rows.duration[:40]
-    np.testing.assert_array_equal(again.predict(*push).covariance, model.predict(*push).covariance)
+    np.testing.assert_array_equal(again.predict_rows(*push).covariance, model.predict_rows(*push).covariance)
     tabulated = tabulate(again)
     assert tabulated.domain is not None, tabulated.how
-    variance = np.diagonal(model.predict(*push).covariance, axis1=1, axis2=2)
-    of_table = np.diagonal(tabulated.predict(*push).covariance, axis1=1, axis2=2)
+    variance = np.diagonal(model.predict_rows(*push).covariance, axis1=1, axis2=2)
+    of_table = np.diagonal(tabulated.predict_rows(*push).covariance, axis1=1, axis2=2)
     np.testing.assert_allclose(of_table, variance, rtol=1e-2)
     truth = 1e-6 * np.exp(4.0 * rows.inputs[:40, 2] - 2.0)
     assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4

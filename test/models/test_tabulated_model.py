@@ -102,7 +102,7 @@ def inside(model: PushModel, n: int, seed: int = 5) -> Array:
 
 
 def of(model: PushModel | TabulatedModel, inputs: Array) -> Prediction:
-    return model.predict(inputs, np.full(len(inputs), 0.2))
+    return model.predict_rows(inputs, np.full(len(inputs), 0.2))
 
 
 def variances(covariance: Array) -> Array:

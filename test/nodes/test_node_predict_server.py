@@ -158,7 +158,7 @@ def server(folder):
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
 def test_it_answers_what_the_model_says(server, folder, kind):
     model = tabulate(load_model(folder / f"{kind}.model"))
-    expected = model.predict(MANY, np.full(len(MANY), 0.2))
+    expected = model.predict_rows(MANY, np.full(len(MANY), 0.2))
     answered = prediction_from_response(server.batch(MANY, model=kind))
     for k, push in enumerate(MANY):
         single = prediction_from_response(server.push(push, model=kind))

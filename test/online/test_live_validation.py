@@ -61,7 +61,7 @@ def models() -> dict[str, PushModel]:
 
 def predict(model: PushModel, window: PushWindow) -> Prediction:
     inputs = np.array([[window.velocity, window.contact, window.angle]])
-    return model.predict(inputs, np.array([window.duration]))
+    return model.predict_rows(inputs, np.array([window.duration]))
 
 
 def answered(models: dict[str, PushModel], windows: list[PushWindow], shuffle: int = 0) -> LiveValidation:

@@ -124,7 +124,7 @@ def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -
     inputs = np.tile(grid.typical_inputs[3], (len(rows), 1))
     found = log_densities(pushes, fit, inputs, rows)
     model = trained(pushes, fit)
-    prediction = model.predict(inputs, np.full(len(rows), 0.2))
+    prediction = model.predict_rows(inputs, np.full(len(rows), 0.2))
     variance = np.diagonal(prediction.covariance, axis1=1, axis2=2)
     expected = -0.5 * (np.log(2.0 * np.pi * variance) + (rows - prediction.mean) ** 2 / variance)
     np.testing.assert_allclose(found.gaussian, expected, atol=1e-9)

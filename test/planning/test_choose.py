@@ -14,7 +14,7 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.push_model import Prediction
 from push_predictor.planning.choose import choose_push
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.repertoire import Pushes, Repertoire, push_grid, repertoire
+from push_predictor.planning.repertoire import Repertoire, StraightPushes, push_grid, repertoire
 from push_predictor.planning.unscented import PusherGeometry
 
 SQUARE = PusherGeometry(shape_outline("rect1"), 0.00475, 0.2)
@@ -27,7 +27,7 @@ def made_up(means, sds) -> Repertoire:
     sds = sds if sds.ndim == 2 else np.tile(sds[:, None], 3)
     inputs = np.column_stack([np.full(len(means), 0.02), 0.01 * np.arange(len(means)), np.zeros(len(means))])
     covariance = np.einsum("ni,ij->nij", sds**2, np.eye(3))
-    return Repertoire(Pushes(inputs, np.ones(len(means), dtype=np.int64)), means, covariance)
+    return Repertoire(StraightPushes(inputs, np.ones(len(means), dtype=np.int64)), means, covariance)
 
 
 def number(choice) -> int:

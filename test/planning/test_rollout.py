@@ -382,7 +382,7 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
         rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.0, 0.2]], 4000)
         heading_of_push = np.array([heading_of(0.125, 0.0, model)])
         covariates = {"slider_heading": np.array([heading])}
-        expected = model.predict(np.array([[0.02, 0.125, 0.0]]), np.array([0.2]), covariates)
+        expected = model.predict_rows(np.array([[0.02, 0.125, 0.0]]), np.array([0.2]), covariates)
         along = displaced(AT_REST[None], heading_of_push, expected.mean)[0]
         back = rotate(rolled.mean[0, :2], np.array(-heading))
         error = 4.0 * np.sqrt(np.diagonal(expected.covariance[0]).max() / 4000)

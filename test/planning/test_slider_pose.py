@@ -88,7 +88,7 @@ def test_it_is_what_the_model_says_of_the_contact_that_was_meant(shape: str, ang
     model = model_of(shape)
     for contact in np.arange(24) / 24.0 + 0.02:  # every edge of every outline
         push = push_at(shape, contact, angle)
-        expected = model.predict(np.array([[SPEED, contact, angle]]), np.array([DURATION]))
+        expected = model.predict_rows(np.array([[SPEED, contact, angle]]), np.array([DURATION]))
         heading = np.arctan2(push.velocity[1], push.velocity[0])
         x, y, turn = expected.mean[0]
         by_hand = push.slider + [
@@ -149,7 +149,7 @@ def test_the_covariance_is_that_of_samples_carried_into_the_world(contact: float
     along = np.array([np.cos(heading), np.sin(heading), 0.0])
     across = np.array([-np.sin(heading), np.cos(heading), 0.0])
     axes = np.stack([along, across, [0.0, 0.0, 1.0]])
-    in_push_frame = model.predict(np.array([[SPEED, contact, angle]]), np.array([DURATION])).covariance[0]
+    in_push_frame = model.predict_rows(np.array([[SPEED, contact, angle]]), np.array([DURATION])).covariance[0]
     np.testing.assert_allclose(axes @ after.covariance @ axes.T, in_push_frame, rtol=1e-6, atol=1e-16)
 
 
@@ -157,9 +157,9 @@ def test_a_covariance_off_the_diagonal_is_carried_over() -> None:
     """Made-up predictions with a full covariance, whatever the models of today know."""
 
     class Correlated(PushModel):
-        def predict(self, inputs, duration, covariates=None):
+        def predict_rows(self, inputs, duration, covariates=None):
             full = np.array([[4e-8, 1e-8, 3e-7], [1e-8, 1e-8, 2e-7], [3e-7, 2e-7, 3e-5]])
-            return replace(super().predict(inputs, duration, covariates), covariance=full[None])
+            return replace(super().predict_rows(inputs, duration, covariates), covariance=full[None])
 
     base = model_of("rect1")
     model = Correlated(base.name, base.kind, base.rig, base.predictor, base.training, base.provenance)
@@ -172,7 +172,7 @@ def test_a_served_model_answers_as_its_table_does() -> None:
     tabulated = tabulate(model_of("rect1", "gp"))
     assert isinstance(tabulated, TabulatedModel) and tabulated.tabulated
     push = push_at("rect1", 0.1, 0.3)
-    ours = tabulated.predict(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
+    ours = tabulated.predict_rows(np.array([[SPEED, 0.1, 0.3]]), np.array([DURATION]))
     heading = np.arctan2(push.velocity[1:], push.velocity[:1])
     after = slider_after(tabulated, push)
     np.testing.assert_allclose(after.pose, displaced(push.slider[None], heading, ours.mean)[0], atol=1e-9)
@@ -212,7 +212,7 @@ def test_at_a_corner_the_edge_that_faces_the_tip_is_pushed() -> None:
 def test_at_a_corner_the_other_edge_is_pushed_where_the_nearer_is_not(towards: float) -> None:
     """Driving along -x pushes on edge 2 and slides along edge 3, whichever is nearer to the tip."""
     model = model_of("rect1")
-    expected = model.predict(np.array([[SPEED, 0.75 - 1e-12, 0.0]]), np.array([DURATION])).mean[0]
+    expected = model.predict_rows(np.array([[SPEED, 0.75 - 1e-12, 0.0]]), np.array([DURATION])).mean[0]
     after = slider_after(model, at_corner(towards, np.pi))
     np.testing.assert_allclose(after.pose, expected * [-1.0, -1.0, 1.0], atol=1e-9)
 
@@ -230,7 +230,7 @@ def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
     recording, tabulated = read_recording(BAGS / "square_abs_test"), tabulate(model_of("rect1", "vhgp"))
     windows = find_windows(recording, recording.rig)[::4]
     table = windows_to_table(windows)
-    shown = tabulated.predict(table.inputs, table.duration, table.covariates)
+    shown = tabulated.predict_rows(table.inputs, table.duration, table.covariates)
     headings = np.array([window.push_heading for window in windows])
     poses = displaced(np.array([window.slider_start for window in windows]), headings, shown.mean)
     spreads = covariance_in_world(shown.covariance, headings)
@@ -266,7 +266,7 @@ def test_what_the_poses_tell_need_not_be_brought(name: str) -> None:
     assert model.needs == (name,)
     heading = float(np.arctan2(push.velocity[1], push.velocity[0]))
     value = dict(zip(TOLD, (0.4, -0.3, 7.0 - 2.0 * np.pi, heading, 4e-4), strict=True))[name]
-    expected = model.predict(np.array([[SPEED, 0.1, -0.5]]), np.array([DURATION]), {name: np.array([value])})
+    expected = model.predict_rows(np.array([[SPEED, 0.1, -0.5]]), np.array([DURATION]), {name: np.array([value])})
     after = slider_after(model, push)
     np.testing.assert_allclose(
         after.pose, displaced(push.slider[None], np.array([heading]), expected.mean)[0], atol=1e-9
@@ -350,7 +350,7 @@ def test_an_outline_with_a_notch_is_touched_where_the_tip_is() -> None:
     model = replace(model_of("rect1"), rig=Rig("c", outline, RADIUS, "abs", 0.8))
     tip = np.array([RADIUS, 0.0]) - Outline(vertices).centroid
     push = WorldPush(np.zeros(3), tip, np.array([-SPEED, 0.0]), DURATION)
-    expected = model.predict(np.array([[SPEED, *contact_and_angle(outline, tip)]]), np.array([DURATION])).mean[0]
+    expected = model.predict_rows(np.array([[SPEED, *contact_and_angle(outline, tip)]]), np.array([DURATION])).mean[0]
     np.testing.assert_allclose(slider_after(model, push).pose, expected * [-1.0, -1.0, 1.0], atol=1e-9)
 
 

@@ -26,7 +26,7 @@ def test_it_was_trained_on_the_simulators_recording_and_nothing_else():
 
 def test_its_covariances_are_full():
     model = load_model(share_path(*DEFAULT_MODEL))
-    covariance = model.predict(model.training.inputs, model.training.duration).covariance
+    covariance = model.predict_rows(model.training.inputs, model.training.duration).covariance
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     assert np.abs(covariance[:, 0, 1] / (sd[:, 0] * sd[:, 1])).max() > 0.3
 

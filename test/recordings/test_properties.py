@@ -233,7 +233,7 @@ def test_covariances_are_symmetric_and_positive_definite_in_and_out_of_the_domai
     predictor = tabulated(shape, kind) if from_table else model_of(shape, kind)
     if kind == "analytical":
         velocity = min(velocity, 0.2)  # mechanics is integrated along the way: metres take minutes, and are refused
-    prediction: Prediction = predictor.predict(np.array([[velocity, contact, angle]]), np.array([0.2]))
+    prediction: Prediction = predictor.predict_rows(np.array([[velocity, contact, angle]]), np.array([0.2]))
     (total,), (process,) = prediction.covariance, prediction.process_covariance
     for covariance in (total, process):
         assert np.array_equal(covariance, covariance.T)

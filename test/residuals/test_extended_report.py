@@ -70,7 +70,7 @@ def test_a_map_is_drawn_at_the_middle_of_the_covariates(base: PushModel, table: 
     contact = cells.contact[7:9].mean() / base.rig.outline.perimeter
     inputs = np.array([[0.02, contact, cells.angle[20:22].mean()]])
     columns = {name: np.array([value]) for name, value in held.items()}
-    expected = model.predict(inputs, np.array([0.2]), columns)
+    expected = model.predict_rows(inputs, np.array([0.2]), columns)
     assert expected.in_domain[0]
     np.testing.assert_allclose(shown.mean[20, 7], expected.mean[0], rtol=1e-9)
     np.testing.assert_allclose(shown.sd[20, 7] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)

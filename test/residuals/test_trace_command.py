@@ -113,7 +113,7 @@ def test_the_extended_model_is_saved_as_it_is(place: Path, tmp_path: Path, found
     table = pushes(5, 3)
     assert extended.extended is not None
     one, other = (
-        m.predict(table.inputs, table.duration, table.covariates) for m in (load_model(path), extended.extended)
+        m.predict_rows(table.inputs, table.duration, table.covariates) for m in (load_model(path), extended.extended)
     )
     np.testing.assert_allclose(one.mean, other.mean, rtol=1e-12)
 

@@ -122,7 +122,7 @@ def push_map(
     angles, contacts = np.meshgrid(angle, contact, indexing="ij")
     inputs = np.column_stack([np.full(contacts.size, velocity), contacts.ravel(), angles.ravel()])
     covariates = covariates_of_map(model.rig.outline, held or {}, inputs)
-    prediction = model.predict(inputs, np.full(len(inputs), duration), covariates)
+    prediction = model.predict_rows(inputs, np.full(len(inputs), duration), covariates)
     sd = np.sqrt(np.diagonal(prediction.covariance, axis1=1, axis2=2))
     hidden = ~prediction.in_domain[:, None]
     shape = (*cells.shape, len(OUTPUTS))

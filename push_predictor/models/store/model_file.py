@@ -150,7 +150,7 @@ def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -
 def _check_answers(model: PushModel) -> None:
     """Raise ValueError unless the model gives some of its own training pushes a Gaussian."""
     rows = model.training.take(np.linspace(0, len(model.training) - 1, PROBES).astype(int))
-    found = model.predict(rows.inputs, rows.duration, rows.covariates)
+    found = model.predict_rows(rows.inputs, rows.duration, rows.covariates)
     for name, values in (("mean", found.mean), ("covariance", found.covariance)):
         if not np.all(np.isfinite(values)):
             raise ValueError(f"the {name} of a training push is not finite")

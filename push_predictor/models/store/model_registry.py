@@ -131,7 +131,7 @@ def _tabulated(path: Path) -> TabulatedModel:
         tabulated = tabulate(model)
         # The first prediction fills what is left of caches; no request should wait for that.
         first = model.training.take(np.arange(1))
-        tabulated.predict(first.inputs, first.duration, first.covariates)
+        tabulated.predict_rows(first.inputs, first.duration, first.covariates)
     except Exception as error:
         raise ModelFileError(f"{path}: the model cannot be served ({type(error).__name__}: {error})") from None
     return tabulated

@@ -71,13 +71,13 @@ class TabulatedModel:
         """Whether pushes in the domain are answered from a table."""
         return self.domain is not None
 
-    def predict(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
+    def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
         """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same.
 
         Of an extended model the base is tabulated; the effects are computed and added.
         """
         if self.domain is None:
-            return self._quick.predict(inputs, duration, covariates)
+            return self._quick.predict_rows(inputs, duration, covariates)
         prediction, predictor = self._of_base(self.domain, inputs, duration), self._quick.predictor
         if not isinstance(predictor, ExtendedPredictor):
             return prediction
@@ -97,11 +97,11 @@ class TabulatedModel:
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         base = self.model.base
         if len(inputs) == 1:
-            return domain.predict_one(inputs[0].tolist()) or base.predict(inputs, duration)
+            return domain.predict_one(inputs[0].tolist()) or base.predict_rows(inputs, duration)
         inside, prediction = domain.predict(inputs)
         if prediction is not None:
             return prediction
-        exact = base.predict(inputs[~inside], duration[~inside])
+        exact = base.predict_rows(inputs[~inside], duration[~inside])
         if not inside.any():
             return exact
         return _merged(inside, self._of_base(domain, inputs[inside], duration[inside]), exact)
@@ -140,7 +140,7 @@ def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:
     inputs = _probes(model)
     inside, table = domain.predict(inputs)
     assert table is not None, inputs[~inside]
-    exact = model.predict(inputs, np.full(len(inputs), model.training.duration[0]))
+    exact = model.predict_rows(inputs, np.full(len(inputs), model.training.duration[0]))
     sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
     of_mean = np.max(np.abs(table.mean - exact.mean) / sd)
     of_outcome = relative_error(table.covariance, exact.covariance)

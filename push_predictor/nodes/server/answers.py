@@ -38,7 +38,7 @@ def answer_push(shelf: ModelRegistry, request: Any, response: Any) -> None:
     tabulated = shelf.get(query.model)
     covariates = {name: float(column[0]) for name, column in query.covariates.items()}
     check_request(tabulated.model, request.velocity, request.contact, request.angle, query.duration, covariates)
-    prediction = tabulated.predict(query.inputs, np.array([query.duration]), query.covariates)
+    prediction = tabulated.predict_rows(query.inputs, np.array([query.duration]), query.covariates)
     _check_finite(tabulated, prediction, 0)
     fill_response(response, prediction)
 
@@ -60,7 +60,7 @@ def answer_batch(go_on: Callable[[], None], shelf: ModelRegistry, request: Any, 
         go_on()
         rows = slice(start, start + ROWS_AT_ONCE)
         inputs, covariates = query.inputs[rows], {name: column[rows] for name, column in query.covariates.items()}
-        prediction = tabulated.predict(inputs, np.full(len(inputs), query.duration), covariates)
+        prediction = tabulated.predict_rows(inputs, np.full(len(inputs), query.duration), covariates)
         _check_finite(tabulated, prediction, start)
         extend_batch_response(response, prediction)
     response.success = True

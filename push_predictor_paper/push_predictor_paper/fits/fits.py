@@ -99,7 +99,7 @@ class Answer:
 
 def ask(pushes: PushSet, fit: Fit, inputs: Array) -> Answer:
     """Train a model and ask it for the pushes inputs (m, 3), each a window long."""
-    prediction = trained(pushes, fit).predict(inputs, np.full(len(inputs), WINDOW))
+    prediction = trained(pushes, fit).predict_rows(inputs, np.full(len(inputs), WINDOW))
     sd, process_sd = (
         np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         for covariance in (prediction.covariance, prediction.process_covariance)
