@@ -25,7 +25,7 @@ from benchmarks.blind_score import wilson
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.evaluation.alarm.scores import Calibration, calibrate, judged
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
@@ -110,7 +110,9 @@ def case_of(seed: int) -> tuple[PushModel, PushTable, PushTable, int]:
     plain, other = (later_spec(rig, rng, LATER) for _ in range(2))
     change = int(rng.integers(round(SHARES[0] * LATER), round(SHARES[1] * LATER)))
     rise = Changes(contact_friction=partial(_risen, change))
-    model = train_model(table_of(rig), simulated_rig(rig), "vhgp", name=f"{seed}", n_train=ROWS, seed=seed)
+    model = train_model(
+        table_of(rig), simulated_rig(rig), "vhgp", name=f"{seed}", options=TrainingOptions(n_train=ROWS, seed=seed)
+    )
     return model, table_of(plain), table_of(replace(other, changes=rise)), change
 
 

@@ -41,7 +41,7 @@ from benchmarks.blind_library import library_without
 from benchmarks.blind_oracle import oracle_gain
 from benchmarks.blind_score import markdown_of, score_of
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
@@ -154,7 +154,10 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     assert rig is not None  # the simulator knows its rig
     table = windows_to_table(find_windows(training, rig))
     rows = min(size.rows, len(table))
-    save_model(train_model(table, rig, size.kind, name=f"{number:03d}", n_train=rows, seed=seed), folder / MODEL)
+    save_model(
+        train_model(table, rig, size.kind, name=f"{number:03d}", options=TrainingOptions(n_train=rows, seed=seed)),
+        folder / MODEL,
+    )
     told = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
     known = {key: value for key, value in asdict(replace(drawn, act=Changes())).items() if key != "act"}
     (truth / f"{number:03d}.json").write_text(json.dumps({**told, "pushes": len(later.pushes), **known}, indent=1))

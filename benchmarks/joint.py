@@ -29,7 +29,7 @@ from push_predictor.models.correlation import Correlation
 from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -140,7 +140,7 @@ def _simulated(bags: Path, kind: str, sizes: Sequence[int]) -> None:
         parts = []
         for seed in range(FOLDS):
             start = time.process_time()
-            model = train_model(train, rig, kind, name=kind, n_train=n, seed=seed)
+            model = train_model(train, rig, kind, name=kind, options=TrainingOptions(n_train=n, seed=seed))
             parts.append(judged(model, test, time.process_time() - start))
         print(_row(n, parts), flush=True)
 

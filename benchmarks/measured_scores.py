@@ -14,7 +14,7 @@ from push_predictor.evaluation.metrics import COVERAGE_LEVELS
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -41,7 +41,7 @@ class Fold:
 def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False) -> Fold:
     """Train on one table, predict another."""
     start = time.process_time()
-    model = train_model(table, rig, kind, name=kind, fit=fit)
+    model = train_model(table, rig, kind, name=kind, options=TrainingOptions(fit=fit))
     cpu = time.process_time() - start
     return Fold(model, compare(model, test), model.predict_rows(test.inputs, test.duration).in_domain, cpu)
 

@@ -47,7 +47,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Load, train, save."""
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.models.train import inducing_inputs, train_model, training_rows
+    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
     from push_predictor.recordings.load import load_data, load_rig_for
     from push_predictor.recordings.windows.push_window import WindowOptions
 
@@ -73,10 +73,9 @@ def run(options: argparse.Namespace) -> None:
             options.model,
             name=options.name or options.out.stem,
             sources=[path.name for path in options.data],
-            n_train=options.n_train,
-            seed=options.seed,
-            fit=options.fit,
-            inducing=options.inducing,
+            options=TrainingOptions(
+                n_train=options.n_train, seed=options.seed, fit=options.fit, inducing=options.inducing
+            ),
         )
     save_model(model, options.out)
     result = {

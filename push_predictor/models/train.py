@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,10 +32,30 @@ from push_predictor.types import Array, IntArray
 
 DEFAULT_ROWS = 1000
 FEWEST_ROWS = 10
-MOST_DENSE_ROWS = (
-    2000  # a dense VHGP of so many takes 46 CPU s and 240 MB, one of twice as many eight and four times that
-)
-CONSTANT = 1e-9  # a feature whose spread is below this part of its size does not vary
+MOST_DENSE_ROWS = 2000  # a dense VHGP takes 46 CPU s and 240 MB; with twice the rows eight and four times as much
+CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """How to train a model. Raises TrainingError for a value that no training accepts.
+
+    n_train: draw this many rows at random with default_rng(seed). None takes all rows up to 1000; of more, it draws
+    1000 evenly over the pushes. fit: estimate friction and pressure of an analytical model; otherwise the textbook's
+    values are used. kernels: of a learned model. inducing: number of inducing inputs of a VHGP. None trains a dense
+    VHGP on up to MOST_DENSE_ROWS rows, and beyond that a sparse one with DEFAULT_INDUCING.
+    """
+
+    n_train: int | None = None
+    seed: int = 0
+    fit: bool = False
+    kernels: KernelChoice = DEFAULT_CHOICE
+    inducing: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("n_train", self.n_train), ("inducing", self.inducing)):
+            if value is not None and value < 1:
+                raise TrainingError(f"{name}: {value} is not accepted, give 1 or more")
 
 
 def train_model(
@@ -45,57 +65,50 @@ def train_model(
     *,
     name: str,
     sources: Sequence[str] = (),
-    n_train: int | None = None,
-    seed: int = 0,
-    fit: bool = False,
-    choice: KernelChoice = DEFAULT_CHOICE,
-    inducing: int | None = None,
+    options: TrainingOptions = TrainingOptions(),
 ) -> PushModel:
     """Train a model of one of KINDS on rows of the table.
 
-    n_train: that many rows at random by default_rng(seed); None takes all up to 1000, beyond that 1000 drawn evenly
-    over the pushes. fit: estimate the analytical model's friction and pressure instead of taking the textbook's.
-    choice: the kernels of a learnt model. inducing: how many inducing inputs a VHGP is to have; None for a dense one of
-    up to MOST_DENSE_ROWS rows, and for a usual number beyond.
-    Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or inducing inputs where no model
-    has them.
+    name: the model's name in files and requests. sources: names of the recordings or tables, for its provenance.
+    Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or options that the kind does not
+    have.
     """
     if kind not in KINDS:
         raise TrainingError(f"model: {kind!r} is not accepted, give one of {', '.join(KINDS)}")
-    rows = table.take(training_rows(table, n_train, seed))
+    rows = table.take(training_rows(table, options.n_train, options.seed))
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
-    most_inducing = inducing_inputs(kind, len(rows), inducing)
-    predictor = (
-        _analytical(rows, rig, fit) if kind == "analytical" else _learned(rows, rig, kind, choice, most_inducing)
+    inducing = inducing_inputs(kind, len(rows), options.inducing)
+    predictor: GaussianProcessPredictor | AnalyticalPredictor = (
+        _analytical(rows, rig, options.fit)
+        if kind == "analytical"
+        else _learned(rows, rig, kind, options.kernels, inducing)
     )
-    provenance = Provenance(tuple(sources), len(rows.pushes), seed, __version__)
+    provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
     return PushModel(name, kind, rig, predictor, rows, provenance)
 
 
 def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | None:
-    """How many inducing inputs a model of so many rows gets, None for a dense one; see train_model."""
+    """Number of inducing inputs of a model of this many rows, None for a dense one; see TrainingOptions."""
     if wanted is None:
         return DEFAULT_INDUCING if kind == "vhgp" and rows > MOST_DENSE_ROWS else None
     if kind != "vhgp":
         raise TrainingError(f"inducing: {wanted} is not accepted, only a vhgp has inducing inputs")
-    if wanted < 1:
-        raise TrainingError(f"inducing: {wanted} is not accepted, give 1 or more")
-    return wanted
+    return TrainingOptions(inducing=wanted).inducing
 
 
 def training_rows(table: PushTable, n_train: int | None, seed: int) -> IntArray:
-    """Indices of the training rows; see train_model."""
+    """Indices of the training rows; see TrainingOptions."""
     count = len(table)
     if n_train is None:
         return np.arange(count) if count <= DEFAULT_ROWS else _even_over_pushes(table, DEFAULT_ROWS, seed)
     if not 0 < n_train <= count:
-        raise TrainingError(f"n_train: {n_train} is not accepted, give 1 to {count}, the rows there are")
+        raise TrainingError(f"n_train: {n_train} is not accepted, give 1 to {count}, the number of rows")
     return np.sort(np.random.default_rng(seed).permutation(count)[:n_train])
 
 
 def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
-    """Every push gives its k-th random row before any gives its (k+1)-th."""
+    """Draw one random row of each push, then a second one of each, until there are n_train."""
     order = np.random.default_rng(seed).permutation(len(table))
     turn = np.empty(len(table), dtype=np.int64)
     taken: dict[str, int] = {}
@@ -106,26 +119,26 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
 
 
 def _learned(
-    rows: PushTable, rig: Rig, kind: str, choice: KernelChoice, most_inducing: int | None
+    rows: PushTable, rig: Rig, kind: str, kernels: KernelChoice, inducing: int | None
 ) -> GaussianProcessPredictor:
     scaling = _scaling(rows, rig)
     features = scaled_features(rig, scaling, rows.inputs)
     scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    regressions = (_regression(features, column, kind, choice, most_inducing) for column in scaled.T)
+    regressions = (_regression(features, column, kind, kernels, inducing) for column in scaled.T)
     predictor = GaussianProcessPredictor(rig, scaling, tuple(regressions))
     return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
 
 
 def _regression(
-    features: Array, column: Array, kind: str, choice: KernelChoice, most_inducing: int | None
+    features: Array, column: Array, kind: str, kernels: KernelChoice, inducing: int | None
 ) -> GaussianProcess | VHGP | SparseVHGP:
     if kind == "gp":
-        return fit_gp(features, column, choice)
-    if most_inducing is None:
-        return fit_vhgp(features, column, choice)
-    if choice != DEFAULT_CHOICE:
-        raise TrainingError(f"{choice}: a sparse VHGP has squared exponential kernels and no nugget")
-    return fit_sparse_vhgp(features, column, most_inducing)
+        return fit_gp(features, column, kernels)
+    if inducing is None:
+        return fit_vhgp(features, column, kernels)
+    if kernels != DEFAULT_CHOICE:
+        raise TrainingError(f"{kernels}: a sparse VHGP has squared exponential kernels and no nugget")
+    return fit_sparse_vhgp(features, column, inducing)
 
 
 def _scaling(rows: PushTable, rig: Rig) -> Scaling:
@@ -135,9 +148,13 @@ def _scaling(rows: PushTable, rig: Rig) -> Scaling:
     outcome_sd = rows.outcomes.std(axis=0)
     for name, sd in zip(OUTPUTS, outcome_sd, strict=True):
         if not sd > 0.0:
-            raise TrainingError(f"{name}: does not vary over the {len(rows)} training windows, nothing can be learnt")
+            raise TrainingError(
+                f"{name}: does not vary over the {len(rows)} training windows: there is nothing to learn"
+            )
     if not columns.size:
-        raise TrainingError("velocity, contact and angle are the same in all training windows, nothing can be learnt")
+        raise TrainingError(
+            "velocity, contact and angle are the same in all training windows: there is nothing to learn"
+        )
     used = features[:, columns]
     return Scaling(
         tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), rows.outcomes.mean(axis=0), outcome_sd

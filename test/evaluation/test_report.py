@@ -38,7 +38,7 @@ from push_predictor.evaluation.validation import Comparison, compare, metrics_js
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import SHAPES, shape_outline
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
@@ -109,7 +109,10 @@ def table() -> PushTable:
 def models(square: Rig) -> list[PushModel]:
     training = concatenate([made_up_table(25, 3, name="a"), made_up_table(8, 4, velocity=0.05, name="b")])
     kinds = {"vhgp": 90, "gp": 90, "analytical": None}
-    return [train_model(training, square, kind, name=f"my {kind}", n_train=n) for kind, n in kinds.items()]
+    return [
+        train_model(training, square, kind, name=f"my {kind}", options=TrainingOptions(n_train=n))
+        for kind, n in kinds.items()
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from benchmarks.planner_table import Regime, Runs, table
 from examples import plan_pushes, processes
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.store.model_file import save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
@@ -51,7 +51,12 @@ def test_the_same_seed_scatters_a_row_alike_whatever_the_others_do():
 def model(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("planner") / "gp.pushmodel"
     recording = [plan_pushes.TRAINING]
-    save_model(train_model(load_data(recording), load_rig_for(recording), "gp", name="gp", n_train=200), path)
+    save_model(
+        train_model(
+            load_data(recording), load_rig_for(recording), "gp", name="gp", options=TrainingOptions(n_train=200)
+        ),
+        path,
+    )
     return path
 
 

@@ -20,7 +20,7 @@ from examples.planner_client import PlannerClient
 from push_predictor.cli import main as push_predictor
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.window_table import put_aside
 from push_predictor.recordings import atomic_append as whole_lines
@@ -36,7 +36,9 @@ TIMEOUT = 0.5  # s
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path, data = tmp_path_factory.mktemp("model") / "gp.pushmodel", [HEXAGON]
-    save_model(train_model(load_data(data), load_rig_for(data), "gp", name="gp", n_train=30), path)
+    save_model(
+        train_model(load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=30)), path
+    )
     return path
 
 

@@ -26,7 +26,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.store.model_file import FORMAT_VERSION, load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 
 KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
 COPIES = 60  # of each kind; benchmarks/damaged_models.py makes as many as it is told
@@ -38,7 +38,7 @@ def trained() -> dict[str, PushModel]:
     """A model of every kind of body."""
     rows, rig = pushes(25), square_rig()
     models = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
-    models["sparse"] = train_model(rows, rig, "vhgp", name="sparse", inducing=15)
+    models["sparse"] = train_model(rows, rig, "vhgp", name="sparse", options=TrainingOptions(inducing=15))
     predictor = ExtendedPredictor(
         models["gp"].predictor, AnalyticalPush(rig.outline, rig.pusher_radius), (slippery(0.1, 0.05),), ONES
     )

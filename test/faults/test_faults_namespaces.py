@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from validator_bench import CIRCLE, HEXAGON, WRITTEN, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
@@ -105,7 +105,9 @@ def _models(folder: Path) -> dict[str, Path]:
     paths = {}
     for cell, recording in CELLS.items():
         data = [recording]
-        model = train_model(load_data(data), load_rig_for(data), "gp", name="robot", n_train=30)
+        model = train_model(
+            load_data(data), load_rig_for(data), "gp", name="robot", options=TrainingOptions(n_train=30)
+        )
         paths[cell] = folder / f"{cell.strip('/')}.pushmodel"
         save_model(model, paths[cell])
     return paths

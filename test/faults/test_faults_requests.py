@@ -34,7 +34,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import FARTHEST, check_request, check_requests
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import push_validator
 from push_predictor.nodes.parameters import Param, declare
 from push_predictor.nodes.replay import options as replay_options
@@ -55,7 +55,9 @@ TABLES = {
 def models() -> dict[str, PushModel]:
     rows, rig = pushes(25), square_rig()
     found = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "vhgp")}
-    matern = train_model(noisy_pushes(60), rig, "gp", name="matern", choice=KernelChoice("matern52"))
+    matern = train_model(
+        noisy_pushes(60), rig, "gp", name="matern", options=TrainingOptions(kernels=KernelChoice("matern52"))
+    )
     return {
         **found,
         "matern": matern,

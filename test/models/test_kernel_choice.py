@@ -36,7 +36,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store import model_file
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array
 
 CHOICES = [KernelChoice(family, nugget) for family, nugget in product(FAMILIES, (False, True))]
@@ -233,7 +233,10 @@ def test_every_choice_finds_where_it_is_noisy_also_when_the_search_begins_on_a_t
 
 @pytest.fixture(scope="module")
 def models() -> dict[KernelChoice, PushModel]:
-    return {c: train_model(noisy_pushes(60), square_rig(), "vhgp", name="a model", choice=c) for c in CHOICES}
+    return {
+        c: train_model(noisy_pushes(60), square_rig(), "vhgp", name="a model", options=TrainingOptions(kernels=c))
+        for c in CHOICES
+    }
 
 
 @pytest.mark.parametrize("choice", CHOICES)
@@ -253,7 +256,9 @@ def independent(model: PushModel) -> PushModel:
 
 
 def test_a_gp_keeps_its_family(tmp_path: Path) -> None:
-    model = train_model(noisy_pushes(60), square_rig(), "gp", name="g", choice=KernelChoice("matern52"))
+    model = train_model(
+        noisy_pushes(60), square_rig(), "gp", name="g", options=TrainingOptions(kernels=KernelChoice("matern52"))
+    )
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
     assert [r.parameters.family for r in loaded.predictor.regressions] == ["matern52"] * 3

@@ -22,7 +22,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import check_request, check_requests
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
-from push_predictor.models.train import train_model, training_rows
+from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
@@ -263,3 +263,9 @@ def _rewrite(path: Path, members: dict[str, bytes]) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in {**content, **members}.items():
             archive.writestr(name, data)
+
+
+@pytest.mark.parametrize("name", ["n_train", "inducing"])
+def test_training_options_reject_counts_below_one(name: str) -> None:
+    with pytest.raises(TrainingError, match=f"{name}: 0 is not accepted, give 1 or more"):
+        TrainingOptions(**{name: 0})

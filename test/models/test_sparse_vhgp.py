@@ -26,7 +26,7 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import MOST_DENSE_ROWS, inducing_inputs, train_model
+from push_predictor.models.train import MOST_DENSE_ROWS, TrainingOptions, inducing_inputs, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -206,7 +206,7 @@ def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None
 
 def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) -> None:
     rows = table(400)
-    model = train_model(rows, square_rig(), "vhgp", name="sparse", n_train=400, inducing=30)
+    model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=30))
     assert isinstance(model.predictor, GaussianProcessPredictor)
     assert all(isinstance(regression, SparseVHGP) for regression in model.predictor.regressions)
     save_model(model, tmp_path / "sparse.pushmodel")
@@ -224,4 +224,10 @@ def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) 
 
 def test_a_sparse_model_takes_no_other_kernels() -> None:
     with pytest.raises(TrainingError, match="squared exponential"):
-        train_model(table(50), square_rig(), "vhgp", name="m", inducing=10, choice=KernelChoice("matern52"))
+        train_model(
+            table(50),
+            square_rig(),
+            "vhgp",
+            name="m",
+            options=TrainingOptions(inducing=10, kernels=KernelChoice("matern52")),
+        )

@@ -40,7 +40,7 @@ from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes import push_validator
 from push_predictor.nodes.validator.sensor_subscriber import Samples
 from push_predictor.nodes.validator.validation_run import ValidationRun
@@ -61,7 +61,9 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder, data = tmp_path_factory.mktemp("models"), [HEXAGON]
     table, rig = load_data(data), load_rig_for(data)
     for kind in ("gp", "analytical"):
-        save_model(train_model(table, rig, kind, name=kind, n_train=30), folder / f"{kind}.pushmodel")
+        save_model(
+            train_model(table, rig, kind, name=kind, options=TrainingOptions(n_train=30)), folder / f"{kind}.pushmodel"
+        )
     return {kind: folder / f"{kind}.pushmodel" for kind in ("gp", "analytical")}
 
 

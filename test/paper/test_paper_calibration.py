@@ -35,7 +35,7 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
@@ -133,7 +133,7 @@ def test_a_probability_of_one_lies_in_the_last_bar() -> None:
 
 def test_the_exact_transform_is_the_distribution_function_of_the_exact_density() -> None:
     pushes = made_up_set()
-    model = train_model(pushes.table, pushes.rig, "vhgp", name="v", n_train=60)
+    model = train_model(pushes.table, pushes.rig, "vhgp", name="v", options=TrainingOptions(n_train=60))
     table, k = pushes.table.take(np.arange(1)), 1
     latent, scaling = model.predictor.latent(table.inputs)[k], model.predictor.scaling
     scaled = float((table.outcomes[0, k] - scaling.outcome_mean[k]) / scaling.outcome_sd[k])

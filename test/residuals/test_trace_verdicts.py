@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
@@ -36,7 +36,9 @@ def learnt() -> PushModel:
     recording = simulate(spec(1, 120))
     assert recording.rig is not None
     table = windows_to_table(find_windows(recording, recording.rig))
-    return train_model(table, recording.rig, "gp", name="deployed", n_train=min(250, len(table)))
+    return train_model(
+        table, recording.rig, "gp", name="deployed", options=TrainingOptions(n_train=min(250, len(table)))
+    )
 
 
 def traced(changes: Changes = Changes(), **faults: Any) -> Trace:

@@ -33,7 +33,7 @@ from push_predictor.models.push_model import (
     Provenance,
     PushModel,
 )
-from push_predictor.models.train import train_model, training_rows
+from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidates import candidate
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
@@ -174,7 +174,14 @@ def _retrained(model: PushModel, table: PushTable, outcomes: Array) -> PushModel
     rows, predictor, seed = replace(table, outcomes=outcomes), model.predictor, model.provenance.seed
     if isinstance(predictor, GaussianProcessPredictor):
         choice, sources = _choice(predictor), model.provenance.sources
-        return train_model(rows, model.rig, model.kind, name=model.name, sources=sources, seed=seed, choice=choice)
+        return train_model(
+            rows,
+            model.rig,
+            model.kind,
+            name=model.name,
+            sources=sources,
+            options=TrainingOptions(seed=seed, kernels=choice),
+        )
     assert isinstance(predictor, AnalyticalPredictor)
     residual = outcomes - predictor.physics.displacement(table.inputs, table.duration)
     covariance = residual.T @ residual / len(residual)

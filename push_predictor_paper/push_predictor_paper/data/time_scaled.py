@@ -17,7 +17,7 @@ from push_predictor.evaluation.push_scores import PushScores, tally
 from push_predictor.evaluation.splits import FOLDS
 from push_predictor.evaluation.validation import compare
 from push_predictor.geometry.frames import rotate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.simulation.dynamics import Motion, run
@@ -87,7 +87,9 @@ def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> P
     Push k at any speed is of fold k % 5: pushes of that number met the same places of the table.
     """
     table = concatenate([table.take(training_rows(table, bracket)) for table in windows[: bracket.speeds]])
-    model = train_model(_scaled(table, bracket.told), rig, bracket.kind, name=bracket.kind, n_train=len(table))
+    model = train_model(
+        _scaled(table, bracket.told), rig, bracket.kind, name=bracket.kind, options=TrainingOptions(n_train=len(table))
+    )
     held = concatenate([table.take(np.flatnonzero(fold_of(table) == bracket.fold)) for table in windows])
     return tally(compare(model, _scaled(held, bracket.told)))
 

@@ -13,7 +13,7 @@ from push_predictor.evaluation.push_scores import PushScores, tally
 from push_predictor.evaluation.splits import Split, random_split, split_by_push
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array, BoolArray
 from push_predictor_paper.data.corpus import Corpus, Pair, PushSet
 from push_predictor_paper.plan import WINDOW
@@ -111,7 +111,9 @@ def trained(pushes: PushSet, fit: Fit) -> PushModel:
     """The model itself."""
     rows = np.sort(split_of(pushes, fit).first(fit.n))
     table = pushes.table.take(rows)
-    return train_model(table, pushes.rig, fit.kind, name=fit.kind, n_train=len(rows), seed=fit.seed)
+    return train_model(
+        table, pushes.rig, fit.kind, name=fit.kind, options=TrainingOptions(n_train=len(rows), seed=fit.seed)
+    )
 
 
 def split_of(pushes: PushSet, fit: Fit) -> Split:

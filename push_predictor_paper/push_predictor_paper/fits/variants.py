@@ -9,7 +9,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import tally
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.fits.fits import SPLITS, Fit, Score, scores, split_of, trainable
 from push_predictor_paper.plan import Plan
@@ -55,6 +55,12 @@ def score_variant(pushes: PushSet, fit: Fit, choice: KernelChoice) -> Score:
     split = split_of(pushes, fit)
     table = pushes.table.take(np.sort(split.first(fit.n)))
     start = time.process_time()
-    model = train_model(table, pushes.rig, fit.kind, name=fit.kind, n_train=fit.n, seed=fit.seed, choice=choice)
+    model = train_model(
+        table,
+        pushes.rig,
+        fit.kind,
+        name=fit.kind,
+        options=TrainingOptions(n_train=fit.n, seed=fit.seed, kernels=choice),
+    )
     cpu = time.process_time() - start
     return Score(fit, tally(compare(model, pushes.table.take(split.test))), cpu)
