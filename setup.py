@@ -14,7 +14,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=["push_predictor", "push_predictor.*", "msg_adapters", "msg_adapters.*"]),
-    package_data={"push_predictor": ["py.typed"]},
+    package_data={"push_predictor": ["py.typed", "reporting/templates/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -26,7 +26,7 @@ setup(
     ],
     install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4"],
     extras_require={
-        "report": ["matplotlib>=3.8", "joblib>=1.4", "rich>=13"],
+        "report": ["matplotlib>=3.8", "jinja2>=3.1", "joblib>=1.4", "diptest>=0.9", "rich>=13"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "test": [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -42,6 +43,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.reporting import html
 
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
 
@@ -455,10 +457,29 @@ def test_without_matplotlib_the_error_names_the_extra(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(PushPredictorError, match=r"pip install 'push_predictor\[report\]'"):
         write_validation_report(tmp_path, "", table, None, models, comparisons, {}, [])
     assert not (tmp_path / "report.html").exists()
+
+
+def test_error_names_the_extra_without_jinja2(
+    models: list[PushModel],
+    comparisons: list[Comparison],
+    table: PushTable,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    html._environment.cache_clear()
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    with pytest.raises(PushPredictorError, match=r"Jinja2.*pip install 'push_predictor\[report\]'"):
+        write_validation_report(tmp_path, "", table, None, models, comparisons, {}, [])
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_page_escapes_text_that_is_not_a_part() -> None:
+    page = html.page("title", [html.paragraph("safe"), "<script>"])
+    assert "<p>safe</p>" in page and "&lt;script&gt;" in page
 
 
 def test_a_model_differs_from_itself_by_nothing_and_from_a_worse_one_by_more(comparisons: list[Comparison]) -> None:

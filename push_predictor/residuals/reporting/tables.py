@@ -63,7 +63,7 @@ def tested_tables(trace: Trace) -> list[str]:
     parts = [html.table(caption, head, rows[:open_rows])]
     if rest := rows[open_rows:]:
         table = html.table(f"The other {len(rest)}.", head, rest)
-        parts.append(f"<details><summary>The other {len(rest)} candidates</summary>\n{table}\n</details>")
+        parts.append(html.details(f"The other {len(rest)} candidates", table))
     return parts
 
 
