@@ -15,7 +15,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.evidence.drivers import standard_form, two_dimensional
 from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.extension.extension import extend, gain, refit_base
+from push_predictor.residuals.extension.extended_model import extend, gain, refit_base
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:

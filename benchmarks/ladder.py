@@ -29,15 +29,15 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidates import Candidate, candidates_of
+from push_predictor.residuals.candidates.enumeration import Candidate, candidates_of
 from push_predictor.residuals.evidence.drivers import driver_names
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.loading import Loaded, load_evidence
-from push_predictor.residuals.evidence.residuals import evidence_of
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
-from push_predictor.residuals.extension.extension import compared, extend, gain, physics_of
+from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
+from push_predictor.residuals.extension.extended_model import compared, extend, gain
 from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.selection.search import Term, search
+from push_predictor.residuals.selection.forward_selection import Term, search
 from push_predictor.types import Array
 
 ALPHA = 0.05  # of a step; the gate guards against what this lets in

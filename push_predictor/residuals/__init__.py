@@ -1,4 +1,5 @@
-"""The residual loop: find what a model fails to explain, trace it to an effect, add it, measure again.
+"""The residual loop: find what a model fails to explain, trace it to an effect, add the effect, measure again.
 
-Import `trace`, `outcome` and `reporting`; the folders are the steps that docs/explanation/residual_loop.md numbers.
+Import `trace`, `outcome` and `reporting`. Folders follow the steps of docs/explanation/residual_loop.md and import in
+this order: evidence < candidates < selection < channels < extension < reporting < trace.
 """

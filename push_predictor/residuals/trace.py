@@ -26,10 +26,10 @@ from push_predictor.residuals.channels.motion import MotionFinding, MotionTerm, 
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.loading import Loaded, cut_anew, load_evidence, previous_residual
-from push_predictor.residuals.evidence.residuals import evidence_of
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
 from push_predictor.residuals.extension.effect_size import size_of
-from push_predictor.residuals.extension.extension import Term, compared, estimate, extend, gain, physics_of, refit_base
+from push_predictor.residuals.extension.extended_model import Term, compared, estimate, extend, gain, refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, notes_of, notes_of_data
 

@@ -200,11 +200,11 @@ def test_drivers_have_the_names_of_the_contract() -> None:
 
 
 def test_a_mechanism_is_out_of_the_library_only_inside() -> None:
-    from push_predictor.residuals.candidates import candidates
+    from push_predictor.residuals.candidates import enumeration
 
     with library_without("tilted_surface"):
-        assert "tilted_surface" not in {mechanism.name for mechanism in candidates.LIBRARY}
-    assert candidates.LIBRARY is LIBRARY
+        assert "tilted_surface" not in {mechanism.name for mechanism in enumeration.LIBRARY}
+    assert enumeration.LIBRARY is LIBRARY
     with pytest.raises(SystemExit, match="perpetual"), library_without("perpetual"):
         pass
 

@@ -32,7 +32,7 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.extension.extension import extend, gain, refit_base
+from push_predictor.residuals.extension.extended_model import extend, gain, refit_base
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])

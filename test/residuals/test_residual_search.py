@@ -15,14 +15,14 @@ from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidates import candidates_of, entangled
+from push_predictor.residuals.candidates.enumeration import candidates_of, entangled
 from push_predictor.residuals.channels.variance import variance_effects
-from push_predictor.residuals.evidence.baseline import baseline_of
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.residuals import evidence_of
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.forward_selection import Search, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import block_scores, screen
-from push_predictor.residuals.selection.search import Search, search
 
 WINDOWS = 2
 SIDE = 0.09
@@ -79,7 +79,8 @@ def learnt():
 @pytest.fixture(autouse=True)
 def a_library_of_six(monkeypatch) -> None:
     """Responses take most of the time."""
-    monkeypatch.setattr("push_predictor.residuals.candidates.candidates.LIBRARY", [m for m in LIBRARY if m.name in SIX])
+    library = [m for m in LIBRARY if m.name in SIX]
+    monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
 def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> Search:

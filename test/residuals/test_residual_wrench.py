@@ -13,7 +13,7 @@ from push_predictor.models.mechanics.limit_surface import contact_force
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.candidates.limit_load import loads
+from push_predictor.residuals.channels.limit_load import loads
 from push_predictor.residuals.channels.wrench import WrenchFinding, wrench_effects
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 from push_predictor.types import Array

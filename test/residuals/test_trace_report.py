@@ -17,9 +17,9 @@ from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, plant
 from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals import outcome
-from push_predictor.residuals.extension.advice import separating_words
 from push_predictor.residuals.outcome import Gain, Sized, Trace
 from push_predictor.residuals.reporting import page as report
+from push_predictor.residuals.reporting.advice import separating_words
 from push_predictor.residuals.reporting.figures import gallery, map_pictures
 from push_predictor.residuals.reporting.figures.driver_basis import bins_of
 from push_predictor.residuals.reporting.figures.maps import halves_of, scale_of

@@ -16,9 +16,9 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import ExtendedPredictor, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.residuals import evidence_of
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
-from push_predictor.residuals.extension.extension import Term, compared, extend, gain, physics_of, refit_base
+from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
+from push_predictor.residuals.extension.extended_model import Term, compared, extend, gain, refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])

@@ -1,4 +1,4 @@
-"""Steps 4 and 5: every mechanism with every covariate, cleared of what the model's inputs explain.
+"""Step 4: every mechanism with every covariate, and what is regressed out of each candidate.
 
-Import `candidates`; nothing here imports from the later steps.
+Import `candidate` and `enumeration`; only `evidence` is imported here.
 """

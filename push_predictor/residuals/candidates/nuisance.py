@@ -15,8 +15,8 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals.evidence.drivers import SETTLED
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, inputs_of
-from push_predictor.residuals.evidence.residuals import Evidence, whitened_response
-from push_predictor.residuals.selection.screening import Residualizer
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
 from push_predictor.types import Array
 
 TOUCHED = ("time_since_contact", "contact_gap")  # differ between the window that begins with the touch and later ones

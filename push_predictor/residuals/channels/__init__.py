@@ -1,4 +1,4 @@
-"""Where an effect may lie: motion, measurement, wrench, variance.
+"""Where an effect may lie: the measurement, the mean motion, its variance, the wrench.
 
-Import one module per channel.
+Import one module per channel; a channel imports no later step.
 """

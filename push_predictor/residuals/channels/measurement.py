@@ -22,7 +22,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.contrast import (
+from push_predictor.residuals.channels.contrast import (
     Stacked,
     Tried,
     best_first,
@@ -35,8 +35,8 @@ from push_predictor.residuals.candidates.contrast import (
     tells,
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
+from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array, BoolArray, IntArray
 
 NEEDED = ("contact_gap", "slider_x", "slider_y", "slider_heading")

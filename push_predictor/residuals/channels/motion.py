@@ -11,18 +11,18 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.residuals.candidates.candidates import Candidate, candidates_of, entangled
+from push_predictor.residuals.candidates.enumeration import Candidate, candidates_of, entangled
 from push_predictor.residuals.channels.variance import Scatter, variance_effects
-from push_predictor.residuals.evidence.baseline import Baseline, baseline_of
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
-from push_predictor.residuals.evidence.residuals import Evidence, evidence_of
-from push_predictor.residuals.extension.experiment import separating_pushes
-from push_predictor.residuals.extension.extension import physics_of
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of, physics_of
 from push_predictor.residuals.outcome import Tested
+from push_predictor.residuals.selection.baseline import Baseline, baseline_of
+from push_predictor.residuals.selection.cross_validation import fit
+from push_predictor.residuals.selection.experiment import separating_pushes
+from push_predictor.residuals.selection.forward_selection import Search, Term, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
-from push_predictor.residuals.selection.screening import Residualizer, Screened
-from push_predictor.residuals.selection.search import Search, Term, search
-from push_predictor.residuals.selection.selection import fit
+from push_predictor.residuals.selection.screening import Screened
 from push_predictor.types import Array
 
 FELT = 0.15  # an output is named where its shift, in units of the prediction, is this share of the strongest output's

@@ -14,11 +14,12 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.residuals.evidence.baseline import Baseline
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_forms
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.residuals import Evidence
-from push_predictor.residuals.selection.screening import Residualizer, Scores, Screened, block_scores, screen
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.baseline import Baseline
+from push_predictor.residuals.selection.screening import Scores, Screened, block_scores, screen
 from push_predictor.types import Array
 
 TINY = 1e-12

@@ -20,7 +20,7 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.contrast import (
+from push_predictor.residuals.channels.contrast import (
     Stacked,
     Tried,
     best_first,
@@ -31,10 +31,10 @@ from push_predictor.residuals.candidates.contrast import (
     stacked,
     tells,
 )
-from push_predictor.residuals.candidates.limit_load import FORCES, inputs_of, loads
+from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL, PLACE, screening_forms
+from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.residuals.selection.screening import Residualizer
 from push_predictor.types import Array, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"

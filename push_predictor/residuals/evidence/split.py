@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.residuals import push_order
+from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import BoolArray
 
 BLOCK = 10  # pushes

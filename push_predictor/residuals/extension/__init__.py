@@ -1,4 +1,4 @@
-"""Steps 8 to 10: the extended model, the size of its effects, and the pushes that would separate rivals.
+"""Step 9 and 10: the refit, the model with its effects, their size, and the gain on held-out pushes.
 
-Import `extension`, `effect_size`, `experiment` and `advice`.
+Import `extended_model`, `refit`, `held_out_gain` and `effect_size`.
 """

@@ -1,4 +1,4 @@
 """What a person or a program reads of a trace: page, tables, sentences, JSON.
 
-Import `page`, `summary` and `trace_json`.
+Import `page`, `summary`, `wording` and `trace_json`; every phrase for a mechanism or covariate comes from `phrases`.
 """

@@ -9,8 +9,8 @@ from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.split import RULE
-from push_predictor.residuals.extension.advice import separating_words
 from push_predictor.residuals.outcome import Trace
+from push_predictor.residuals.reporting.advice import separating_words
 from push_predictor.residuals.reporting.figures.gallery import (
     calibration_picture,
     channel_picture,

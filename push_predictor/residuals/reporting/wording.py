@@ -15,7 +15,7 @@ from push_predictor.models.request import UNITS
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.html import NOTHING, number
 from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.extension.extension import physics_of
+from push_predictor.residuals.evidence.standardised import physics_of
 from push_predictor.residuals.outcome import FoundEffect, Gain, Sized, Trace, Verdict
 from push_predictor.types import Array
 

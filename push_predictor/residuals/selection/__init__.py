@@ -1,4 +1,4 @@
 """Steps 6 to 8: screening, forward selection, rivals, names, and the smallest detectable effect.
 
-Import `search`; the other modules are its parts.
+Import `forward_selection`, `power` and `baseline`; only `evidence` and `candidates` are imported here.
 """

@@ -13,10 +13,10 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidates import Candidate
+from push_predictor.residuals.candidates.enumeration import Candidate
 from push_predictor.residuals.evidence.drivers import CATEGORIES, HEADINGS, PLACE, standard_form, two_dimensional
-from push_predictor.residuals.selection.screening import Residualizer
-from push_predictor.residuals.selection.selection import Judged, gains_of
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.selection.cross_validation import Judged, gains_of
 from push_predictor.types import Array, IntArray
 
 STEPS = 9  # places of a step that are tried, at quantiles of the driver

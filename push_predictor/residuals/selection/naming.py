@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.effects.effect import mechanism_named
-from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.selection.screening import ResidualBlocks, Residualizer, raw_scores, screen, unit_scores
-from push_predictor.residuals.selection.selection import Judged, fit, gains_of
+from push_predictor.residuals.candidates.enumeration import Candidate
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
+from push_predictor.residuals.selection.cross_validation import Judged, fit, gains_of
+from push_predictor.residuals.selection.screening import raw_scores, screen, unit_scores
 from push_predictor.types import Array, IntArray
 
 STRUCK_OFF = 0.01  # p below which a rival is not the truth

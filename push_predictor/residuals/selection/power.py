@@ -8,21 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.effects.effect import mechanism_named
-from push_predictor.residuals.candidates.candidates import HEADED, SIDES, Candidate
-from push_predictor.residuals.evidence.baseline import Baseline, difference
+from push_predictor.residuals.candidates.enumeration import HEADED, SIDES, Candidate
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_of
-from push_predictor.residuals.evidence.residuals import Evidence
-from push_predictor.residuals.selection.screening import (
-    TINY,
-    Residualizer,
-    Scores,
-    moments,
-    raw_scores,
-    sums_by,
-    unit_scores,
-)
-from push_predictor.residuals.selection.search import Search
+from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.baseline import Baseline, difference
+from push_predictor.residuals.selection.forward_selection import Search
+from push_predictor.residuals.selection.screening import TINY, Scores, moments, raw_scores, unit_scores
 from push_predictor.types import Array, IntArray
 
 SURE = 0.8416  # standard normal quantile of a power of 80 %

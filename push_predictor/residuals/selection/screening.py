@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer, sums_by
 from push_predictor.types import Array, IntArray
 
 DRAWS = 1999
-SINGULAR = 0.01  # a block that alone fixes a direction of the inputs is enlarged no more than so
 TINY = 1e-6  # relative; directions of a candidate that the inputs explain away are dropped
 
 
@@ -62,22 +62,6 @@ class Scores:
         return Scores(np.vstack([self.rows, np.zeros((blocks, self.rows.shape[1]))]), self.total)
 
 
-@dataclass(frozen=True, eq=False)
-class ResidualBlocks:
-    """Residuals without the inputs: left (n, 3), and as large as before a fit made them smaller, enlarged (n, 3)."""
-
-    left: Array
-    enlarged: Array
-    block: IntArray
-
-    def apart(self, beside: Array | None) -> ResidualBlocks:
-        """Less what orthonormal columns (3 n, q) explain of them, all outputs together."""
-        if beside is None:
-            return self
-        parts = [flat - beside @ (beside.T @ flat) for flat in (self.left.ravel(), self.enlarged.ravel())]
-        return ResidualBlocks(parts[0].reshape(self.left.shape), parts[1].reshape(self.left.shape), self.block)
-
-
 def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
     """Screen candidates by their block scores, each in coordinates in which its information is one."""
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, len(scores[0].rows)))
@@ -107,42 +91,6 @@ def raw_scores(left: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
     x = flat.reshape(-1, flat.shape[2])
     rows = sums_by(left.block, np.einsum("nkp,nk->np", flat, left.enlarged))
     return Scores(rows, x.T @ left.left.ravel()), x.T @ x
-
-
-def sums_by(block: IntArray, values: Array) -> Array:
-    """Sums (b, p) of values (n, p) over the blocks, in ascending order of their numbers."""
-    numbers, index = np.unique(block, return_inverse=True)
-    sums = np.zeros((len(numbers), values.shape[1]))
-    np.add.at(sums, index, values)
-    return sums
-
-
-class Residualizer:
-    """Takes a basis (n, m) out of values, by least squares."""
-
-    def __init__(self, basis: Array) -> None:
-        left, values, _ = np.linalg.svd(basis, full_matrices=False)
-        self.q: Array = left[:, values > 1e-9 * max(values[0], np.finfo(float).tiny)] if basis.shape[1] else basis
-
-    def __call__(self, values: Array) -> Array:
-        """Values (n, ...) less their fit."""
-        flat = values.reshape(len(values), -1)
-        return np.asarray(flat - self.q @ (self.q.T @ flat)).reshape(values.shape)
-
-    def left(self, z: Array, block: IntArray) -> ResidualBlocks:
-        """Residuals z (n, 3) without the basis."""
-        left = self(z)
-        enlarged = left.copy()
-        if self.q.shape[1]:
-            for rows in _rows_of(block):
-                values, vectors = np.linalg.eigh(np.eye(len(rows)) - self.q[rows] @ self.q[rows].T)
-                enlarged[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ left[rows])
-        return ResidualBlocks(left, enlarged, block)
-
-
-def _rows_of(block: IntArray) -> list[IntArray]:
-    order = np.argsort(block, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(block[order])) + 1)
 
 
 def _statistics(score: Scores, signs: Array) -> tuple[float, Array]:

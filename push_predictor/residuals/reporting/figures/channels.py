@@ -11,7 +11,7 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
-from push_predictor.residuals.evidence.residuals import push_order
+from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import DRAWS, LEAST_PUSHES
 from push_predictor.residuals.reporting.wording import unit_of

@@ -12,8 +12,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of, mechanism_named
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.residuals import evidence_of
-from push_predictor.residuals.extension.extension import physics_of
+from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
 from push_predictor.residuals.outcome import Trace
 from push_predictor.types import Array, BoolArray, IntArray
 

@@ -14,7 +14,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.reporting.canvas import COLOURS, PREDICTED, SYMBOLS, UNIT_NAMES, UNITS, grid
-from push_predictor.residuals.extension.extension import physics_of
+from push_predictor.residuals.evidence.standardised import physics_of
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows
 from push_predictor.types import Array, BoolArray

@@ -17,13 +17,14 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, with_independent_outputs
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidates import Candidate, usable
+from push_predictor.residuals.candidates.enumeration import Candidate, usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import LOCAL, STANDING
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis, inputs_of
 from push_predictor.residuals.evidence.loading import with_inputs
-from push_predictor.residuals.evidence.residuals import Evidence, push_order, whitened_response, whitener_of
-from push_predictor.residuals.selection.screening import TINY, Residualizer, Scores, raw_scores
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence, push_order, whitened_response, whitener_of
+from push_predictor.residuals.selection.screening import TINY, Scores, raw_scores
 from push_predictor.types import Array
 
 

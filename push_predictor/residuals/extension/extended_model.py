@@ -35,12 +35,12 @@ from push_predictor.models.push_model import (
 )
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidates import candidate
+from push_predictor.residuals.candidates.enumeration import candidate
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.residuals import Evidence, evidence_of, evidence_scale
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of, evidence_scale, physics_of
 from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.selection.screening import Residualizer
-from push_predictor.residuals.selection.selection import RIDGE
+from push_predictor.residuals.selection.cross_validation import RIDGE
 from push_predictor.types import Array, IntArray
 
 Term: TypeAlias = tuple[str | None, str, DriverBasis]  # mechanism (None: the generic one), covariate, form
@@ -117,13 +117,6 @@ def gain(
 def compared(model: PushModel, table: PushTable, training_mean: Array) -> Comparison:
     """A model against a table, its NMSE over the distance from this mean outcome (3,)."""
     return replace(compare(model, table), training_mean=training_mean)
-
-
-def physics_of(model: PushModel) -> AnalyticalPush:
-    """The analytical model of a push model's slider: its own, or the textbook's for a learnt one."""
-    if isinstance(model.predictor, AnalyticalPredictor | ExtendedPredictor):
-        return model.predictor.physics
-    return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
 
 
 def _extended(

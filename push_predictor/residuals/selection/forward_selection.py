@@ -10,23 +10,16 @@ from typing import Literal, get_args
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.evidence.baseline import Baseline, difference
+from push_predictor.residuals.candidates.enumeration import Candidate
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, inputs_of
-from push_predictor.residuals.evidence.residuals import Evidence
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.baseline import Baseline, difference
 from push_predictor.residuals.selection.basis_choice import best_form
+from push_predictor.residuals.selection.cross_validation import Judged, fit, judge
 from push_predictor.residuals.selection.naming import MOST_LEFT, Case, Naming, leaves_over, open_rivals, plausible
-from push_predictor.residuals.selection.screening import (
-    ResidualBlocks,
-    Residualizer,
-    Scores,
-    Screened,
-    raw_scores,
-    screen,
-    unit_scores,
-)
-from push_predictor.residuals.selection.selection import Judged, fit, judge
+from push_predictor.residuals.selection.screening import Scores, Screened, raw_scores, screen, unit_scores
 from push_predictor.types import Array
 
 MOST_TERMS = 3

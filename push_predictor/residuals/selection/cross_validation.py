@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.selection.screening import TINY, Residualizer, sums_by
+from push_predictor.residuals.candidates.enumeration import Candidate
+from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.selection.screening import TINY
 from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5

@@ -9,8 +9,8 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidates import Candidate
-from push_predictor.residuals.evidence.residuals import Evidence, evidence_scale
+from push_predictor.residuals.candidates.enumeration import Candidate
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_scale
 from push_predictor.types import Array
 
 PUSHES = 4

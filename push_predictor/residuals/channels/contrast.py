@@ -13,8 +13,9 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.residuals import blocks_of
-from push_predictor.residuals.selection.screening import Residualizer, Screened, block_scores, screen, sums_by
+from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.standardised import blocks_of
+from push_predictor.residuals.selection.screening import Screened, block_scores, screen
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000

@@ -14,8 +14,8 @@ from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, screening_forms
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind
-from push_predictor.residuals.evidence.residuals import Evidence, whitened_response
-from push_predictor.residuals.selection.screening import Residualizer
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
 from push_predictor.types import Array
 
 HEADED = "push_heading"  # drives what has a direction in the world by itself
