@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from benchmarks.blind import conditions
-from benchmarks.blind_effects import GROUPS, World, draw
+from benchmarks.blind.effects import GROUPS, World, draw
+from benchmarks.blind.recordings import conditions
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.changes import Changes, Law, Moment

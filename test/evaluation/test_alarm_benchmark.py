@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.alarm import Row, markdown_of
+from benchmarks.blind.alarm import Row, markdown_of
 
 
 def row(change: int | None, fired: int | None) -> Row:

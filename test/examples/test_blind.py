@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.blind import CYCLE, MODEL, Size, _group, apart, drawn_for, later_spec, main, make_one, rig_of
-from benchmarks.blind_effects import DRIVERS, GROUPS, SIZES, undisturbed
-from benchmarks.blind_library import library_without
-from benchmarks.blind_score import markdown_of, score_of, wilson
+from benchmarks.blind.commands import CYCLE, _group, apart, main
+from benchmarks.blind.effects import DRIVERS, GROUPS, SIZES, undisturbed
+from benchmarks.blind.library import library_without
+from benchmarks.blind.recordings import MODEL, Size, drawn_for, later_spec, make_one, rig_of
+from benchmarks.blind.scores import markdown_of, score_of, wilson
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.recordings.read import read_recording
 from push_predictor.simulation.changes import Changes

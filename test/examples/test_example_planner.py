@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import ros_harness as harness
 
-from benchmarks.planner_table import Regime, Runs, table
+from benchmarks.planning.planner_table import Regime, Runs, table
 from examples import plan_pushes, processes
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.store.model_file import save_model

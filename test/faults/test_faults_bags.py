@@ -49,7 +49,7 @@ def told(bag: Path) -> tuple[list[bytes], list[str]]:
 
 def test_damaged_copies_of_every_kind_and_form_are_read_as_far_as_they_are_whole() -> None:
     """The same by hand, of 2000: python -m benchmarks.fuzz_bags. It judges by bags that the mcap package wrote."""
-    command = [sys.executable, "-m", "benchmarks.fuzz_bags", "--copies", str(COPIES), "--seed", "6"]
+    command = [sys.executable, "-m", "benchmarks.recordings.fuzz_bags", "--copies", str(COPIES), "--seed", "6"]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
     done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr

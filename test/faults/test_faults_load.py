@@ -28,9 +28,9 @@ from push_predictor_interfaces.srv import PredictPush
 
 
 def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run benchmarks/NAME.py in a domain of its own."""
+    """Run benchmarks/nodes/NAME.py in a domain of its own."""
     domain = free_domain()
-    command = [sys.executable, f"benchmarks/{name}.py", "--domain", str(domain), *arguments]
+    command = [sys.executable, "-m", f"benchmarks.nodes.{name}", "--domain", str(domain), *arguments]
     return subprocess.run(
         command, cwd=REPOSITORY, env=node_environment(domain), capture_output=True, text=True, timeout=400, check=False
     )

@@ -29,7 +29,7 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 
 KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
-COPIES = 60  # of each kind; benchmarks/damaged_models.py makes as many as it is told
+COPIES = 60  # of each kind; benchmarks/models/damaged_models.py makes as many as it is told
 MEMORY = 30 << 20  # bytes that reading a forged file may take
 ONES = np.ones(3)
 

@@ -20,8 +20,8 @@ from mit_square_fits import split_by_push as expected_split_by_push
 from ros_harness import free_domain, node_process, wait_until
 from synthetic import Push, pose_stream, stamps, translating_push
 
-from benchmarks.measured import leave_one_run_out, mean_speed, travelled
-from benchmarks.measured_scores import pooled, total
+from benchmarks.measured.scores import pooled, total
+from benchmarks.measured.tables import leave_one_run_out, mean_speed, travelled
 from push_predictor.cli import main
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.offline import validate_recording

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.ladder import climb, mlab, named
+from benchmarks.measured.ladder import climb, mlab, named
 
 EVEN = 0.0451  # m: mean distance from the centre of an even triangle
 # Mean distance (m) of the support points from the centre, by recording; 2 and 6 lay flat.

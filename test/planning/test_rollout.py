@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from synthetic import RADIUS, square_rig
 
-from benchmarks.rollout_truth import EnergyDistance
+from benchmarks.planning.rollout_truth import EnergyDistance
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.shapes import shape_outline

@@ -1,0 +1,5 @@
+"""`python -m benchmarks.measured`: see tables.py."""
+
+from benchmarks.measured.tables import main
+
+main()

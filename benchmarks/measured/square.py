@@ -1,0 +1,49 @@
+"""The measured square of the MIT set: analytical model, GP and VHGP over n, on a random split and by push."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from push_predictor_paper.data.corpus import PushSet
+from push_predictor_paper.fits.fits import KINDS, Fit, Score, SplitName, score
+
+from benchmarks.measured.scores import HEAD, difference, figures
+from push_predictor.evaluation.push_scores import pooled
+from push_predictor.evaluation.splits import FOLDS
+from push_predictor.recordings.importers import import_source
+from push_predictor.recordings.load import load_data, load_rig_for
+
+SIZES = (100, 200, 500, 1000)
+SPLITS: tuple[tuple[SplitName, str], ...] = (("random", "random split"), ("push", "split by push"))
+
+
+def mit_square_tables(data: Path, work: Path, quick: bool) -> None:
+    """Print a table for each split."""
+    pushes = imported_square(data, work)
+    for split, name in SPLITS:
+        print(f"\n{name}\n\n| model | n | {HEAD} | NMSE, NLPD: mean of {FOLDS} | CPU, s |\n{10 * '|---'}|")
+        for n in SIZES[:1] if quick else SIZES:
+            scores = {kind: square_scores(pushes, kind, n, split) for kind in KINDS}
+            for kind in KINDS:
+                print(f"| {kind} | {n} | {_cells(scores[kind])} |", flush=True)
+            gp, vhgp = (pooled([s.tally for s in scores[kind]]) for kind in ("gp", "vhgp"))
+            print(f"| vhgp less gp | {n} | {difference(gp, vhgp)} | | |", flush=True)
+
+
+def imported_square(data: Path, work: Path) -> PushSet:
+    """The rows as `import mit-square` writes them."""
+    import_source("mit-square", [data / "mit_square" / "pushes_3500.npz"], work)
+    path = work / "pushes_3500.csv"
+    return PushSet(load_data([path]), load_rig_for([path]))
+
+
+def square_scores(pushes: PushSet, kind: str, n: int, split: SplitName) -> list[Score]:
+    """A model of n rows for each fold, or as many seeds of the random split."""
+    return [score(pushes, Fit(kind, n, split, k)) for k in range(FOLDS)]
+
+
+def _cells(scores: list[Score]) -> str:
+    nmse, nlpd = np.mean([s.nmse.sum() for s in scores]), np.mean([s.nlpd.sum() for s in scores])
+    cpu = np.mean([s.cpu for s in scores])
+    return f"{figures(pooled([s.tally for s in scores]))} | {nmse:.3f}, {nlpd:.2f} | {cpu:.2f}"

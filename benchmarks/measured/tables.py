@@ -1,0 +1,163 @@
+"""Models against pushes measured by others: makes the tables of docs/results/measured.md anew.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
+
+FOLDER holds mcube_preliminary, mit_raw and mit_square. Everything is imported anew into a temporary folder and goes
+the way of the command line: import, windows, train_model, compare. Only the split called random parts pushes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.measured.scores import HEAD, Fold, figures, pooled, total, trained
+from benchmarks.measured.square import mit_square_tables
+from push_predictor.evaluation.metrics import nmse
+from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
+from push_predictor.recordings.importers import import_source
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.types import Array
+
+BLOCKS = {"Al": "aluminium", "St": "steel"}
+STRIDE = 0.02  # s between the starts of overlapping training windows
+MCUBE_MODELS = (  # kind, fitted physics, stride of the training windows
+    ("analytical", False, None),
+    ("analytical", True, None),
+    ("gp", False, None),
+    ("vhgp", False, None),
+    ("gp", False, STRIDE),
+    ("vhgp", False, STRIDE),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="the folder of the measured data")
+    parser.add_argument("--kind", choices=tuple(TABLES), action="append", help="which tables; all if not given")
+    parser.add_argument("--quick", action="store_true", help="mit-square: n = 100 only")
+    options = parser.parse_args(arguments)
+    for kind in options.kind or TABLES:
+        with tempfile.TemporaryDirectory(prefix="measured_") as work:
+            TABLES[kind](options.data, Path(work), options.quick)
+
+
+# --- mcube ----------------------------------------------------------------------------------------------------
+
+
+def mcube_tables(data: Path, work: Path, quick: bool) -> None:
+    """The windows of the eight runs; models of each block against the run they have not seen."""
+    runs = sorted(import_source("mcube", [data / "mcube_preliminary"], work).written)
+    print("\n| run | windows | s in windows | tip, mm/s | way of the block, mm | turn, degrees |\n" + 6 * "|---" + "|")
+    for run in runs:
+        print(f"| {run.name} | {_summary(read_recording(run))} |")
+    for prefix, name in BLOCKS.items():
+        block = [run for run in runs if run.name.startswith(prefix)]
+        print(f"\n{name}\n\n| model | trained on | {HEAD} | in domain, NMSE there | NMSE run by run |\n{10 * '|---'}|")
+        for kind, fit, stride in MCUBE_MODELS:
+            print(_leave_one_out_row(block, kind, fit, stride), flush=True)
+        print(f"\n{_physics_in_words(block)}")
+
+
+def leave_one_run_out(runs: Sequence[Path], kind: str, fit: bool = False, stride: float | None = None) -> list[Fold]:
+    """For every run, a model trained on the other runs. stride (s) overlaps training windows; tested ones tile."""
+    rig, options = load_rig_for(runs), WindowOptions(stride=stride)
+    return [
+        trained(
+            load_data([other for other in runs if other != run], None, options), load_data([run]), rig, kind, fit=fit
+        )
+        for run in runs
+    ]
+
+
+def mean_speed(recording: Recording, start: int, end: int) -> float:
+    """Speed (m/s) of the tip between two stamps (ns), along the chord."""
+    tip = recording.pusher
+    chord = [np.diff(np.interp([start, end], tip.stamp, column))[0] for column in (tip.x, tip.y)]
+    return float(np.hypot(*chord)) / ((end - start) * 1e-9)
+
+
+def travelled(windows: Sequence[PushWindow]) -> tuple[float, float]:
+    """Length (m) of the slider's way from window to window, and the sum (rad) of its turns."""
+    moved = np.array([window.displacement for window in windows])
+    return float(np.hypot(*moved[:, :2].T).sum()), float(moved[:, 2].sum())
+
+
+def _summary(recording: Recording) -> str:
+    windows = find_windows(recording, require_rig(recording))
+    way, turn = travelled(windows)
+    seconds = sum(window.duration for window in windows)
+    speed = 1e3 * mean_speed(recording, windows[0].start, windows[-1].end)
+    return f"{len(windows)} | {seconds:.1f} | {speed:.0f} | {1e3 * way:.0f} | {np.degrees(turn):.0f}"
+
+
+def _leave_one_out_row(runs: Sequence[Path], kind: str, fit: bool, stride: float | None) -> str:
+    folds = leave_one_run_out(runs, kind, fit, stride)
+    counts = [len(fold.model.training) for fold in folds]
+    inside, there = np.concatenate([fold.in_domain for fold in folds]), _nmse_in_domain(folds)
+    by_run = " ".join(f"{total(fold.tally, 'nmse'):.2f}" for fold in folds)
+    title = f"{kind}, fitted" if fit else kind
+    rows = f"{min(counts)} to {max(counts)}{' overlapping' if stride else ''}"
+    return f"| {title} | {rows} | {figures(pooled(folds))} | {inside.mean():.0%}, {there:.2f} | {by_run} |"
+
+
+def _nmse_in_domain(folds: Sequence[Fold]) -> float:
+    """Of the windows that their models do not flag, summed over the outputs."""
+    rows = [(fold.comparison, fold.in_domain) for fold in folds]
+    error = np.concatenate([(c.observed - c.mean)[inside] ** 2 for c, inside in rows])
+    spread = np.concatenate([(c.observed - c.training_mean)[inside] ** 2 for c, inside in rows])
+    return float(np.sum(error.sum(axis=0) / spread.sum(axis=0)))
+
+
+def _physics_in_words(runs: Sequence[Path]) -> str:
+    """What a fit finds, and how much of the textbook model's error in dx is the window's acceleration."""
+    rig, table = load_rig_for(runs), load_data(runs)
+    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
+    fitted = fit_analytical(physics, table.inputs, table.duration, table.outcomes)
+    recordings = [read_recording(run) for run in runs]
+    speeds = [mean_speed(r, w.start, w.end) for r in recordings for w in find_windows(r, rig)]
+    told = np.column_stack([speeds, table.inputs[:, 1:]])
+    predicted = [physics.displacement(inputs, table.duration) for inputs in (table.inputs, told)]
+    dx = [nmse(mean, table.outcomes, table.outcomes.mean(axis=0))[0] for mean in predicted]
+    turn = np.sum(predicted[0][:, 2] * np.sign(table.outcomes[:, 2])) / np.sum(np.abs(table.outcomes[:, 2]))
+    return (
+        f"fitted to all four: friction {fitted.contact_friction:.2f}, c {1e3 * fitted.support.length:.1f} mm (even "
+        f"pressure {1e3 * physics.support.length:.1f} mm). Textbook: turns {turn:.2f} times the observed; NMSE of dx "
+        f"{dx[0]:.3f}, told the mean speed of each window {dx[1]:.3f}"
+    )
+
+
+# --- mit ------------------------------------------------------------------------------------------------------
+
+
+def mit_table(data: Path, work: Path, quick: bool) -> None:
+    """The windows of the one push: what the analytical model says beside what was observed."""
+    (path,) = import_source("mit", [data / "mit_raw"], work).written
+    rig, table = load_rig_for([path]), load_data([path])
+    for velocity, contact, angle in table.inputs:
+        print(f"\nvelocity {1e3 * velocity:.0f} mm/s, contact {contact:.3f}, angle {np.degrees(angle):.1f} degrees")
+    print("\n| | dx, mm | dy, mm | dtheta, degrees |\n|---|---|---|---|")
+    print(_outcome_rows("observed", table.outcomes))
+    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
+    print(_outcome_rows("analytical, textbook", physics.displacement(table.inputs, table.duration)))
+
+
+def _outcome_rows(title: str, outcomes: Array) -> str:
+    rows = outcomes * [1e3, 1e3, 180.0 / np.pi]
+    return "\n".join(f"| {title} | {dx:.1f} | {dy:.1f} | {dtheta:.1f} |" for dx, dy, dtheta in rows)
+
+
+TABLES: dict[str, Callable[[Path, Path, bool], None]] = {
+    "mcube": mcube_tables,
+    "mit": mit_table,
+    "mit-square": mit_square_tables,
+}

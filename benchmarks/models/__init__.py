@@ -1,0 +1,4 @@
+"""Cost and quality of training and prediction in one process, next to other libraries.
+
+Each module is a script; `peers` and `training` also offer their helpers to the others.
+"""

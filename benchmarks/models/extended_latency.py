@@ -1,0 +1,133 @@
+"""How long one prediction of an extended model takes in the server's process, effect by effect.
+
+    python -m benchmarks.models.extended_latency [--pushes N] [--seed K]
+
+No ROS. A GP of 300 simulated windows is the base. Every push is asked of the served base, of the served extended model
+and of the same with its effects computed by arrays of one row (as before plain numbers), in turns, so that all see the
+same load of the machine. Ratio: to the base's prediction in the same run. Apart: the largest difference of a mean
+between plain numbers and the model itself, in predicted standard deviations.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
+from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+Ask = Callable[[Array, Array, Mapping[str, Array]], Prediction]
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pushes", type=int, default=300, help="of each model (default 300)")
+    parser.add_argument("--seed", type=int, default=1, help="of the pushes (default 1)")
+    options = parser.parse_args()
+    base, table = _base(), _table(options.pushes, options.seed)
+    friction, centre = _effect("contact_friction", 0.05), _effect("centre_of_friction", 1e-3, 1e-3)
+    models = {
+        "contact_friction": _extended(base, friction),
+        "centre_of_friction": _extended(base, centre),
+        "both": _extended(base, friction, centre),
+        "generic": _extended(base, _effect(None, *np.full(18, 0.1))),
+        "anisotropic_friction": _extended(base, _effect("anisotropic_friction", 0.1, 0.05)),
+        "analytical, no effect": _analytical(base),
+    }
+    print(f"{'p50, us':24s}{'base':>8s}{'before':>8s}{'now':>8s}{'ratio':>8s}{'was':>8s}{'apart':>10s}")
+    for name, model in models.items():
+        first, before, now = _times([tabulate(base).predict_rows, _before(model), tabulate(model).predict_rows], table)
+        print(
+            f"{name:24s}{first:8.0f}{before:8.0f}{now:8.0f}{now / first:8.1f}{before / first:8.1f}"
+            f"{_apart(model, table):10.1e}"
+        )
+
+
+def _before(model: PushModel) -> Ask:
+    """The table for the base, and arrays for the effects."""
+    if not isinstance(predictor := model.predictor, ExtendedPredictor):
+        return model.predict_rows
+    base = tabulate(model.base)
+
+    def predict_rows(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
+        found = base.predict_rows(inputs, duration)
+        moments = found.mean, found.covariance, found.process_covariance
+        return Prediction(*predictor.extended(moments, Push(inputs, duration, covariates)), found.in_domain)
+
+    return predict_rows
+
+
+def _times(asks: list[Ask], table: PushTable) -> list[float]:
+    """Median time of each, us."""
+    times: list[list[float]] = [[] for _ in asks]
+    for k in range(len(table)):
+        row = table.take(np.arange(k, k + 1))
+        for ask, taken in zip(asks, times, strict=True):
+            start = perf_counter()
+            ask(row.inputs, row.duration, row.covariates)
+            taken.append(perf_counter() - start)
+    return [float(np.median(taken)) * 1e6 for taken in times]
+
+
+def _apart(model: PushModel, table: PushTable) -> float:
+    """Of pushes asked one by one of the served model, from the same by arrays of one row."""
+    tabulated, before, apart = tabulate(model), _before(model), 0.0
+    for k in range(len(table)):
+        row = table.take(np.arange(k, k + 1))
+        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (tabulated.predict_rows, before))
+        sd = np.sqrt(np.diagonal(theirs.covariance[0]))
+        apart = max(apart, float(np.max(np.abs(ours.mean - theirs.mean) / sd)))
+    return apart
+
+
+def _table(count: int, seed: int) -> PushTable:
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    duration = np.full(count, 0.2)
+    outcomes = _physics().displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
+    covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
+    return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
+
+
+def _rig() -> Rig:
+    return Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
+
+
+def _physics() -> AnalyticalPush:
+    return AnalyticalPush(_rig().outline, _rig().pusher_radius)
+
+
+def _base() -> PushModel:
+    return train_model(_table(300, 0), _rig(), "gp", name="base")
+
+
+def _analytical(base: PushModel) -> PushModel:
+    return train_model(base.training, _rig(), "analytical", name="analytical")
+
+
+def _effect(mechanism: str | None, *size: float) -> Effect:
+    covariance = np.diag(0.1 * np.abs(size)) ** 2
+    return Effect(mechanism, "elapsed_time", DRIFT, np.array(size), covariance, np.array([0.02, 0.02, 0.5]))
+
+
+def _extended(base: PushModel, *effects: Effect) -> PushModel:
+    return replace(base, predictor=ExtendedPredictor(base.predictor, _physics(), effects, np.ones(3)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""Training cost of GP and VHGP against scikit-learn's GP, all measured in this run on the same rows.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.training [n ...] [--data FOLDER]
+
+Rows are made up here, of two inputs and of three; with --data also those of FOLDER/mit_square. For each kernel choice:
+CPU seconds for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the peak memory
+of one fit in dense matrices of n x n doubles. Last the time to rebuild three VHGPs from their parameters and to predict
+one input and a thousand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.types import Array
+
+CHOICES = {"SE": DEFAULT_CHOICE, "Matern + nugget": KernelChoice("matern52", noise_nugget=True)}
+
+
+def main() -> None:
+    """Print one line of costs for each set of rows and choice of kernels."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sizes", nargs="*", type=int, default=[100, 200, 500, 1000])
+    parser.add_argument("--data", type=Path, help="folder that holds mit_square")
+    arguments = parser.parse_args()
+    print("                             CPU s                      / sklearn      matrices  ms         us      ms")
+    print("rows          n  kernels          sklearn    GP   VHGP    GP   VHGP    peak      rebuild  1 push  1000")
+    for n in arguments.sizes:
+        for title, inputs, outputs in rows(n, arguments.data):
+            reference, _ = cpu_seconds(lambda x=inputs, y=outputs: [fit_reference(x, column) for column in y.T])
+            for name, choice in CHOICES.items():
+                print(
+                    f"{title:10s} {len(inputs):5d}  {name:16s} {costs(inputs, outputs, choice, reference)}", flush=True
+                )
+
+
+def rows(n: int, data: Path | None) -> Iterator[tuple[str, Array, Array]]:
+    """Titles, standardised inputs (n, D) and outputs (n, 3)."""
+    yield "made up 2", *made_up_pushes(n)
+    yield "made up 3", *made_up_pushes(n, velocity=True)
+    if data is not None:
+        yield "mit_square", *measured_pushes(data / "mit_square" / "pushes_3500.npz", n)
+
+
+def costs(inputs: Array, outputs: Array, choice: KernelChoice, reference: float) -> str:
+    """One line of the table, from the CPU seconds of the reference on."""
+    gp, processes = cpu_seconds(lambda: [fit_gp(inputs, column, choice) for column in outputs.T])
+    starts = [(process.outputs, process.parameters) for process in processes]
+    vhgp, models = cpu_seconds(lambda: [fit_vhgp(inputs, column, choice, start=start) for column, start in starts])
+    vhgp += gp
+    peak = peak_bytes(lambda: fit_vhgp(inputs, outputs[:, 0], choice)) / (8.0 * len(inputs) ** 2)
+    rebuild = fastest(lambda: [VHGP(v.inputs, v.outputs, v.parameters, v.site_precisions) for v in models])
+    new = np.random.default_rng(1).uniform(-1.7, 1.7, size=(1000, inputs.shape[1]))
+    one = fastest(lambda: [v.predict(new[:1]) for v in models], repeats=50)
+    many = fastest(lambda: [v.predict(new) for v in models])
+    return (
+        f"{reference:8.2f} {gp:6.2f} {vhgp:6.2f} {gp / reference:5.2f} {vhgp / reference:6.2f} {peak:7.1f}"
+        f" {1e3 * rebuild:12.0f} {1e6 * one:7.0f} {1e3 * many:5.0f}"
+    )
+
+
+def made_up_pushes(n: int, seed: int = 0, velocity: bool = False) -> tuple[Array, Array]:
+    """Standardised inputs (n, 2) and outputs (n, 3) that look like pushes of one edge, noisy where they slide.
+
+    velocity: a third input, over which the object slides further.
+    """
+    rng = np.random.default_rng(seed)
+    inputs = rng.uniform(-1.7, 1.7, size=(n, 2))
+    lever, angle = inputs.T
+    mean = np.column_stack([np.cos(angle) - 0.3 * lever**2, np.sin(angle), lever * np.cos(angle)])
+    noise = 0.05 + 0.5 / (1.0 + np.exp(-6.0 * (np.abs(angle) - 1.0)))
+    if velocity:
+        inputs = np.column_stack([rng.uniform(-1.7, 1.7, size=n), inputs])
+        mean *= 1.0 + 0.3 * np.tanh(inputs[:, :1])
+        noise *= np.exp(0.4 * inputs[:, 0])
+    return inputs, mean + noise[:, None] * rng.normal(size=(n, 3))
+
+
+def measured_pushes(path: Path, n: int) -> tuple[Array, Array]:
+    """Standardised inputs (n, 2) and outputs (n, 3) of random rows of the measured square."""
+    with np.load(path) as file:
+        chosen = np.random.default_rng(0).permutation(len(file["c"]))[:n]
+        inputs, outputs = (
+            np.column_stack([file[k][chosen] for k in keys]) for keys in (("c", "beta"), ("dx", "dy", "dtheta"))
+        )
+    return (inputs - inputs.mean(axis=0)) / inputs.std(axis=0), (outputs - outputs.mean(axis=0)) / outputs.std(axis=0)
+
+
+def fit_reference(inputs: Array, outputs: Array) -> GaussianProcessRegressor:
+    """scikit-learn's GP with the squared exponential of ours."""
+    return GaussianProcessRegressor(ConstantKernel() * RBF(np.ones(inputs.shape[1])) + WhiteKernel(0.1)).fit(
+        inputs, outputs
+    )
+
+
+def cpu_seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+    """CPU seconds of this process for one run of `work`, and what it returned."""
+    start = time.process_time()
+    result = work()
+    return time.process_time() - start, result
+
+
+def peak_bytes(work: Callable[[], Any]) -> int:
+    """The most memory that `work` takes at a time beyond what there is before, bytes; numpy's arrays count."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def fastest(work: Callable[[], Any], repeats: int = 5) -> float:
+    """Shortest wall time of several runs, s."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+if __name__ == "__main__":
+    main()

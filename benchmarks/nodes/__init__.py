@@ -1,0 +1,4 @@
+"""The nodes as processes: latency, throughput, start-up, load, endurance, replay.
+
+Each module is a script, except `server_under_test` and `vitals`, which the scripts share.
+"""

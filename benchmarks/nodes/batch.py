@@ -1,0 +1,123 @@
+"""Predictions per second of predict_push_batch between two processes, beside those of single calls in the same run.
+
+    python -m benchmarks.nodes.batch [--model FILE] [--sizes N ...] [--seconds S] [--domain D]
+
+Without --model a VHGP of 1000 simulated windows is trained first (some 10 s). A call is timed from arrays of pushes to
+arrays of predictions: making the request, sending, predicting, the response, unpacking. Single calls are made between
+the batches. Last, how long single calls take while the server is busy with the longest batch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from time import perf_counter, sleep
+
+import numpy as np
+from rclpy.client import Client
+
+from benchmarks.nodes.server_under_test import Caller, caller, graph, load, model_files, predict_server, single_requests
+from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model
+from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
+
+SIZES = (1, 10, 100, 1000, 5000, 20_000, 100_000, 1_000_000)
+SINGLES = 200  # calls between two sizes
+WARM_UP = 200
+
+
+def main() -> int:
+    """Measure and print."""
+    arguments = _arguments()
+    with ExitStack() as stack:
+        path = arguments.model or stack.enter_context(model_files(1000))[0]
+        stack.enter_context(graph(arguments.domain))
+        server = stack.enter_context(predict_server(path))
+        client, model = stack.enter_context(caller()), load_model(path)
+        print(f"{model.name}: {model.kind}, {len(model.training)} windows; load average {load()} before")
+        _measure(client, model, arguments.sizes, arguments.seconds, server)
+        print(f"load average {load()} after")
+    return 0
+
+
+def _measure(client: Caller, model: PushModel, sizes: list[int], seconds: float, server: int) -> None:
+    single, batch = client.client(PredictPush, "predict_push"), client.client(PredictPushBatch, "predict_push_batch")
+    requests = single_requests(model, SINGLES)
+    for _ in range(WARM_UP // len(requests) + 1):
+        _single_times(client, single, requests)
+    alone: list[float] = []
+    medians = {}
+    memory = {}
+    for size in sizes:
+        alone += _single_times(client, single, requests)
+        medians[size] = _batch_time(client, batch, model, size, seconds)
+        memory[size] = _peak_memory(server)
+    rate = 1.0 / float(np.median(alone))
+    print(f"single calls, one at a time: {rate:.0f} predictions/s (p50 of {len(alone)})")
+    print(f"{'n a call':>10s}{'ms a call':>12s}{'predictions/s':>16s}{'/ single':>10s}{'server peak MB':>16s}")
+    for size, median in medians.items():
+        each = size / median
+        print(f"{size:10d}{median * 1e3:12.2f}{each:16.0f}{each / rate:10.1f}{memory[size]:16.0f}")
+    _during_a_batch(client, single, batch, model, max(sizes))
+
+
+def _single_times(client: Caller, single: Client, requests: list[PredictPush.Request]) -> list[float]:
+    return [client.timed(single, request)[0] for request in requests]
+
+
+def _batch_time(client: Caller, batch: Client, model: PushModel, size: int, seconds: float) -> float:
+    """Median of the calls that fit into so many seconds, three at least."""
+    times: list[float] = []
+    query = _query(model, size)
+    end = perf_counter() + seconds
+    while len(times) < 3 or perf_counter() < end:
+        start = perf_counter()
+        _, response = client.timed(batch, query_to_batch_request(query))
+        prediction = prediction_from_response(response)
+        times.append(perf_counter() - start)
+        if prediction.covariance.shape != (size, 3, 3):
+            raise SystemExit(f"{size} pushes were asked, {len(prediction.mean)} answered")
+    return float(np.median(times))
+
+
+def _during_a_batch(client: Caller, single: Client, batch: Client, model: PushModel, size: int) -> None:
+    request, push = query_to_batch_request(_query(model, size)), single_requests(model, 1)[0]
+    start = perf_counter()
+    answer = batch.call_async(request)
+    times: list[float] = []
+    while True:
+        elapsed, _ = client.timed(single, push)
+        if answer.done():  # this client has unpacked the batch meanwhile, which is not the server's time
+            break
+        times.append(elapsed)
+        sleep(0.005)
+    print(f"while {size} are answered ({perf_counter() - start:.2f} s): {len(times)} single calls, ", end="")
+    p50, p99 = np.percentile(times, [50, 99]) * 1e3 if times else (np.nan, np.nan)
+    print(f"p50 {p50:.1f} ms, p99 {p99:.1f} ms, longest {max(times, default=np.nan) * 1e3:.1f} ms")
+
+
+def _query(model: PushModel, size: int) -> PushQuery:
+    rows = np.random.default_rng(1).integers(0, len(model.training), size)
+    return PushQuery("", model.training.inputs[rows], float(model.training.duration[0]), {})
+
+
+def _peak_memory(process: int) -> float:
+    """The most resident memory that the process ever had, MB."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", type=Path, help="a model file (default: train one)")
+    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES), help="pushes a call")
+    parser.add_argument("--seconds", type=float, default=2.0, help="of calls for each size (default 2)")
+    parser.add_argument("--domain", type=int, default=78, help="ROS domain to run in (default 78)")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

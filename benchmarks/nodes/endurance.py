@@ -1,0 +1,163 @@
+"""A day through the whole chain in accelerated time: does any node grow?
+
+    python -m benchmarks.nodes.endurance [--minutes 10] [--hours 24] [--rate 100] [--recording BAG] [--domain D]
+
+push_replay plays a recording of pushes in a loop at rate 100, or as fast as this machine can, to push_validator, which
+asks predict_server. Ends after so many minutes, or once so many recorded hours were covered. Prints memory, threads
+and file descriptors of each process, at last how much they grew after the warm-up; status 1 if threads or descriptors
+grew, or memory by more than 5 MB.
+
+What grows by design: the validator keeps some twenty bytes of memory a window, ten megabytes a day of pushing without
+a break; windows and answers lie in temporary files, half a kilobyte a window. A window that waits for its answer takes
+1.1 kB; they wait as long as the server is away.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from benchmarks.nodes.server_under_test import Caller, caller, graph, load, process
+from benchmarks.nodes.vitals import Vitals, growth, vitals
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.resources import DEFAULT_MODEL, share_path
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORDING = ROOT / "bags" / "square_abs_test"
+
+
+def main() -> int:
+    """Run, report, judge."""
+    options = _options()
+    stamps = [message.log_time for message in open_bag(options.recording).messages()]
+    hours, count = (max(stamps) - min(stamps)) / 3.6e12, len(stamps)
+    model, before = share_path(*DEFAULT_MODEL), load()
+    with ExitStack() as stack:
+        output = stack.enter_context(tempfile.TemporaryDirectory(prefix="push_endurance_"))
+        stack.enter_context(graph(options.domain))
+        heard = stack.enter_context(caller())
+        validating = {"model": model, "output": output, "report": False}
+        playing = {
+            "recording": options.recording,
+            "play.rate": options.rate,
+            "play.loop": True,
+            "wait_for_subscribers": 20.0,
+        }
+        nodes = {
+            "predict_server": stack.enter_context(_node("predict_server", {"models": [str(model)]})),
+            "push_validator": stack.enter_context(_node("push_validator", validating)),
+            "push_replay": stack.enter_context(_node("push_replay", playing)),
+        }
+        seen = _watched(heard, nodes, options, hours / count)
+        print(f"load average {before} before, {load()} after, two cores")
+        grew = _grew(seen, options.warm_up * 60.0, options.most_growth)
+        print(f"push_validator wrote its result within {_ended(nodes['push_validator']):.0f} s of SIGTERM")
+    return 1 if grew else 0
+
+
+def _watched(
+    heard: Caller, nodes: Mapping[str, int], options: argparse.Namespace, hours_a_message: float
+) -> dict[str, list[Vitals]]:
+    """Each process's vitals over time, from the first window on: until then a node may still be starting.
+
+    hours_a_message: how much of the recording a message stands for.
+    """
+    heard.spin_until(lambda: _windows(heard.diagnostics) > 0)
+    earlier = int(_of(heard.diagnostics, "push_replay").get("published", 0))
+    begun, covered, looks = monotonic(), 0.0, 0
+    seen: dict[str, list[Vitals]] = {}
+    while monotonic() - begun < options.minutes * 60.0 and covered < options.hours:
+        looks += 1
+        heard.spin_until(_clock_at(begun + looks * options.every), options.every + 10.0)
+        told = heard.diagnostics
+        covered = (int(_of(told, "push_replay").get("published", earlier)) - earlier) * hours_a_message
+        print(f"{monotonic() - begun:6.0f} s, {covered:6.2f} h recorded; {_figures(told)}; load {load()}", flush=True)
+        for name, number in _with_children(nodes).items():
+            seen.setdefault(name, []).append(vitals(number))
+            print(f"    {name:25s}{seen[name][-1]}", flush=True)
+    took = monotonic() - begun
+    print(f"{covered:.2f} recorded hours in {took:.0f} s: rate {covered * 3600.0 / took:.0f}")
+    return seen
+
+
+def _clock_at(time: float) -> Callable[[], bool]:
+    return lambda: monotonic() > time
+
+
+def _ended(child: int) -> float:
+    """Seconds that a child takes to end: a day's windows are written for minutes."""
+    begun = monotonic()
+    os.kill(child, signal.SIGTERM)
+    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)
+    return monotonic() - begun
+
+
+def _figures(told: Mapping[str, Mapping[str, str]]) -> str:
+    replay, validator = _of(told, "push_replay"), _of(told, "push_validator")
+    lost = {key: value for key, value in validator.items() if key.endswith(" lost")}
+    return f"behind by {replay.get('behind_s', '?')} s, {_windows(told)} windows, validator lost {json.dumps(lost)}"
+
+
+def _windows(told: Mapping[str, Mapping[str, str]]) -> int:
+    validator = _of(told, "push_validator")
+    return next((int(value) for key, value in validator.items() if key.endswith(" windows") and key[0] != "k"), 0)
+
+
+def _of(told: Mapping[str, Mapping[str, str]], node: str) -> Mapping[str, str]:
+    return next((values for name, values in told.items() if node in name), {})
+
+
+def _with_children(nodes: Mapping[str, int]) -> dict[str, int]:
+    """The nodes and the processes that they have started, by name and number."""
+    found = dict(nodes)
+    for name, number in nodes.items():
+        found |= {f"{name}, child {k}": child for k, child in enumerate(_children(number))}
+    return found
+
+
+def _children(number: int) -> list[int]:
+    """In the order of their start; a process belongs to the thread that started it."""
+    threads = Path(f"/proc/{number}/task").iterdir()
+    return sorted(int(child) for thread in threads for child in (thread / "children").read_text().split())
+
+
+def _grew(seen: Mapping[str, list[Vitals]], warm_up: float, most: float) -> bool:
+    grown = {name: growth(values, warm_up) for name, values in seen.items()}
+    for name, each in grown.items():
+        print(f"{name:25s}after warm-up: {each}")
+    return any(g.memory > most or g.threads > 0 or g.descriptors > 0 for g in grown.values())
+
+
+def _node(executable: str, parameters: Mapping[str, Any]) -> Any:
+    assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_text(value)}")]
+    return process("-m", f"push_predictor.nodes.{executable}", "--ros-args", *assigned)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(str(value) if isinstance(value, Path) else value)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=10.0, help="at most (default %(default)s)")
+    parser.add_argument("--hours", type=float, default=24.0, help="of recorded time (default %(default)s)")
+    parser.add_argument("--rate", type=float, default=100.0, help="of the replay (default %(default)s)")
+    parser.add_argument("--recording", type=Path, default=RECORDING, help="default bags/square_abs_test")
+    parser.add_argument("--every", type=float, default=30.0, help="s between two looks (default %(default)s)")
+    parser.add_argument("--warm-up", type=float, default=2.0, help="minutes (default %(default)s)")
+    parser.add_argument("--most-growth", type=float, default=5.0, help="MB of a process (default %(default)s)")
+    parser.add_argument("--domain", type=int, default=80, help="ROS domain to run in (default %(default)s)")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,130 @@
+"""Many clients of one predict_server, for a long time: what answers take, whether any is lost, what the server grows.
+
+    python -m benchmarks.nodes.load [--clients 50] [--minutes 10] [--rate 5] [--domain D]
+
+Fifty clients, ten a process, each with a node of its own, ask the shipped model one push or, every tenth time, a batch
+of a hundred. Two more ask and take no answer: one never looks (`deaf`), one is stopped as by Ctrl-Z (`stopped`). A
+request that gets no answer within 5 s is an error that its client knows of; `lost` are those that came to nothing at
+all. Status 1 if any was lost, refused, answered wrongly, or the server's memory grew by more than 5 MB after a minute.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+
+from benchmarks.nodes.load_client import MANY, SINGLE, TIMEOUT
+from benchmarks.nodes.server_under_test import caller, graph, load, predict_server
+from benchmarks.nodes.vitals import Growth, Vitals, growth, vitals
+from push_predictor.resources import DEFAULT_MODEL, share_path
+
+A_PROCESS = 10  # clients; with a process each, localhost discovery would not find them all
+WARM_UP = 60.0  # s
+MOST_GROWTH = 5.0  # MB
+
+
+def main() -> int:
+    """Run, report, judge."""
+    options = _options()
+    os.environ.update(ROS_DOMAIN_ID=str(options.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    seconds, before = options.minutes * 60.0, load()
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="push_load_")))
+        server = stack.enter_context(predict_server(share_path(*DEFAULT_MODEL)))
+        counts = [min(A_PROCESS, options.clients - first) for first in range(0, options.clients, A_PROCESS)]
+        groups: list[tuple[str, ...]] = [("--deaf",), ("--stopped",)]
+        groups += [("--clients", f"{count}", "--seed", f"{k + 1}") for k, count in enumerate(counts)]
+        common = ("--seconds", f"{seconds}", "--rate", f"{options.rate}")
+        files = [folder / f"{k}.json" for k in range(len(groups))]
+        running = [stack.enter_context(_clients(f, *common, *g)) for f, g in zip(files, groups, strict=True)]
+        for process in running:
+            assert process.stdout is not None
+            while process.stdout.readline() not in (b"asking\n", b""):  # the middleware may have a word to say, too
+                pass
+        seen = _watched(server, running[2:], options.every)
+        served = _served(stack)
+        accounts = [account for file in files[2:] for account in json.loads(file.read_text())]
+    print(f"{options.clients} clients, {seconds:g} s; load average {before} before, {load()} after, two cores")
+    print(f"the server says that it answered {served}, those who take no answer included")
+    bad = [_report(name, [account[name] for account in accounts]) for name in (SINGLE, MANY)]
+    grown = growth(seen, min(WARM_UP, seconds / 3.0))
+    print(f"server, after warm-up: {grown}")
+    return 1 if any(bad) or _grew(grown) else 0
+
+
+def _grew(grown: Growth) -> bool:
+    return grown.memory > MOST_GROWTH or grown.descriptors > 0 or grown.threads > 0
+
+
+def _served(stack: ExitStack) -> str:
+    """How many requests the server says that it has served and refused."""
+    stack.enter_context(graph(int(os.environ["ROS_DOMAIN_ID"])))
+    told = stack.enter_context(caller()).reported("/push_predictor")
+    return f"{told['requests_served']} and refused {told['requests_refused']}"
+
+
+def _watched(server: int, asking: list[subprocess.Popen[bytes]], every: float) -> list[Vitals]:
+    """The server's vitals until all clients have ended."""
+    begun, seen = monotonic(), [vitals(server)]
+    while any(process.poll() is None for process in asking):
+        sleep(min(every, 1.0))
+        if monotonic() - begun >= every * len(seen):
+            seen.append(vitals(server))
+            print(f"{monotonic() - begun:7.1f} s  {seen[-1]}  load {load()}", flush=True)
+    if failed := [process.returncode for process in asking if process.returncode]:
+        raise SystemExit(f"clients ended with status {failed}")
+    return seen
+
+
+def _report(name: str, accounts: list[dict[str, Any]]) -> int:
+    """Print what became of the requests of a service; answers how many it is to be blamed for."""
+    seconds = np.concatenate([account["seconds"] for account in accounts])
+    total = {key: sum(account[key] for account in accounts) for key in ("asked", "refused", "timed_out", "wrong")}
+    lost = total["asked"] - len(seconds) - total["timed_out"]
+    p50, p99, longest = np.percentile(seconds, [50, 99, 100]) * 1e3 if len(seconds) else [np.nan] * 3
+    print(
+        f"{name:20s}asked {total['asked']}, answered {len(seconds)}: p50 {p50:.2f} ms, p99 {p99:.2f} ms, longest "
+        f"{longest:.1f} ms; refused {total['refused']}, answered wrongly {total['wrong']}, "
+        f"no answer within {TIMEOUT:g} s {total['timed_out']}, lost without an error {lost}"
+    )
+    return int(lost + total["refused"] + total["wrong"])
+
+
+@contextmanager
+def _clients(out: Path, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of clients; leaving kills it, for one that is stopped hears no other signal."""
+    environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+    if "--clients" not in arguments:  # stopped, it would hold a lock of the shared memory that all domains use
+        environment["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
+    command = [sys.executable, "-m", "benchmarks.nodes.load_client", "--out", str(out), *arguments]
+    running = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE)
+    try:
+        yield running
+    finally:
+        running.kill()
+        running.wait()
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--clients", type=int, default=50, help="default %(default)s")
+    parser.add_argument("--minutes", type=float, default=10.0, help="default %(default)s")
+    parser.add_argument("--rate", type=float, default=5.0, help="requests a second of each client (%(default)s)")
+    parser.add_argument("--every", type=float, default=30.0, help="s between two looks at the server (%(default)s)")
+    parser.add_argument("--domain", type=int, default=79, help="ROS domain to run in (default %(default)s)")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

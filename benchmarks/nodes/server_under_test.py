@@ -1,0 +1,163 @@
+"""A predict_server in a process of its own and a client for it: what the benchmarks of its services share."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+from push_predictor_interfaces.srv import PredictPush
+
+DEPTH = QoSProfile(depth=100)
+NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])  # m, m, rad: dy and dtheta go together
+
+
+class Caller:
+    """Calls services one at a time, and hears what their nodes report on /diagnostics."""
+
+    def __init__(self) -> None:
+        self.node = Node("benchmark_client")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.diagnostics: dict[str, dict[str, str]] = {}  # by the name of the status
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 10)
+
+    def client(self, kind: Any, name: str) -> Client:
+        """A client whose service is there. Ends the program if it does not appear."""
+        client = self.node.create_client(kind, name, qos_profile=DEPTH)
+        if not client.wait_for_service(30.0):
+            raise SystemExit(f"{client.srv_name}: the service did not appear within 30 s")
+        return client
+
+    def timed(self, client: Client, request: Any) -> tuple[float, Any]:
+        """Seconds from the call to the response, and the response. A refusal ends the program."""
+        start = perf_counter()
+        future = client.call_async(request)
+        self.spin_until(future.done)
+        elapsed = perf_counter() - start
+        response = future.result()
+        if response is None or (hasattr(response, "mean") and not response.success):
+            raise SystemExit(f"{client.srv_name} refused: {response and response.message}")
+        return elapsed, response
+
+    def spin_until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Handle what arrives until the condition holds. Ends the program after so many seconds."""
+        end = perf_counter() + seconds
+        while not condition():  # spin_until_future_complete would leave tasks behind, and slow down
+            if perf_counter() > end:
+                raise SystemExit(f"no answer within {seconds:g} s")
+            self.executor.spin_once(timeout_sec=seconds)
+
+    def reported(self, node_name: str) -> dict[str, str]:
+        """What the server of that name says of itself, from a status that is heard from now on."""
+        self.diagnostics.clear()
+        self.spin_until(lambda: any(name.startswith(node_name) for name in self.diagnostics), 10.0)
+        return next(values for name, values in self.diagnostics.items() if name.startswith(node_name))
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.diagnostics[status.name] = {pair.key: pair.value for pair in status.values}
+
+
+@contextmanager
+def graph(domain: int) -> Iterator[None]:
+    """ROS in this process and those it starts, on this machine only."""
+    os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    rclpy.init()
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+@contextmanager
+def caller() -> Iterator[Caller]:
+    """A node that calls services."""
+    made = Caller()
+    try:
+        yield made
+    finally:
+        made.executor.shutdown()
+        made.node.destroy_node()
+
+
+@contextmanager
+def predict_server(model: Path, namespace: str = "") -> Iterator[int]:
+    """A running predict_server of one model; its process id."""
+    names = ["-r", f"__ns:={namespace}"] if namespace else []
+    arguments = ["--ros-args", "-p", f"models:=['{model}']", *names]
+    with process("-m", "push_predictor.nodes.predict_server", *arguments) as number:
+        yield number
+
+
+@contextmanager
+def process(*arguments: str) -> Iterator[int]:
+    """Another Python with this repository's packages; its id."""
+    # Inherited, it would keep a Python of another environment from setting its library path.
+    environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+    environment["OPENBLAS_NUM_THREADS"] = "1"
+    root = str(Path(__file__).resolve().parents[2])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+    running = subprocess.Popen([sys.executable, *arguments], env=environment)
+    try:
+        yield running.pid
+    finally:
+        running.terminate()
+        running.wait(10.0)
+
+
+@contextmanager
+def model_files(*sizes: int) -> Iterator[list[Path]]:
+    """For each size a file with a VHGP that learnt from so many simulated windows of the MIT square."""
+    with tempfile.TemporaryDirectory(prefix="push_model_") as folder:
+        paths = [Path(folder) / f"vhgp_{size}.pushmodel" for size in sizes]
+        for size, path in zip(sizes, paths, strict=True):
+            save_model(_trained(size), path)
+        yield paths
+
+
+def single_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
+    """So many of the model's training pushes, drawn at random."""
+    table = model.training
+    rows = np.random.default_rng(0).integers(0, len(table), count)
+    return [
+        PredictPush.Request(velocity=v, contact=c, angle=a, duration=d)
+        for (v, c, a), d in zip(table.inputs[rows].tolist(), table.duration[rows].tolist(), strict=True)
+    ]
+
+
+def load() -> str:
+    """The machine's load now, to print beside times."""
+    return "{:.1f} {:.1f} {:.1f}".format(*os.getloadavg())
+
+
+def _trained(count: int) -> PushModel:
+    rng = np.random.default_rng(0)
+    rig = Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
+    inputs = rng.uniform([0.01, 0.0, -1.2], [0.05, 1.0, 1.2], (count, 3))
+    duration = np.full(count, 0.2)
+    outcomes = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    outcomes += rng.normal(size=(count, 3)) @ NOISE * (0.3 + np.abs(inputs[:, 2:]))
+    table = PushTable(inputs, duration, outcomes, np.array([f"p{k // 10}" for k in range(count)]))
+    return train_model(table, rig, "vhgp", name=f"vhgp_{count}")

@@ -1,0 +1,102 @@
+"""How long the nodes take to be ready, beside an empty node, and the command line to help, beside Python alone.
+
+    python -m benchmarks.nodes.start [--repeats 5] [--domain D]
+
+A node is ready when its service is found by a node that runs already. All are started in turns, so that all see the
+same load of the machine, which is printed. Ratios are of the fastest starts: an announcement that another node misses,
+which happens now and then, is made again only after 3 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from time import perf_counter, sleep
+
+from std_srvs.srv import Trigger
+
+from benchmarks.nodes.server_under_test import caller, graph, load, process
+from push_predictor_interfaces.srv import IsPaused, PredictPush
+
+ROOT = Path(__file__).resolve().parents[2]
+EMPTY = "empty node"
+PATIENCE = 60.0  # s
+_EMPTY_NODE = (
+    "import rclpy; from std_srvs.srv import Trigger; "
+    "rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.NO); node = rclpy.create_node('empty'); "
+    "node.create_service(Trigger, 'empty', lambda q, a: a); rclpy.spin(node)"
+)
+NODES = {
+    EMPTY: (("-c", _EMPTY_NODE), Trigger, "empty"),
+    "predict_server": (("-m", "push_predictor.nodes.predict_server"), PredictPush, "predict_push"),
+    "push_validator": (("-m", "push_predictor.nodes.push_validator"), Trigger, "push_validator/finish"),
+    "push_replay": (
+        (
+            "-m",
+            "push_predictor.nodes.push_replay",
+            "--ros-args",
+            "-p",
+            f"recording:={ROOT / 'bags' / 'hexagon_delrin'}",
+        ),
+        IsPaused,
+        "push_replay/is_paused",
+    ),
+}
+PROGRAMS = {
+    "python alone": ("-c", "pass"),
+    "push_predictor --help": ("-m", "push_predictor.cli", "--help"),
+}
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=5, help="of each (default %(default)s)")
+    parser.add_argument("--domain", type=int, default=82, help="ROS domain to run in (default %(default)s)")
+    options = parser.parse_args()
+    taken: dict[str, list[float]] = {name: [] for name in (*NODES, *PROGRAMS)}
+    before = load()
+    with graph(options.domain):
+        for _ in range(options.repeats):
+            for name in NODES:
+                taken[name].append(_ready(name))
+            for name, arguments in PROGRAMS.items():
+                taken[name].append(_ended(arguments))
+    _print(taken, EMPTY, list(NODES))
+    _print(taken, "python alone", list(PROGRAMS))
+    print(f"fastest of {options.repeats}; load average {before} before, {load()} after, {os.cpu_count()} cores")
+    return 0
+
+
+def _ready(name: str) -> float:
+    arguments, kind, service = NODES[name]
+    with caller() as asking:
+        client = asking.node.create_client(kind, service)
+        begun = perf_counter()
+        with process(*arguments):
+            while not client.service_is_ready():  # wait_for_service looks every 0.25 s
+                if perf_counter() > begun + PATIENCE:
+                    raise SystemExit(f"{name}: no {client.srv_name} after {PATIENCE:g} s")
+                sleep(0.005)
+            return perf_counter() - begun
+
+
+def _ended(arguments: Sequence[str]) -> float:
+    begun = perf_counter()
+    subprocess.run([sys.executable, *arguments], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+    return perf_counter() - begun
+
+
+def _print(taken: dict[str, list[float]], base: str, names: Sequence[str]) -> None:
+    for name in names:
+        ratio = min(taken[name]) / min(taken[base])
+        print(f"{name:22s} {min(taken[name]):6.2f} s, median {median(taken[name]):.2f} s  {ratio:6.2f} x {base}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

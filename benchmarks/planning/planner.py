@@ -1,0 +1,168 @@
+"""What a planner gains by knowing the scatter of its pushes: goals on the simulated rig, with and without.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.planning.planner [--goals N] [--model FILE] [--probability P]
+
+The same planner (planning/choose.py), the same pushes, the same means; only the covariance differs: the model's own;
+one that is the same for every window (the mean of those of the training windows) and grows with a push as the model's
+does; one that is the same for every push (the mean of the pushes'); and none. Goals, places on the table and what
+differs from push to push are drawn once for all. Every regime that is listed below is printed. The model is that of
+bags/square_abs_train, whose rig the simulated cell is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.planning.planner_table import Regime, Runs, table
+from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.train import train_model
+from push_predictor.planning.choose import Choice, choose_push
+from push_predictor.planning.goal import Goal
+from push_predictor.planning.persistence import persistence_of
+from push_predictor.planning.repertoire import Repertoire, push_grid, repertoire
+from push_predictor.planning.unscented import Predict, PusherGeometry
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.simulation.interactive_rig import push_once
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.types import Array, TextArray
+
+TRAINING = Path(__file__).resolve().parents[2] / "bags" / "square_abs_train"
+WINDOW = 0.2  # s
+VELOCITY = 0.02  # m/s, of most of the training pushes
+WINDOWS = (1, 2, 3, 4, 5, 6, 8)  # 4 to 32 mm
+VARIANTS = ("VHGP", "same for every window", "same for every push", "none")
+SEED = 2026
+AREA = 0.12  # m, half the side of the square of the table on which sliders start
+IDLE = (0.125, 0.0, 0.001)  # contact, angle, travel of the push on a slider that is done; not looked at
+
+
+REGIMES = (
+    Regime("near, tight", 0.02, 0.3, 0.001, 0.03),
+    Regime("near, any heading", 0.025, 0.0, 0.001, None),
+    Regime("far, tight", 0.06, 0.6, 0.001, 0.03),
+    Regime("far, middling", 0.06, 0.6, 0.002, 0.05),
+    Regime("far, loose", 0.06, 0.6, 0.004, 0.1),
+    Regime("far, any heading", 0.06, 0.0, 0.002, None),
+)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--goals", type=int, default=100, help="of every regime")
+    parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train; trained now unless given")
+    parser.add_argument("--probability", type=float, default=0.9, help="at which one push shall reach")
+    parser.add_argument("--regimes", nargs="*", help="names; all unless given")
+    options = parser.parse_args(arguments)
+    model = load_model(options.model) if options.model else trained()
+    repertoires = repertoires_of(tabulate(model))
+    count = len(repertoires[VARIANTS[0]])
+    print(f"{count} pushes to choose from; {options.goals} goals; probability {options.probability}\n")
+    for regime in REGIMES:
+        if not options.regimes or regime.name in options.regimes:
+            begun = time.monotonic()
+            runs = {name: run(r, regime, options.goals, options.probability) for name, r in repertoires.items()}
+            print(table(regime, runs), flush=True)
+            print(f"{regime.name}: {time.monotonic() - begun:.0f} s", file=sys.stderr)
+    return 0
+
+
+def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
+    """One a variant: the same pushes and means, those of the model; the covariances of each."""
+    model = tabulated.model
+
+    def predict(inputs: Array) -> Prediction:
+        return tabulated.predict_rows(inputs, np.full(len(inputs), WINDOW))
+
+    typical = model.predict_rows(model.training.inputs, model.training.duration).covariance.mean(axis=0)
+    persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    tip = PusherGeometry(model.rig.outline, model.rig.pusher_radius, WINDOW)
+    edges = len(model.rig.outline.vertices)
+    contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
+    lines = push_grid([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
+    own = repertoire(predict, tip, lines, WINDOWS, persistent_fraction)
+    constant = repertoire(_with_covariance(predict, typical), tip, lines, WINDOWS, persistent_fraction)
+    keys = np.intersect1d(_keys(own), _keys(constant))
+    own, constant = _only(own, keys), _only(constant, keys)
+    every = np.tile(own.covariance.mean(axis=0), (len(own), 1, 1))
+    covariances = own.covariance, constant.covariance, every, np.zeros_like(every)
+    return {name: replace(own, covariance=of) for name, of in zip(VARIANTS, covariances, strict=True)}
+
+
+def run(pushes: Repertoire, regime: Regime, count: int, probability: float) -> Runs:
+    """Bring `count` sliders to their goals, in lockstep."""
+    sliders, goals = _drawn(regime, count)
+    needed = np.full(count, regime.limit + 1)
+    promised, kept = [], []
+    for turn in range(regime.limit):
+        waiting = np.flatnonzero(needed > regime.limit)
+        choices = {int(k): choose_push(pushes, sliders[k], goals[k], probability) for k in waiting}
+        chosen = {k: choice for k, choice in choices.items() if choice is not None}
+        after = push_once(_spec(chosen, count, turn), sliders)
+        sliders[waiting] = after[waiting]
+        for k, choice in chosen.items():
+            there = bool(goals[k].reached(goals[k].ahead(sliders[k])))
+            needed[k] = turn + 1 if there else needed[k]
+            if choice.probability >= probability:
+                promised.append(choice.probability)
+                kept.append(there)
+    error = np.array([np.hypot(*goal.ahead(slider)[:2]) for goal, slider in zip(goals, sliders, strict=True)])
+    return Runs(needed, error, np.array(promised), np.array(kept, dtype=np.bool_))
+
+
+def _drawn(regime: Regime, count: int) -> tuple[Array, list[Goal]]:
+    """Sliders (n, 3) and their goals; the same for every variant."""
+    rng = np.random.default_rng([SEED, REGIMES.index(regime)])
+    sliders = np.column_stack([rng.uniform(-AREA, AREA, (count, 2)), rng.uniform(-np.pi, np.pi, count)])
+    way, toward = regime.far * rng.uniform(0.25, 1.0, count), rng.uniform(-np.pi, np.pi, count)
+    turned = rng.uniform(-regime.turned, regime.turned, count)
+    shift = np.column_stack([way * np.cos(toward), way * np.sin(toward), turned])
+    return sliders, [Goal(pose, regime.distance, regime.turn) for pose in sliders + shift]
+
+
+def _spec(chosen: Mapping[int, Choice], count: int, turn: int) -> SimulationSpec:
+    """The chosen pushes, each in the row of its goal, so that a row scatters alike for all variants."""
+    rows = np.tile(np.array([*IDLE[:2], VELOCITY, IDLE[2]]), (count, 1))
+    for k, choice in chosen.items():
+        velocity, contact, angle = choice.push.inputs[0]
+        rows[k] = contact, angle, velocity, velocity * WINDOW * choice.push.windows[0]
+    return SimulationSpec("rect1", "abs", PushPlan(*rows.T), seed=SEED + turn)
+
+
+def _keys(of: Repertoire) -> TextArray:
+    """What tells the pushes of a repertoire apart."""
+    return np.array(
+        [f"{inputs.tobytes().hex()} {count}" for inputs, count in zip(*vars(of.pushes).values(), strict=True)]
+    )
+
+
+def _only(of: Repertoire, keys: TextArray) -> Repertoire:
+    """Its pushes with these keys, in their order."""
+    rows = np.argsort(every := _keys(of))[np.searchsorted(np.sort(every), keys)]
+    return Repertoire(of.pushes.take(rows), of.mean[rows], of.covariance[rows])
+
+
+def _with_covariance(predict: Predict, covariance: Array) -> Predict:
+    def constant(inputs: Array) -> Prediction:
+        return replace(predict(inputs), covariance=np.tile(covariance, (len(inputs), 1, 1)))
+
+    return constant
+
+
+def trained() -> PushModel:
+    """A VHGP of the recording."""
+    return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="vhgp", sources=[TRAINING.name])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

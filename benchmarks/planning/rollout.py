@@ -1,0 +1,169 @@
+"""Long pushes rolled out, beside the same pushes repeated on the rig simulator.
+
+    python -m benchmarks.planning.rollout [--model FILE] [--repeats 200] [--picture PICTURE.png]
+
+Three distributions of the slider's pose at the end of a push are compared with what the simulator's repeats did:
+
+  rollout      samples carried along, with what persists within a push (planning/persistence.py)
+  independent  the same with independent windows
+  naive        one Gaussian: the path of the means, and the sum of the covariances met on it
+
+By energy distance (heading times the slider's radius of gyration), KL divergence of the Gaussians, and how many of the
+repeats lie in the ellipsoids that hold 50, 90 and 95 % of the samples. Intervals: 95 %, repeats drawn anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from benchmarks.planning.rollout_picture import draw_rollout
+from benchmarks.planning.rollout_truth import (
+    REGIONS,
+    EnergyDistance,
+    Repeats,
+    gaussian_divergence,
+    in_turn,
+    inside,
+    repeats,
+    weights_of,
+)
+from push_predictor.geometry.touch import covariance_in_world, displaced
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
+from push_predictor.models.train import train_model
+from push_predictor.planning.persistence import INDEPENDENT, persistence_of
+from push_predictor.planning.push_windows import windows_of
+from push_predictor.planning.rollout import rollout
+from push_predictor.planning.straight_drive import drive_onto
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.types import Array
+
+TRAINING = Path(__file__).resolve().parents[2] / "bags" / "square_abs_train"
+SPEED, LENGTHS = 0.02, (0.004, 0.02, 0.06, 0.1)  # m/s; m of way after which poses are compared
+CONTACTS, ANGLES = (0.03, 0.08, 0.125, 0.15, 0.2), (-0.5, 0.0, 0.4)
+ARM = 0.09 / np.sqrt(6.0)  # m, of the square
+SAMPLES = 2000
+MILLIMETRES = 1e3
+IN_TURN = 2  # of LENGTHS: the way of the pushes that are made one after the other
+
+Steps: TypeAlias = Sequence[Sequence[float]]  # velocity m/s, contact, angle rad, duration s
+
+
+def main() -> int:
+    """Simulate, roll out, print the table."""
+    options = _arguments()
+    model = load_model(options.model) if options.model else trained()
+    tabulated = tabulate(model)
+    print(f"{model.name}: {model.kind}, {len(model.training)} windows; {tabulated.how}")
+    print("persistence over 4, 8, 16, 40 mm of way, dx dy dtheta:", *_persistence(model))
+    pushes = [(contact, angle) for contact in CONTACTS for angle in ANGLES]
+    seen = [_repeated(k, *push, options.repeats) for k, push in enumerate(pushes)]
+    for place, length in enumerate(LENGTHS):
+        steps = [[[SPEED, *push, length / SPEED]] for push in pushes]
+        _report(tabulated, f"{1e3 * length:.0f} mm of way", steps, [each.poses[place] for each in seen])
+    singles = [[SPEED, *push, LENGTHS[IN_TURN] / SPEED] for push in pushes]
+    sequences = np.random.default_rng(0).permutation(len(pushes)).reshape(-1, 3)
+    truth = [in_turn([seen[k].poses[IN_TURN] for k in sequence]) for sequence in sequences]
+    steps = [[singles[k] for k in sequence] for sequence in sequences]
+    _report(tabulated, f"three pushes of {1e3 * LENGTHS[IN_TURN]:.0f} mm, one after the other", steps, truth)
+    if options.picture:
+        draw_rollout(tabulated, options.picture)
+    return 0
+
+
+def trained() -> PushModel:
+    """The default VHGP of the training recording."""
+    return train_model(load_data([TRAINING], None), load_rig_for([TRAINING], None), "vhgp", name="square_abs")
+
+
+def _repeated(number: int, contact: float, angle: float, count: int) -> Repeats:
+    print(f"simulating push {number + 1}, {count} times", file=sys.stderr)
+    return repeats(contact, angle, SPEED, np.array(LENGTHS) / SPEED, count, 1000 + number)
+
+
+def _report(tabulated: TabulatedModel, title: str, cases: Sequence[Steps], truth: Sequence[Array]) -> None:
+    weights = weights_of(len(truth[0]))
+    print(f"\n{title}: {len(cases)} of them, {len(truth[0])} repeats of each")
+    head = "".join(f"{f'{100.0 * share:.0f} %':>8s}" for share in REGIONS)
+    print(f"{'':12s}{'energy distance, mm':>28s}{'over rollout':>24s}{'KL, nats':>10s}{head}")
+    first: Array | None = None
+    for name, distribution in DISTRIBUTIONS.items():
+        samples = [distribution(tabulated, steps) for steps in cases]
+        energies = [EnergyDistance(s, t, ARM) for s, t in zip(samples, truth, strict=True)]
+        drawn = MILLIMETRES * np.mean([[e.value(w) for w in weights] for e in energies], axis=0)
+        value = MILLIMETRES * np.mean([e.value() for e in energies])
+        first = drawn if first is None else first
+        divergence = np.mean([gaussian_divergence(s, t) for s, t in zip(samples, truth, strict=True)])
+        covered = np.mean([inside(s, t) for s, t in zip(samples, truth, strict=True)], axis=(0, 1))
+        print(
+            f"{name:12s}{_interval(value, drawn):>28s}{_interval(float(np.median(drawn / first)), drawn / first):>24s}"
+            f"{divergence:10.2f}" + "".join(f"{share:8.3f}" for share in covered)
+        )
+
+
+def _interval(value: float, drawn: Array) -> str:
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"
+
+
+def _persistence(model: PushModel) -> list[str]:
+    correlation = persistence_of(model).correlation(np.array([0.004, 0.008, 0.016, 0.04]))
+    return [" ".join(f"{value:.2f}" for value in row) + ";" for row in correlation]
+
+
+def _rolled(tabulated: TabulatedModel, steps: Steps) -> Array:
+    return rollout(tabulated, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES).samples
+
+
+def _independent(tabulated: TabulatedModel, steps: Steps) -> Array:
+    return rollout(tabulated, np.zeros(3), np.zeros((3, 3)), np.array(steps), SAMPLES, persistence=INDEPENDENT).samples
+
+
+def _naive(tabulated: TabulatedModel, steps: Steps) -> Array:
+    """Samples of the Gaussian along the path of the means."""
+    slider, covariance = np.zeros((1, 3)), np.zeros((3, 3))
+    for step in steps:
+        slider, added = _step_of_means(tabulated, slider, step)
+        covariance += added
+    return np.random.default_rng(0).multivariate_normal(slider[0], covariance, SAMPLES)
+
+
+def _step_of_means(tabulated: TabulatedModel, slider: Array, step: Sequence[float]) -> tuple[Array, Array]:
+    """The slider (1, 3) after the mean displacements of a step, and the sum of their covariances (3, 3)."""
+    rig, windows, covariance = tabulated.model.rig, windows_of(tabulated.model, step[3]), np.zeros((3, 3))
+    drive, meeting = drive_onto(rig.outline, rig.pusher_radius, slider, np.array([step[:3]]))
+    for window in range(windows.count):
+        if window:
+            meeting = drive.meet(slider, meeting, window * windows.duration, windows.duration)
+        if not meeting.held[0]:
+            break
+        prediction = tabulated.predict_rows(meeting.touch.inputs, np.array([windows.asked]))
+        slider = displaced(slider, meeting.touch.heading, meeting.share[:, None] * windows.scale * prediction.mean)
+        covariance += covariance_in_world(prediction.covariance, meeting.touch.heading)[0]
+    return slider, covariance
+
+
+DISTRIBUTIONS: dict[str, Callable[[TabulatedModel, Steps], Array]] = {
+    "rollout": _rolled,
+    "independent": _independent,
+    "naive": _naive,
+}
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", type=Path, help="a model file of the square on ABS (default: train one)")
+    parser.add_argument("--repeats", type=int, default=200, help="of each push (default 200)")
+    parser.add_argument("--picture", type=Path, help="also draw the push that ends in two ways")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

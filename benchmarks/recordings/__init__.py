@@ -1,0 +1,4 @@
+"""Reading damaged bags, and the speed of the rig simulator.
+
+`fuzz_bags` and `simulation` are scripts; `bag_damage` makes the damaged copies.
+"""

@@ -1,0 +1,217 @@
+"""Damaged copies of bags are read: is all that stands before the damage used, the damage named, memory and time small?
+
+    python -m benchmarks.recordings.fuzz_bags [--copies 2000] [--seed 0]
+
+Each copy is read by a process of its own, forked off this one. A copy fails if
+
+- a message that stands before the damage is not given, or one is given that was never recorded, where the bag has
+  checksums;
+- messages are not given or differ, and no note names the file and a byte from the start of the damaged record or
+  chunk to its end (nothing can tell of a bit in a message where there are no checksums, nor of a chunk cleanly taken
+  out where there is no summary);
+- Python holds more than twice the bag's largest chunk and 128 kB (tracemalloc, while messages() is gone through), or
+  the process grows by more than 16 MB (ru_maxrss, which counts what C libraries take; its own noise is some MB);
+- reading, or `push_predictor info`'s reading after it, takes more than 2 s of processor time or 60 s
+  of the wall clock, dies, or ends with another error than
+  those that the command line prints as one line.
+
+Prints a table by kind of damage and the copies that failed, each with the command that makes it again; exit status 1
+if there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import pickle
+import re
+import resource
+import signal
+import sys
+import tempfile
+import time
+import tracemalloc
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from benchmarks.recordings.bag_damage import KINDS, Copy, Form, damaged, forms, write_form
+from push_predictor.errors import PushPredictorError
+from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.describe import describe_recording
+
+SLACK = 128_000  # bytes: notes, summary, the buffers of files
+GROWTH = 16_000_000  # bytes
+LONGEST = 2.0  # s of processor time
+HANGS = 60  # s of the wall clock
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a process saw. used: messages that are right, from the first on; strange: given but never recorded."""
+
+    used: int = 0
+    given: int = 0
+    strange: int = 0
+    notes: tuple[str, ...] = ()
+    refused: str = ""
+    python: int = 0
+    growth: int = 0
+    seconds: float = 0.0
+    died: str = ""
+
+
+def main() -> int:
+    """Read the copies, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--copies", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", type=int, help="the number of the one copy to read, its notes are printed")
+    options = parser.parse_args()
+    __import__("yaml")  # which takes memory once
+    whole, rows, failures = forms(), defaultdict(list), []
+    chosen = range(options.copies) if options.only is None else [options.only]
+    begin = time.perf_counter()
+    for number in chosen:
+        copy = copy_number(number, options.seed, whole)
+        reading = read_apart(copy)
+        rows[copy.kind].append((copy, reading))
+        if wrong := faults(copy, reading):
+            failures.append(f"--seed {options.seed} --only {number}: {copy.form.name}, {copy.kind}: {wrong}")
+        if options.only is not None:
+            print(copy.kind, copy.must, copy.near, reading)
+    print(table(rows, failed_by_kind(rows)))
+    print(f"{len(chosen)} copies of {len(whole)} bags in {time.perf_counter() - begin:.0f} s, {len(failures)} failed")
+    print(*failures, sep="\n")
+    return 1 if failures else 0
+
+
+def copy_number(number: int, seed: int, whole: list[Form]) -> Copy:
+    """The same copy whenever it is asked for; kinds and forms take turns."""
+    kinds = list(KINDS)
+    form = whole[number // len(kinds) % len(whole)]
+    return damaged(form, kinds[number % len(kinds)], Random(f"{seed} {number}"))
+
+
+def faults(copy: Copy, reading: Reading) -> str:
+    """What is wrong with a reading, in words; empty if nothing is."""
+    whole = len(copy.form.messages)
+    lost = reading.used < whole or reading.given > whole
+    found = {
+        f"died: {reading.died}": bool(reading.died),
+        f"{reading.used} messages of {copy.must} before the damage": reading.used < copy.must,
+        f"{reading.strange} messages that nobody recorded": copy.form.checked and reading.strange > 0,
+        f"not named: {reading.notes} {reading.refused}": lost
+        and _can_be_seen(copy, reading)
+        and not named(copy, reading),
+        f"Python held {reading.python} bytes": reading.python > 2 * copy.form.largest + SLACK,
+        f"the process grew by {reading.growth} bytes": reading.growth > GROWTH,
+        f"took {reading.seconds:.1f} s": reading.seconds > LONGEST,
+    }
+    return "; ".join(text for text, is_so in found.items() if is_so)
+
+
+def _can_be_seen(copy: Copy, reading: Reading) -> bool:
+    """Nothing tells of a chunk that is taken out, or a bit flipped, where nobody wrote down what there was."""
+    if copy.form.name == "no summary" and copy.kind == "a chunk missing":
+        return False
+    return copy.form.summed or reading.given != len(copy.form.messages)
+
+
+def named(copy: Copy, reading: Reading) -> bool:
+    """Does a note, or the error where nothing is left, name the place?"""
+    if reading.refused:
+        return "bag_0.mcap" in reading.refused
+    low, high = copy.near
+    places = [int(place) for note in reading.notes for place in re.findall(r"at byte (\d+)", note) if "bag_0" in note]
+    return any(low <= place <= high for place in places)
+
+
+def read_apart(copy: Copy) -> Reading:
+    """Read a copy in a forked process, which may die or hang."""
+    with tempfile.TemporaryDirectory(prefix="fuzz_bags_") as folder:
+        path = write_form(Path(folder), copy.form, copy.disk)
+        ours, theirs = os.pipe()
+        if (child := os.fork()) == 0:
+            os.close(ours)
+            signal.alarm(HANGS)
+            tempfile.tempdir = folder  # what the child unpacks there goes with it, however the child ends
+            with os.fdopen(theirs, "wb") as answer:
+                pickle.dump(_read(path, copy), answer)
+            os._exit(0)
+        os.close(theirs)
+        with os.fdopen(ours, "rb") as answer:
+            told = answer.read()
+        _, status = os.waitpid(child, 0)
+    return pickle.loads(told) if told and not status else Reading(died=f"wait status {status}")
+
+
+def _read(path: Path, copy: Copy) -> Reading:
+    """Runs in the forked process."""
+    try:
+        grown, begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+        used, given, strange, notes, refused, held = _messages(path, copy)
+        growth = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - grown)
+        try:
+            described = describe_recording(path)
+            notes += tuple(map(str, described["notes"]))
+        except (PushPredictorError, OSError):
+            pass
+        return Reading(used, given, strange, notes, refused, held, growth, time.process_time() - begin)
+    except BaseException as error:
+        return Reading(died=repr(error))
+
+
+def _messages(path: Path, copy: Copy) -> tuple[int, int, int, tuple[str, ...], str, int]:
+    expected, known = copy.form.messages, frozenset(copy.form.messages)
+    used = given = strange = 0
+    notes: tuple[str, ...] = ()
+    refused = ""
+    tracemalloc.start()
+    try:
+        bag = open_bag(path)
+        for message in bag.messages():
+            told = (message.topic, message.log_time, message.data)
+            used += used == given < len(expected) and told == expected[given]
+            strange += told not in known
+            given += 1
+        notes = tuple(bag.notes)
+    except (PushPredictorError, OSError) as error:
+        refused = str(error)
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return used, given, strange, notes, refused, held
+
+
+def failed_by_kind(rows: dict[str, list[tuple[Copy, Reading]]]) -> dict[str, int]:
+    """The number of copies that failed."""
+    return {kind: sum(bool(faults(copy, reading)) for copy, reading in of_kind) for kind, of_kind in rows.items()}
+
+
+def table(rows: dict[str, list[tuple[Copy, Reading]]], failed: dict[str, int]) -> str:
+    """In Markdown, a line a kind of damage."""
+    lines = [
+        "| damage | copies | used / before the damage | used / in the whole bag | lost some | named with offset"
+        " | held, chunks | grew, MB | most time, s | failed |",
+        "| --- " + "| ---: " * 9 + "|",
+    ]
+    for kind, of_kind in rows.items():
+        lost = [(c, r) for c, r in of_kind if r.used < len(c.form.messages)]
+        cells = [
+            len(of_kind),
+            f"{sum(min(r.used, c.must) for c, r in of_kind)} / {sum(c.must for c, r in of_kind)}",
+            f"{sum(r.given - r.strange for _, r in of_kind)} / {sum(len(c.form.messages) for c, _ in of_kind)}",
+            len(lost),
+            sum(named(c, r) for c, r in lost),
+            f"{max(r.python / c.form.largest for c, r in of_kind):.2f}",
+            f"{max(r.growth for _, r in of_kind) / 1e6:.1f}",
+            f"{max(r.seconds for _, r in of_kind):.2f}",
+            failed[kind],
+        ]
+        lines.append(" | ".join([f"| {kind}", *map(str, cells)]) + " |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
