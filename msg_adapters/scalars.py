@@ -11,8 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from msg_adapters.streams import LIMIT
-from push_predictor.recordings.bag.cdr import decode
-from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
+from push_predictor.recordings.samples import check_samples, scalar_rules
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.types import BoolArray
 
@@ -57,7 +56,7 @@ class ScalarInbox:
         self.kind = kind
         self.received = 0
         self.rejected: Counter[str] = Counter()
-        self._layout = SCALAR_LAYOUTS[kind]
+        self._rules = scalar_rules(kind)
         self._waiting: list[tuple[bytes, int]] = []
         self._lock = threading.Lock()
 
@@ -67,7 +66,7 @@ class ScalarInbox:
     @property
     def timed(self) -> bool:
         """Whether messages bear their time."""
-        return self._layout.header
+        return self._rules.layout.header
 
     def put(self, data: bytes, sent: int) -> None:
         """Take a message and the time (ns) at which it was sent; any thread may."""
@@ -87,15 +86,14 @@ class ScalarInbox:
         with self._lock:
             count = len(self._waiting) if self.timed else sum(sent < until for _, sent in self._waiting)
             taken, self._waiting = self._waiting[:count], self._waiting[count:]
-        columns = decode([data for data, _ in taken], self._layout)
+        checked = check_samples([data for data, _ in taken], self._rules)
+        self.rejected.update(checked.rejected)
         told = [NEVER if (time := time_of(sent)) is None else time for _, sent in taken] if not self.timed else ()
-        stamp = columns.stamp if self.timed else np.array(told, dtype=np.int64)
-        usable = self._kept("unreadable", np.ones(count, dtype=bool), columns.valid)
-        usable = self._kept("not finite", usable, np.isfinite(columns.values[:, 0]))
-        usable = self._kept("without time", usable, stamp != NEVER)
+        stamp = checked.stamp if self.timed else np.array(told, dtype=np.int64)
+        usable = self._kept("without time", checked.usable, stamp != NEVER)
         if near is not None:
             usable = self._kept("another clock", usable, (stamp > near - FAR) & (stamp < near + FAR))
-        return ScalarStream(stamp[usable], columns.values[usable, 0])
+        return ScalarStream(stamp[usable], checked.values[usable, 0])
 
     def _kept(self, kind: str, usable: BoolArray, good: BoolArray) -> BoolArray:
         if count := int(np.sum(usable & ~good)):

@@ -73,7 +73,8 @@ class Outline:
         x, y = self.vertices.T
         xn, yn = np.roll(x, -1), np.roll(y, -1)
         cross = x * yn - xn * y
-        return np.array([np.sum((x + xn) * cross), np.sum((y + yn) * cross)]) / (3.0 * np.sum(cross))
+        moments = np.array([np.sum((x + xn) * cross), np.sum((y + yn) * cross)])
+        return np.asarray(moments / (3.0 * np.sum(cross)))
 
     @cached_property
     def rotational_symmetry(self) -> int:
@@ -90,7 +91,7 @@ class Outline:
         if self.semi_axes is not None:
             return np.array([0.0, 1.0])
         # Rounded, so that the k-th side of a square begins at k / 4 and not a bit beside it.
-        return np.round(self._arc / self._arc[-1], 15)
+        return np.asarray(np.round(self._arc / self._arc[-1], 15))
 
     def edge(self, contact: Array) -> tuple[IntArray, Array]:
         """Edge index (n,) and fraction along that edge (n,) of contacts (n,) in [0, 1)."""
@@ -110,7 +111,7 @@ class Outline:
             return self._curve(self._curve_parameter(contact))
         edge, fraction = self.edge(contact)
         start = self.vertices[edge]
-        return start + fraction[:, None] * (self._ends[edge] - start)
+        return np.asarray(start + fraction[:, None] * (self._ends[edge] - start))
 
     def inward_normal(self, contact: Array) -> Array:
         """Unit normals (n, 2) into the slider at contacts (n,)."""
@@ -179,7 +180,7 @@ class Outline:
     def _table(self) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
         first = np.arctan2(self.vertices[0, 1] / b, self.vertices[0, 0] / a)
-        return first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1)
+        return np.asarray(first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
@@ -188,10 +189,10 @@ class Outline:
     def _curve_normal(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
         normal = np.stack([b * np.cos(parameter), a * np.sin(parameter)], axis=-1)
-        return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
     def _curve_parameter(self, contact: Array) -> Array:
-        return np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table)
+        return np.asarray(np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table))
 
     def _project_smooth(self, points: Array) -> Projection:
         parameter = self._nearest_parameter(points)
@@ -217,7 +218,7 @@ class Outline:
             before, t = t, np.where(usable, newton, (low + high) / 2.0)
             if np.all(np.abs(t - before) < PARAMETER_TOLERANCE):
                 break
-        return np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0]))
+        return np.asarray(np.arctan2(np.copysign(np.sin(t), points[:, 1]), np.copysign(np.cos(t), points[:, 0])))
 
 
 def _signed_area(vertices: Array) -> float:

@@ -57,7 +57,7 @@ def covariance_in_world(covariance: Array, heading: Array) -> Array:
 def _angle(inward: Array, ahead: Array) -> Array:
     """From inward normals (..., 2) to directions (..., 2), rad."""
     across = inward[..., 0] * ahead[..., 1] - inward[..., 1] * ahead[..., 0]
-    return np.arctan2(across, np.sum(inward * ahead, axis=-1))
+    return np.asarray(np.arctan2(across, np.sum(inward * ahead, axis=-1)))
 
 
 def _at_corners(outline: Outline, nearest: Projection, ahead: Array) -> Array:

@@ -205,7 +205,7 @@ def test_messages_before_a_foreign_schema_or_encoding_are_used(bag: Path, what: 
         writer.finish()
     read = read_recording(bag)
     assert (len(read.slider), len(read.pusher)) == (50, 100)
-    said = "50 messages are of type 'my_msgs/msg/Pose'" if what == "type" else "/slider/pose is encoded as 'json'"
+    said = "50 messages have type 'my_msgs/msg/Pose'" if what == "type" else "/slider/pose is encoded as 'json'"
     assert any("/slider/pose" in note and said in note for note in read.notes)
 
 

@@ -14,9 +14,11 @@ from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
 from msg_adapters import streams
-from msg_adapters.streams import SLIDER, TIP, MessageBuffer, slider_stream, tip_stream, wrench_stream
+from msg_adapters.streams import MessageBuffer
 from push_predictor.nodes.validator import sensor_subscriber as sensor_inlet
+from push_predictor.recordings import samples
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.samples import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
 
@@ -83,14 +85,14 @@ def test_an_empty_frame_id_accepts_any_frame():
 
 
 def test_the_tip_is_a_point_its_orientation_does_not_matter():
-    stream = tip_stream(*filled(MessageBuffer(TIP, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
+    stream = pusher_stream(*filled(MessageBuffer(PUSHER, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
     assert stream.x.tolist() == [0.1]
-    assert len(filled(MessageBuffer(TIP, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
+    assert len(filled(MessageBuffer(PUSHER, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
 
 
 def test_of_a_wrench_the_planar_part_must_be_finite():
     inbox = filled(
-        MessageBuffer(streams.WRENCH, "world"),
+        MessageBuffer(samples.WRENCH, "world"),
         wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
         wrench(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
@@ -120,11 +122,11 @@ def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Pa
     messages += [("/pusher/wrench", WRENCH, START + k, data) for k, data in enumerate(forces)]
     read = read_recording(write_bag(tmp_path / "some.mcap", messages))
     slider = slider_stream(*filled(MessageBuffer(SLIDER, "world"), *poses).take())
-    tip = tip_stream(*filled(MessageBuffer(TIP, "world"), *poses).take())
-    force = wrench_stream(*filled(MessageBuffer(streams.WRENCH, "world"), *forces).take())
+    tip = pusher_stream(*filled(MessageBuffer(PUSHER, "world"), *poses).take())
+    force = wrench_stream(*filled(MessageBuffer(samples.WRENCH, "world"), *forces).take())
     for name in ("stamp", "x", "y", "z", "heading"):
         assert np.array_equal(getattr(slider, name), getattr(read.slider, name)), name
-    for name in ("stamp", "x", "y", "z"):
+    for name in ("stamp", "x", "y", "z", "heading"):
         assert np.array_equal(getattr(tip, name), getattr(read.pusher, name)), name
     assert read.wrench is not None
     for name in ("stamp", "fx", "fy", "torque"):

@@ -18,16 +18,7 @@ from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
 from msg_adapters.poses import PlanarPose, PlanarWrench, pose_to_message, wrench_to_message
-from msg_adapters.streams import (
-    SLIDER,
-    TIP,
-    WRENCH,
-    MessageBuffer,
-    SensorKind,
-    slider_stream,
-    tip_stream,
-    wrench_stream,
-)
+from msg_adapters.streams import MessageBuffer
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import Prediction, PushModel
@@ -35,6 +26,15 @@ from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabu
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.samples import (
+    PUSHER,
+    SLIDER,
+    WRENCH,
+    SampleRules,
+    pusher_stream,
+    slider_stream,
+    wrench_stream,
+)
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import find_windows
@@ -65,7 +65,7 @@ def through_messages(recording: Recording) -> Recording:
     return replace(
         recording,
         slider=slider_stream(*received(SLIDER, poses(recording.slider))),
-        pusher=tip_stream(*received(TIP, poses(recording.pusher))),
+        pusher=pusher_stream(*received(PUSHER, poses(recording.pusher))),
         wrench=wrench_stream(*received(WRENCH, [wrench_to_message(PlanarWrench(*row)) for row in forces])),
     )
 
@@ -75,7 +75,7 @@ def poses(stream: PoseStream) -> list[PoseStamped]:
     return [pose_to_message(PlanarPose(*row)) for row in columns]
 
 
-def received(kind: SensorKind, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
+def received(kind: SampleRules, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
     inbox = MessageBuffer(kind, "world")
     for message in messages:
         inbox.put(serialize_message(message))

@@ -229,7 +229,7 @@ def test_a_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp
         read_recording(write_mcap(tmp_path / "wrong.mcap", wrong))
     with pytest.raises(RecordingError, match="/pose is encoded as 'json', cdr is accepted"):
         read_recording(write_mcap(tmp_path / "json.mcap", poses, encoding="json"))
-    with pytest.raises(RecordingError, match="topic /pusher/pose holds no message"):
+    with pytest.raises(RecordingError, match="topic /pusher/pose contains no readable message"):
         read_recording(write_mcap(tmp_path / "none.mcap", {**poses, "/pusher/pose": (POSE, [])}))
 
 
@@ -241,8 +241,9 @@ def test_samples_that_say_nothing_are_dropped_and_counted(tmp_path: Path) -> Non
     path = write_mcap(tmp_path / "a.mcap", {**pose_topics(), "/slider/pose": (POSE, messages)})
     read = read_recording(path)
     np.testing.assert_array_equal(read.slider.stamp, np.delete(STAMP, [3, 5, 7, 9]))
-    assert any("/slider/pose: 3 samples" in note for note in read.notes)
-    assert any("/slider/pose: 1 messages" in note for note in read.notes)
+    assert "/slider/pose: 2 samples contain NaN or infinity; discarded" in read.notes
+    assert "/slider/pose: 1 samples have no orientation; discarded" in read.notes
+    assert "/slider/pose: 1 messages are not readable CDR; discarded" in read.notes
     assert len(read.pusher) == N
 
 
@@ -267,7 +268,7 @@ def test_a_quaternion_gives_its_heading_whatever_its_length_and_sign(tmp_path: P
 
 def test_another_frame_is_noted(tmp_path: Path) -> None:
     read = read_recording(write_mcap(tmp_path / "a.mcap", pose_topics("vicon")))
-    assert any("/slider/pose: frame_id 'vicon', taken for 'world'" in note for note in read.notes)
+    assert any("/slider/pose: frame_id 'vicon' is treated as 'world'" in note for note in read.notes)
 
 
 def test_header_stamps_count_not_log_times_and_file_order_is_kept(tmp_path: Path) -> None:

@@ -14,9 +14,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from msg_adapters.streams import SLIDER, TIP, WRENCH, MessageBuffer, slider_stream, tip_stream, wrench_stream
+from msg_adapters.streams import MessageBuffer
 from push_predictor.nodes.polling import PolledGroup, take_all
 from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
+from push_predictor.recordings.samples import PUSHER, SLIDER, WRENCH, pusher_stream, slider_stream, wrench_stream
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 
 DEPTH = 5000  # the most that Fast DDS keeps, of more the newest are turned away; memory is taken as they fill
@@ -24,7 +25,7 @@ PERIOD = 0.01  # s between two looks into the middleware, which keeps the last D
 PATIENCE = 1.0  # s
 TOPICS = (
     ("slider", PoseStamped, "slider/pose", SLIDER),
-    ("pusher", PoseStamped, "pusher/pose", TIP),
+    ("pusher", PoseStamped, "pusher/pose", PUSHER),
     ("wrench", WrenchStamped, "pusher/wrench", WRENCH),
 )
 
@@ -127,7 +128,7 @@ class SensorSubscriber:
         for stamp, _ in (slider, tip):
             self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # one stamp may be of another time
         scalars = self._scalars.take(self._newest)
-        return Samples(slider_stream(*slider), tip_stream(*tip), wrench_stream(*wrench), scalars)
+        return Samples(slider_stream(*slider), pusher_stream(*tip), wrench_stream(*wrench), scalars)
 
     def last_scalars(self) -> dict[str, ScalarStream]:
         """The scalars that no sensor's sample came after."""

@@ -89,6 +89,12 @@ def encode(stamp: IntArray, values: Array, layout: Layout, frame_id: str = "worl
     return [data[i : i + size] for i in range(0, len(data), size)]
 
 
+def frame_of(message: bytes) -> str:
+    """The frame_id of a readable message that begins with a header."""
+    length = int.from_bytes(message[_FRAME - 4 : _FRAME], "little" if message[1] else "big")
+    return message[_FRAME : _FRAME + length].rstrip(b"\0").decode(errors="replace")
+
+
 def _header_words(stamp: IntArray, frame_length: int) -> bytes:
     seconds, nanoseconds = np.divmod(np.asarray(stamp, np.int64), _NANO)
     if np.any((seconds < -(2**31)) | (seconds >= 2**31)):

@@ -36,12 +36,12 @@ class _Readable(Protocol[Record]):
     def read(self, stream: ReadDataStream, /) -> Record: ...
 
 
-class _Strict(ReadDataStream):
-    """The package's stream, but a string that is longer than its record is an error, not a short string."""
+class _Record(BytesIO):
+    """A record's content; a string or number that is longer than its record is an error, not a short read."""
 
-    def read(self, length: int) -> bytes:
-        data: bytes = super().read(length)
-        if len(data) < length:
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        if size is not None and len(data) < size:
             raise EndOfFile
         return data
 
@@ -61,7 +61,7 @@ CHUNK_HEAD_SIZE = _CHUNK.size + _LARGEST_NAME + _LENGTH.size
 
 def parse(kind: _Readable[Record], data: Bytes, start: int, end: int) -> Record:
     """One record's content as the mcap package's class. Raises one of UNREADABLE."""
-    return kind.read(_Strict(BytesIO(data[start:end])))
+    return kind.read(ReadDataStream(_Record(data[start:end])))
 
 
 def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
@@ -86,7 +86,7 @@ def is_head(head: bytes) -> bool:
     if len(head) < HEAD.size:
         return True
     opcode, length = HEAD.unpack(head)
-    return (opcode in _ALL or opcode >= 0x80) and length < 4 * LARGEST_CHUNK
+    return bool((opcode in _ALL or opcode >= 0x80) and length < 4 * LARGEST_CHUNK)
 
 
 def chunk_head(start: bytes, length: int) -> ChunkHead:

@@ -107,11 +107,8 @@ def _plain_dump(data: object) -> str:
     """YAML without anchors: rosbag2 reads them, other tools may not."""
     import yaml
 
-    class Plain(yaml.SafeDumper):
-        def ignore_aliases(self, data: object) -> bool:
-            return True
-
-    return str(yaml.dump(data, Dumper=Plain, sort_keys=False))
+    unshared = json.loads(json.dumps(data))  # YAML writes an anchor for every object that occurs twice
+    return str(yaml.safe_dump(unshared, sort_keys=False))
 
 
 def _topic(topic: TopicInfo) -> dict[str, object]:
