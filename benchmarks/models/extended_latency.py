@@ -12,24 +12,23 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
-from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from benchmarks.models.made_up_models import (
+    analytical_model,
+    base_model,
+    drifting_effect,
+    extended_model,
+    made_up_table,
+)
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.models.train import train_model
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 Ask = Callable[[Array, Array, Mapping[str, Array]], Prediction]
 
 
@@ -39,15 +38,15 @@ def main() -> None:
     parser.add_argument("--pushes", type=int, default=300, help="of each model (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of the pushes (default 1)")
     options = parser.parse_args()
-    base, table = _base(), _table(options.pushes, options.seed)
-    friction, centre = _effect("contact_friction", 0.05), _effect("centre_of_friction", 1e-3, 1e-3)
+    base, table = base_model(), made_up_table(options.pushes, options.seed)
+    friction, centre = drifting_effect("contact_friction", 0.05), drifting_effect("centre_of_friction", 1e-3, 1e-3)
     models = {
-        "contact_friction": _extended(base, friction),
-        "centre_of_friction": _extended(base, centre),
-        "both": _extended(base, friction, centre),
-        "generic": _extended(base, _effect(None, *np.full(18, 0.1))),
-        "anisotropic_friction": _extended(base, _effect("anisotropic_friction", 0.1, 0.05)),
-        "analytical, no effect": _analytical(base),
+        "contact_friction": extended_model(base, friction),
+        "centre_of_friction": extended_model(base, centre),
+        "both": extended_model(base, friction, centre),
+        "generic": extended_model(base, drifting_effect(None, *np.full(18, 0.1))),
+        "anisotropic_friction": extended_model(base, drifting_effect("anisotropic_friction", 0.1, 0.05)),
+        "analytical, no effect": analytical_model(base),
     }
     print(f"{'p50, us':24s}{'base':>8s}{'before':>8s}{'now':>8s}{'ratio':>8s}{'was':>8s}{'apart':>10s}")
     for name, model in models.items():
@@ -93,40 +92,6 @@ def _apart(model: PushModel, table: PushTable) -> float:
         sd = np.sqrt(np.diagonal(theirs.covariance[0]))
         apart = max(apart, float(np.max(np.abs(ours.mean - theirs.mean) / sd)))
     return apart
-
-
-def _table(count: int, seed: int) -> PushTable:
-    rng = np.random.default_rng(seed)
-    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
-    duration = np.full(count, 0.2)
-    outcomes = _physics().displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
-    covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
-    return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
-
-
-def _rig() -> Rig:
-    return Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
-
-
-def _physics() -> AnalyticalPush:
-    return AnalyticalPush(_rig().outline, _rig().pusher_radius)
-
-
-def _base() -> PushModel:
-    return train_model(_table(300, 0), _rig(), "gp", name="base")
-
-
-def _analytical(base: PushModel) -> PushModel:
-    return train_model(base.training, _rig(), "analytical", name="analytical")
-
-
-def _effect(mechanism: str | None, *size: float) -> Effect:
-    covariance = np.diag(0.1 * np.abs(size)) ** 2
-    return Effect(mechanism, "elapsed_time", DRIFT, np.array(size), covariance, np.array([0.02, 0.02, 0.5]))
-
-
-def _extended(base: PushModel, *effects: Effect) -> PushModel:
-    return replace(base, predictor=ExtendedPredictor(base.predictor, _physics(), effects, np.ones(3)))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,11 +18,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import test_node_trace_residual as tracing
 from action_msgs.msg import GoalStatus
 from made_up_traces import made_up_trace, slippery
-from synthetic import square_rig
-from test_push_model import noisy_pushes
+from synthetic import noisy_pushes, square_rig
+from trace_bench import drifting_folder, server_of
 
 from push_predictor.cli import main
 from push_predictor.commands.output import write_text
@@ -44,7 +44,17 @@ from push_predictor.reporting.canvas import draw
 from push_predictor.residuals.reporting import page as trace_report
 from push_predictor.residuals.reporting.page import write_trace_report
 
-place, drifting = tracing.place, tracing.drifting  # fixtures
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model, and a folder of pushes whose contact friction drifts."""
+    return drifting_folder(tmp_path_factory.mktemp("trace"))
+
+
+@pytest.fixture
+def drifting(place: Path, tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(place / "drifting", tmp_path / "result"))
 
 
 @contextmanager
@@ -219,7 +229,7 @@ def test_a_trace_tells_which_result_could_not_be_written(
 
 def test_a_server_with_a_full_disk_says_so_and_goes_on(place: Path, drifting: Path) -> None:
     before = contents(drifting)
-    with tracing.server_of(place / "deployed.pushmodel") as server:
+    with server_of(place / "deployed.pushmodel") as server:
         answer = list(server.push().mean)
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
         status, result = server.trace(drifting).end()

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_up_windows import made_up_windows, predict
 from rclpy.context import Context
 from rclpy.node import Node
 from ros_harness import REPOSITORY, free_domain, node_environment, ros_context, wait_until
 from synthetic import square_rig
-from test_live_validation import made_up_windows, predict
 
 from push_predictor.models.train import train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient

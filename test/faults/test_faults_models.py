@@ -11,90 +11,46 @@ import threading
 import tracemalloc
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from drifting_models import pushes
+from server_bench import GOOD, server_of
 from synthetic import square_rig
-from test_extended_model import pushes, slippery
-from test_node_predict_server import GOOD, server_of
 
+from benchmarks.models.damaged_models import KINDS, damage, equal, predict_probes, undamaged_bytes, write_models
 from push_predictor.errors import ModelFileError
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.store.model_file import FORMAT_VERSION, load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train import train_model
 
-KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
-COPIES = 60  # of each kind; benchmarks/models/damaged_models.py makes as many as it is told
+COPIES = 60  # of each kind; `python -m benchmarks.models.damaged_models` tries as many as asked for
 MEMORY = 30 << 20  # bytes that reading a forged file may take
-ONES = np.ones(3)
-
-
-def trained() -> dict[str, PushModel]:
-    """A model of every kind of body."""
-    rows, rig = pushes(25), square_rig()
-    models = {kind: train_model(rows, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
-    models["sparse"] = train_model(rows, rig, "vhgp", name="sparse", options=TrainingOptions(inducing=15))
-    predictor = ExtendedPredictor(
-        models["gp"].predictor, AnalyticalPush(rig.outline, rig.pusher_radius), (slippery(0.1, 0.05),), ONES
-    )
-    models["extended"] = replace(models["gp"], name="extended", predictor=predictor)
-    return models
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("models")
-    for name, model in trained().items():
-        save_model(model, folder / f"{name}.model")
-    return {name: folder / f"{name}.model" for name in KINDS}
-
-
-def told(model: PushModel) -> Prediction:
-    rows = pushes(4, seed=9)
-    return model.predict_rows(rows.inputs, rows.duration, rows.covariates)
-
-
-def same(one: Prediction, other: Prediction) -> bool:
-    return np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
-
-
-def damaged(data: bytes, other: bytes, rng: np.random.Generator) -> bytes:
-    """A copy with flipped bits, cut, with a hole of zeros, or of which another file has overwritten the beginning."""
-    copy, at = bytearray(data), int(rng.integers(0, len(data)))
-    match int(rng.integers(0, 6)):
-        case 0:
-            del copy[at:]
-        case 1:
-            copy[at : at + 64] = bytes(len(copy[at : at + 64]))
-        case 2:
-            copy[:at] = other[:at]
-        case _:
-            for place in {at, *rng.integers(0, len(data), int(rng.integers(0, 3))).tolist()}:
-                copy[place] ^= 1 << int(rng.integers(0, 8))
-    return bytes(copy)
+    return write_models(tmp_path_factory.mktemp("models"))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_damaged_copy_is_refused_or_answers_as_the_whole_one(
+def test_a_damaged_copy_is_refused_or_predicts_as_the_undamaged_file(
     files: dict[str, Path], kind: str, tmp_path: Path
 ) -> None:
-    whole, other = files[kind].read_bytes(), files["vhgp" if kind == "gp" else "gp"].read_bytes()
-    expected, rng, refused = told(load_model(files[kind])), np.random.default_rng(len(whole)), 0
+    undamaged, other = undamaged_bytes(files, kind)
+    expected, rng, refused = predict_probes(load_model(files[kind])), np.random.default_rng(len(undamaged)), 0
     path = tmp_path / "d.model"
     for _ in range(COPIES):
-        path.write_bytes(data := damaged(whole, other, rng))
+        path.write_bytes(data := damage(undamaged, other, rng))
         try:
             model = load_model(path)
         except ModelFileError as error:
             refused += 1
             assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
         else:
-            assert data == whole or same(told(model), expected)  # the bits were in a part that says nothing
+            assert data == undamaged or equal(predict_probes(model), expected)  # the bits were in an unused part
     assert refused > 0.6 * COPIES
 
 
@@ -107,7 +63,7 @@ def test_an_array_that_claims_to_be_smaller_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name, array in members.items():
             archive.writestr(f"{name}.npy", npy(array))
-    assert same(told(load_model(path)), told(model))
+    assert equal(predict_probes(load_model(path)), predict_probes(model))
     data = path.read_bytes()
     assert data.count(b"'<f8'") >= 3
     at = data.index(b"'<f8'", data.index(b"outcomes.npy")) + 3

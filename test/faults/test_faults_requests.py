@@ -17,15 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from drifting_models import extended, pushes, slippery
 from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Vector3
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from server_bench import Server, server_of
 from std_msgs.msg import Header
-from synthetic import square_rig
-from test_extended_model import extended, pushes, slippery
-from test_node_predict_server import Server, server_of
-from test_push_model import noisy_pushes
+from synthetic import noisy_pushes, square_rig
 
 from msg_adapters.predictions import PushQuery, query_to_batch_request, query_to_request
 from push_predictor.errors import PushPredictorError, RequestError

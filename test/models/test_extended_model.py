@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from drifting_models import DRIFT, GRAIN, NOISE, extended, grain, physics, pushes, slippery
 from synthetic import square_rig, translating_push
 
 from msg_adapters.predictions import PushQuery, prediction_from_response, query_to_batch_request, query_to_request
@@ -21,7 +22,6 @@ from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariate_range import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import KINDS, ExtendedPredictor, Prediction, PushModel
 from push_predictor.models.request import check_request, check_table
@@ -35,47 +35,8 @@ from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.extension.extended_model import extend, gain, refit_base
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
-NOISE = np.array([1e-4, 1e-4, 3e-3])
-DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
-GRAIN = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
-
-
-def physics() -> AnalyticalPush:
-    rig = square_rig()
-    return AnalyticalPush(rig.outline, rig.pusher_radius)
-
-
-def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
-    """Pushes of three windows, by the analytical model with these effects; the windows of a push share some noise."""
-    rng = np.random.default_rng(seed)
-    n = 3 * count
-    inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
-    duration = np.full(n, 0.2)
-    shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
-    outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
-    covariates = {
-        "elapsed_time": np.repeat(np.linspace(0.0, 1000.0, count), 3),
-        "topic:/warmth": np.repeat(rng.standard_normal(count), 3),
-        "slider_heading": rng.uniform(-np.pi, np.pi, n),
-    }
-    shift = sum((e.shift(physics(), Push(inputs, duration, covariates))[0] for e in effects), np.zeros((n, 3)))
-    push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
-    return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
-
-
-def slippery(size: float, sd: float = 0.0) -> Effect:
-    """A contact friction that changes by `size` in 300 s."""
-    return Effect("contact_friction", "elapsed_time", DRIFT, np.array([size]), np.array([[sd**2]]), np.ones(3))
-
-
-def grain(size: float) -> Effect:
-    return Effect(*GRAIN, np.array([size, 0.5 * size]), np.diag([1e-4, 1e-4]), np.ones(3))
-
-
-def extended(base: PushModel, *effects: Effect, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> PushModel:
-    return replace(base, predictor=ExtendedPredictor(base.predictor, physics(), effects, np.array(scale)))
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import gamma, kv
-from synthetic import square_rig
-from test_push_model import noisy_pushes
+from synthetic import noisy_pushes, square_rig
 
 from push_predictor.errors import ModelFileError
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters, fit_gp, log_likelihood_and_gradient

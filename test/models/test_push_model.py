@@ -12,31 +12,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic import square_rig, triangle
+from synthetic import noisy_pushes, square_rig, triangle
 
 from push_predictor.errors import ModelFileError, RequestError, TrainingError
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.features import push_features
-from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import check_request, check_requests
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
-from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-
-
-def noisy_pushes(n: int = 120, seed: int = 0, rig: Rig | None = None, windows_per_push: int = 3) -> PushTable:
-    """Analytical outcomes with noise that grows with the angle."""
-    rig = rig or square_rig()
-    rng = np.random.default_rng(seed)
-    inputs = np.column_stack([rng.uniform(0.01, 0.05, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
-    duration = np.full(n, 0.2)
-    exact = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
-    noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
-    push_id = np.array([f"{seed}-{k // windows_per_push}" for k in range(n)])
-    return PushTable(inputs, duration, exact + noise, push_id, {"elapsed_time": np.arange(float(n))})
 
 
 @pytest.fixture(scope="module")

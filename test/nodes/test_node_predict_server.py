@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import resource
 import signal
@@ -17,13 +16,11 @@ import pytest
 import rclpy
 import ros_harness as harness
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from server_bench import GOOD, MANY, server_of
 from service_msgs.msg import ServiceEventInfo
 from synthetic import square_pushes
 
@@ -43,22 +40,9 @@ from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server import answers
 from push_predictor.nodes.server.answers import MOST_PUSHES, answer_batch
 from push_predictor.nodes.server.parameters import PARAMETERS
-from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
+from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
-SERVICES = {
-    "predict_push": PredictPush,
-    "predict_push_batch": PredictPushBatch,
-    "list_models": ListModels,
-    "load_model": LoadModel,
-    "push_predictor/change_state": ChangeState,
-    "push_predictor/set_parameters": SetParameters,
-    "push_predictor/get_parameters": GetParameters,
-    "push_predictor/describe_parameters": DescribeParameters,
-    "push_predictor/get_state": GetState,  # last: the node has found all the others when this one is answered
-}
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
-GOOD = np.array([0.02, 0.1, 0.2])
-MANY = np.column_stack([np.full(20, 0.02), np.linspace(0.01, 0.99, 20), np.linspace(-0.9, 0.9, 20)])
 
 
 @pytest.fixture(scope="module")
@@ -71,76 +55,6 @@ def folder(tmp_path_factory) -> Path:
     whole = (place / "gp.model").read_bytes()
     (place / "damaged.model").write_bytes(whole[: len(whole) // 2])
     return place
-
-
-class Server:
-    """A running predict_server and a client for it."""
-
-    def __init__(self, process, node) -> None:
-        self.process, self.node = process, node
-        self._clients = {
-            name: node.create_client(kind, name, qos_profile=QoSProfile(depth=100)) for name, kind in SERVICES.items()
-        }
-        self.statuses: list = []
-        node.create_subscription(DiagnosticArray, "/diagnostics", lambda m: self.statuses.extend(m.status), 10)
-
-    def call(self, name, request):
-        return harness.call(self._clients[name], request)
-
-    def push(self, push=GOOD, duration=0.2, model="", covariates=None):
-        return self.call("predict_push", query_to_request(model, np.asarray(push), duration, covariates))
-
-    def batch(self, inputs, duration=0.2, model="", covariates=None):
-        query = PushQuery(model, np.asarray(inputs, dtype=float).reshape(-1, 3), duration, covariates or {})
-        return self.call("predict_push_batch", query_to_batch_request(query))
-
-    def load(self, path, name="", make_default=False):
-        return self.call("load_model", LoadModel.Request(path=str(path), name=name, make_default=make_default))
-
-    def list(self):
-        return self.call("list_models", ListModels.Request())
-
-    def state(self):
-        return self.call("push_predictor/get_state", GetState.Request()).current_state.label
-
-    def change(self, transition):
-        request = ChangeState.Request(transition=Transition(id=transition))
-        return self.call("push_predictor/change_state", request).success
-
-    def set(self, name, value):
-        kinds = {
-            str: (ParameterType.PARAMETER_STRING, "string_value"),
-            float: (ParameterType.PARAMETER_DOUBLE, "double_value"),
-        }
-        if isinstance(value, list):
-            kind, field = ParameterType.PARAMETER_STRING_ARRAY, "string_array_value"
-        else:
-            kind, field = kinds[type(value)]
-        parameter = Parameter(name=name, value=ParameterValue(**{"type": kind, field: value}))
-        return self.call("push_predictor/set_parameters", SetParameters.Request(parameters=[parameter])).results[0]
-
-    def next_status(self, ready=lambda status: True):
-        """The first status from now on that is ready."""
-        self.statuses.clear()
-        found = []
-
-        def seen() -> bool:
-            found[:] = [s for s in list(self.statuses) if ready(s)]
-            return bool(found)
-
-        assert harness.wait_until(seen, 60.0), f"no such diagnostics among {self.statuses}\n{self.process.text()}"
-        return found[0], {pair.key: pair.value for pair in found[0].values}
-
-
-@contextlib.contextmanager
-def server_of(models, **params):
-    domain = harness.free_domain()
-    params = {"models": [str(path) for path in models], "diagnostics_period": 0.2, **params}
-    running = harness.node_process("predict_server", domain=domain, params=params)
-    with running as process, harness.ros_context(domain) as node:
-        server = Server(process, node)
-        server.state()  # the node answers
-        yield server
 
 
 @pytest.fixture(scope="module")

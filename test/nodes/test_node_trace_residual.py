@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shutil
@@ -12,124 +11,33 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import ros_harness as harness
 from action_msgs.msg import GoalStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from made_up_traces import pushes, slippery
-from rclpy.action import ActionClient
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from made_up_traces import pushes
 from synthetic import square_rig
+from trace_bench import RIG, Server, drifting_folder, server_of
 from validator_bench import Status
 
-from msg_adapters.predictions import query_to_request
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.trace_worker import EXTENDED, REPORT, VERDICT, evidence_in
-from push_predictor.recordings.rig import save_rig
-from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
-from push_predictor_interfaces.action import TraceResidual
-from push_predictor_interfaces.srv import LoadModel, PredictPush
-
-STAGES = {"motion": 0.15}  # share of the work that is done when the stage begins
-PATIENCE = 60.0  # s, for a trace on a busy machine; alone it takes 3
-DRIVERS = ["elapsed_time", "slider_x"]
-RIG = "pushes.rig.yaml"
-
-
-def recorded(folder: Path, table: PushTable) -> Path:
-    """A folder as push_validator leaves it."""
-    folder.mkdir(parents=True)
-    write_table(folder / "pushes.csv", table)
-    save_rig(square_rig(), folder / RIG)
-    return folder
+from push_predictor_interfaces.srv import LoadModel
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model, and a folder of pushes whose contact friction drifts."""
-    folder = tmp_path_factory.mktemp("trace")
-    save_model(train_model(pushes(60, 1), square_rig(), "analytical", name="deployed"), folder / "deployed.pushmodel")
-    recorded(folder / "drifting", pushes(60, 2, slippery(0.1)))
-    return folder
+    return drifting_folder(tmp_path_factory.mktemp("trace"))
 
 
 @pytest.fixture
 def drifting(place: Path, tmp_path: Path) -> Path:
     """A copy of that folder."""
     return Path(shutil.copytree(place / "drifting", tmp_path / "result"))
-
-
-class Server:
-    """A running predict_server, and a client of its action."""
-
-    def __init__(self, process: harness.NodeProcess, node: Node, domain: int) -> None:
-        self.process, self.node, self.domain = process, node, domain
-        self.load = node.create_client(LoadModel, "load_model")
-        self.change = node.create_client(ChangeState, "push_predictor/change_state")
-        self._action = ActionClient(
-            node, TraceResidual, "trace_residual", feedback_sub_qos_profile=QoSProfile(depth=100)
-        )
-        self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
-
-    def trace(self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "") -> Goal:
-        return Goal(self._action, TraceResidual.Goal(model=model, covariates=covariates, output=str(output)))
-
-    def push(self, covariates: dict[str, float] | None = None, model: str = "") -> PredictPush.Response:
-        """A push that slides along the side, so that contact friction matters."""
-        return harness.call(self.predict, query_to_request(model, np.array([0.02, 0.1, 0.8]), 0.2, covariates))
-
-    def workers(self) -> list[int]:
-        """The processes of traces: children of the node that run what multiprocessing starts."""
-        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
-        children = [int(pid) for task in tasks for pid in task.read_text().split()]
-        return [pid for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
-
-    def held(self, goal: Goal) -> int:
-        """The process of a trace at work, stopped: it does not end by itself, however long the test takes."""
-        assert goal.reached("motion")
-        (worker,) = self.workers()
-        os.kill(worker, signal.SIGSTOP)
-        return worker
-
-
-class Goal:
-    """A goal that was accepted: its feedback so far, its status and result."""
-
-    def __init__(self, action: ActionClient, goal: TraceResidual.Goal) -> None:
-        assert action.wait_for_server(harness.START_TIMEOUT)
-        self.stages: list[tuple[str, float]] = []
-        sent = action.send_goal_async(goal, lambda m: self.stages.append((m.feedback.stage, m.feedback.progress)))
-        assert harness.wait_until(sent.done, PATIENCE)
-        self.handle: Any = sent.result()
-        assert self.handle.accepted
-        self._result = self.handle.get_result_async()
-
-    @property
-    def ended(self) -> bool:
-        return bool(self._result.done())
-
-    def reached(self, stage: str) -> bool:
-        return harness.wait_until(lambda: any(done >= STAGES[stage] for _, done in self.stages), PATIENCE)
-
-    def end(self) -> tuple[int, TraceResidual.Result]:
-        assert harness.wait_until(self._result.done, PATIENCE), self.stages
-        return self._result.result().status, self._result.result().result
-
-
-@contextlib.contextmanager
-def server_of(model: Path, **params: Any) -> Iterator[Server]:
-    domain = harness.free_domain()
-    params = {"models": [str(model)], **params}
-    running = harness.node_process("predict_server", domain=domain, params=params)
-    with running as process, harness.ros_context(domain) as node:
-        server = Server(process, node, domain)
-        assert server.push().success
-        yield server
 
 
 @pytest.fixture(scope="module")

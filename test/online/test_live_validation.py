@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up_windows import made_up_windows, predict
 from synthetic import square_rig
 
 from push_predictor.evaluation.metrics import gaussian_nlpd
@@ -18,7 +19,7 @@ from push_predictor.evaluation.offline import rig_difference
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.online.live_validation import LiveValidation
 from push_predictor.online.running_score import RunningScore
@@ -27,41 +28,11 @@ from push_predictor.online.window_rows import WindowRows
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 
-BEGIN = 1_700_000_000_000_000_000
-
-
-def made_up_windows(count: int, seed: int = 0, per_push: int = 4) -> list[PushWindow]:
-    """Windows of pushes that move the slider about as far as the pusher, with scatter."""
-    rng = np.random.default_rng(seed)
-    return [
-        PushWindow(
-            push_id=f"push-{k // per_push}",
-            index=k % per_push,
-            start=BEGIN + k * 200_000_000,
-            end=BEGIN + (k + 1) * 200_000_000,
-            velocity=float(rng.uniform(0.01, 0.05)),
-            contact=float(rng.uniform(0.0, 1.0)),
-            angle=float(rng.uniform(-1.0, 1.0)),
-            duration=0.2,
-            displacement=rng.normal([0.004, 0.0, 0.0], [0.001, 0.001, 0.03]),
-            slider_start=rng.normal(size=3),
-            slider_end=rng.normal(size=3),
-            push_heading=float(rng.uniform(-3.0, 3.0)),
-            covariates={"elapsed_time": 0.2 * k, "edge": float(k % 4), **({"normal_force": 1.5} if k % 3 else {})},
-        )
-        for k in range(count)
-    ]
-
 
 @pytest.fixture(scope="module")
 def models() -> dict[str, PushModel]:
     table = windows_to_table(made_up_windows(40, seed=1))
     return {kind: train_model(table, square_rig(), kind, name=kind) for kind in ("gp", "analytical")}
-
-
-def predict(model: PushModel, window: PushWindow) -> Prediction:
-    inputs = np.array([[window.velocity, window.contact, window.angle]])
-    return model.predict_rows(inputs, np.array([window.duration]))
 
 
 def answered(models: dict[str, PushModel], windows: list[PushWindow], shuffle: int = 0) -> LiveValidation:

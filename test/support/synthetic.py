@@ -34,6 +34,18 @@ def square_pushes(count: int, seed: int = 0) -> tuple[PushTable, Rig]:
     return PushTable(inputs, duration, outcomes, np.array([f"p{k // 3}" for k in range(count)])), rig
 
 
+def noisy_pushes(n: int = 120, seed: int = 0, rig: Rig | None = None, windows_per_push: int = 3) -> PushTable:
+    """Analytical outcomes with noise that grows with the angle."""
+    rig = rig or square_rig()
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.uniform(0.01, 0.05, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    duration = np.full(n, 0.2)
+    exact = AnalyticalPush(rig.outline, rig.pusher_radius).displacement(inputs, duration)
+    noise = rng.standard_normal((n, 3)) * [1e-4, 1e-4, 3e-3] * (0.3 + np.abs(inputs[:, 2:]))
+    push_id = np.array([f"{seed}-{k // windows_per_push}" for k in range(n)])
+    return PushTable(inputs, duration, exact + noise, push_id, {"elapsed_time": np.arange(float(n))})
+
+
 @dataclass(frozen=True)
 class Push:
     """A push along the inward normal of the slider, which moves with the pusher and does not turn.

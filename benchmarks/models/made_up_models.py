@@ -1,0 +1,59 @@
+"""Small models of a made-up square, plain and extended by effects: what the benchmarks of this room are run on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+
+
+def made_up_table(count: int, seed: int) -> PushTable:
+    """Windows of the square by the analytical model, with constant noise, over 1000 s."""
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+    duration = np.full(count, 0.2)
+    outcomes = square_physics().displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
+    covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
+    return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
+
+
+def square_rig() -> Rig:
+    """The MIT square on ABS."""
+    return Rig("rect1", shape_outline("rect1"), 0.00475, "abs", 0.837)
+
+
+def square_physics() -> AnalyticalPush:
+    """The textbook model of that rig."""
+    return AnalyticalPush(square_rig().outline, square_rig().pusher_radius)
+
+
+def base_model() -> PushModel:
+    """A GP of 300 windows."""
+    return train_model(made_up_table(300, 0), square_rig(), "gp", name="base")
+
+
+def analytical_model(base: PushModel) -> PushModel:
+    """The analytical model of the same windows."""
+    return train_model(base.training, square_rig(), "analytical", name="analytical")
+
+
+def drifting_effect(mechanism: str | None, *size: float) -> Effect:
+    """An effect that grows by `size` in 300 s, known to 10 %."""
+    covariance = np.diag(0.1 * np.abs(size)) ** 2
+    return Effect(mechanism, "elapsed_time", DRIFT, np.array(size), covariance, np.array([0.02, 0.02, 0.5]))
+
+
+def extended_model(base: PushModel, *effects: Effect) -> PushModel:
+    """The base with these effects."""
+    return replace(base, predictor=ExtendedPredictor(base.predictor, square_physics(), effects, np.ones(3)))
