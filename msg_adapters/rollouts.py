@@ -114,7 +114,7 @@ def seen_from(to_request: SpatialPose, slider: WorldSlider, poses: Array) -> Arr
 
 def remarks(rolled: Rollout) -> str:
     """In words, what a planner should know of a rollout; empty where all went by what the model has learnt."""
-    known, held = rolled.in_domain, rolled.held
+    known, held = rolled.in_domain, rolled.in_contact
     said = []
     if beyond := [k for k, share in enumerate(known) if share < 1.0]:
         first, share = beyond[0], 100.0 * (1.0 - known[-1])

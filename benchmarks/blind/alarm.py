@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.blind.recordings import later_spec, rig_of
 from benchmarks.blind.scores import wilson
 from push_predictor.evaluation.alarm.evidence import AlarmState
-from push_predictor.evaluation.alarm.scores import Calibration, calibrate, judged
+from push_predictor.evaluation.alarm.scores import Calibration, alarm_state, calibrate
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
@@ -128,7 +128,7 @@ def table_of(spec: SimulationSpec) -> PushTable:
 def state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:
     """What the alarm says after all pushes of a table."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
-    return judged(calibration, table, prediction.mean, prediction.covariance)
+    return alarm_state(calibration, table, prediction.mean, prediction.covariance)
 
 
 def markdown_of(rows: Sequence[Row]) -> str:

@@ -21,7 +21,7 @@ from typing import TypeAlias
 import numpy as np
 
 from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.push_scores import tally
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.predictors import ExtendedPredictor
@@ -184,7 +184,7 @@ def _plausible(effect: Effect, table: PushTable) -> bool:
 
 
 def _row(before: Step, step: Step, held: PushTable, reference: Array) -> str:
-    sums = tally(compared(step.model, held, reference))
+    sums = push_scores(compared(step.model, held, reference))
     outputs = " ".join(f"{value:.3f}" for value in sums.totals().nmse[0])
     errors = f"{by_push(sums, total_nmse).text('.3f')}, {outputs} | {by_push(sums, total_nlpd).text()}"
     told = [""] * 2 if step is before else [_interval(g) for g in gain(before.model, step.model, held, reference)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from push_predictor_paper.estimate import Estimate, by_push, difference_by_push, total_nlpd, total_nmse
 
-from push_predictor.evaluation import push_scores as tallies
+from push_predictor.evaluation import push_scores as scores
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
 from push_predictor.evaluation.push_scores import PushScores
 from push_predictor.evaluation.validation import Comparison, compare
@@ -33,9 +33,9 @@ class Fold:
     cpu: float
 
     @property
-    def tally(self) -> PushScores:
+    def push_scores(self) -> PushScores:
         """Its sums by push."""
-        return tallies.tally(self.comparison)
+        return scores.push_scores(self.comparison)
 
 
 def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False) -> Fold:
@@ -48,14 +48,14 @@ def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool
 
 def pooled(folds: Sequence[Fold]) -> PushScores:
     """The windows of all folds together; each keeps its own model's training mean as reference of the NMSE."""
-    return tallies.pooled([fold.tally for fold in folds])
+    return scores.pooled([fold.push_scores for fold in folds])
 
 
-def figures(tally: PushScores) -> str:
+def figures(push_scores: PushScores) -> str:
     """The cells under HEAD: totals over the outputs in SI units, intervals by resampling whole pushes."""
-    totals = tally.totals()
-    nmse, nlpd = by_push(tally, total_nmse), by_push(tally, total_nlpd)
-    exact = "" if _gaussian(tally) else f"{total(tally, 'exact_nlpd'):.2f}"
+    totals = push_scores.totals()
+    nmse, nlpd = by_push(push_scores, total_nmse), by_push(push_scores, total_nlpd)
+    exact = "" if _gaussian(push_scores) else f"{total(push_scores, 'exact_nlpd'):.2f}"
     cells = (f"{nmse.value:.3f} ({_listed(totals.nmse[0], '.3f')})", _between(nmse, ".2f"))
     cells += (f"{nlpd.value:.2f}", _between(nlpd, ".2f"), exact, _listed(totals.coverage[0, :, WITHIN], ".2f"))
     return " | ".join(cells)
@@ -68,13 +68,13 @@ def difference(first: PushScores, second: PushScores) -> str:
     return f"{nmse.value:+.3f} | {_between(nmse, '+.3f')} | {nlpd.value:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"
 
 
-def total(tally: PushScores, key: str) -> float:
+def total(push_scores: PushScores, key: str) -> float:
     """One figure (nmse, nlpd, exact_nlpd), summed over the outputs."""
-    return float(np.sum(getattr(tally.totals(), key)))
+    return float(np.sum(getattr(push_scores.totals(), key)))
 
 
-def _gaussian(tally: PushScores) -> bool:
-    return np.array_equal(tally.exact_nlpd, tally.nlpd)
+def _gaussian(push_scores: PushScores) -> bool:
+    return np.array_equal(push_scores.exact_nlpd, push_scores.nlpd)
 
 
 def _listed(values: Array, form: str) -> str:

@@ -27,7 +27,7 @@ def mit_square_tables(data: Path, work: Path, quick: bool) -> None:
             scores = {kind: square_scores(pushes, kind, n, split) for kind in KINDS}
             for kind in KINDS:
                 print(f"| {kind} | {n} | {_cells(scores[kind])} |", flush=True)
-            gp, vhgp = (pooled([s.tally for s in scores[kind]]) for kind in ("gp", "vhgp"))
+            gp, vhgp = (pooled([s.push_scores for s in scores[kind]]) for kind in ("gp", "vhgp"))
             print(f"| vhgp less gp | {n} | {difference(gp, vhgp)} | | |", flush=True)
 
 
@@ -46,4 +46,4 @@ def square_scores(pushes: PushSet, kind: str, n: int, split: SplitName) -> list[
 def _cells(scores: list[Score]) -> str:
     nmse, nlpd = np.mean([s.nmse.sum() for s in scores]), np.mean([s.nlpd.sum() for s in scores])
     cpu = np.mean([s.cpu for s in scores])
-    return f"{figures(pooled([s.tally for s in scores]))} | {nmse:.3f}, {nlpd:.2f} | {cpu:.2f}"
+    return f"{figures(pooled([s.push_scores for s in scores]))} | {nmse:.3f}, {nlpd:.2f} | {cpu:.2f}"

@@ -104,7 +104,7 @@ def _leave_one_out_row(runs: Sequence[Path], kind: str, fit: bool, stride: float
     folds = leave_one_run_out(runs, kind, fit, stride)
     counts = [len(fold.model.training) for fold in folds]
     inside, there = np.concatenate([fold.in_domain for fold in folds]), _nmse_in_domain(folds)
-    by_run = " ".join(f"{total(fold.tally, 'nmse'):.2f}" for fold in folds)
+    by_run = " ".join(f"{total(fold.push_scores, 'nmse'):.2f}" for fold in folds)
     title = f"{kind}, fitted" if fit else kind
     rows = f"{min(counts)} to {max(counts)}{' overlapping' if stride else ''}"
     return f"| {title} | {rows} | {figures(pooled(folds))} | {inside.mean():.0%}, {there:.2f} | {by_run} |"

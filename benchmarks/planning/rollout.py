@@ -41,7 +41,7 @@ from push_predictor.models.train import train_model
 from push_predictor.planning.persistence import INDEPENDENT, persistence_of
 from push_predictor.planning.push_windows import windows_of
 from push_predictor.planning.rollout import rollout
-from push_predictor.planning.straight_drive import drive_onto
+from push_predictor.planning.straight_drive import start_drive
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.types import Array
 
@@ -138,11 +138,11 @@ def _naive(tabulated: TabulatedModel, steps: Steps) -> Array:
 def _step_of_means(tabulated: TabulatedModel, slider: Array, step: Sequence[float]) -> tuple[Array, Array]:
     """The slider (1, 3) after the mean displacements of a step, and the sum of their covariances (3, 3)."""
     rig, windows, covariance = tabulated.model.rig, windows_of(tabulated.model, step[3]), np.zeros((3, 3))
-    drive, meeting = drive_onto(rig.outline, rig.pusher_radius, slider, np.array([step[:3]]))
+    drive, meeting = start_drive(rig.outline, rig.pusher_radius, slider, np.array([step[:3]]))
     for window in range(windows.count):
         if window:
             meeting = drive.meet(slider, meeting, window * windows.duration, windows.duration)
-        if not meeting.held[0]:
+        if not meeting.in_contact[0]:
             break
         prediction = tabulated.predict_rows(meeting.touch.inputs, np.array([windows.asked]))
         slider = displaced(slider, meeting.touch.heading, meeting.share[:, None] * windows.scale * prediction.mean)

@@ -27,7 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Validate and print; warn where the model is of another rig, or a push was trained on."""
-    from push_predictor.evaluation.alarm.scores import alarm_about
+    from push_predictor.evaluation.alarm.scores import recording_alarm
     from push_predictor.evaluation.offline import recording_rig, rig_difference, validate_recording
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> None:
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
         windows, comparison = validate_recording(model, options.recording, rig, warn)
-        alarm = alarm_about(model, windows_to_table(windows), comparison, options.false_alarm_rate)
+        alarm = recording_alarm(model, windows_to_table(windows), comparison, options.false_alarm_rate)
         metrics = {**metrics_json(comparison), "alarm": alarm}
     if difference := rig_difference(model, rig):
         warn(difference)

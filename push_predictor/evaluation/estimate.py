@@ -48,9 +48,9 @@ def of_draws(value: float, draws: Array) -> Estimate:
     return Estimate(float(value), float(low), float(high))
 
 
-def by_push(tally: PushScores, figure: Figure) -> Estimate:
-    """A figure of the pushes of a tally, by drawing whole pushes anew."""
-    return of_draws(float(figure(tally.totals())[0]), figure(tally.resampled()))
+def by_push(push_scores: PushScores, figure: Figure) -> Estimate:
+    """A figure of the pushes of a push_scores, by drawing whole pushes anew."""
+    return of_draws(float(figure(push_scores.totals())[0]), figure(push_scores.resampled()))
 
 
 def difference_by_push(first: PushScores, second: PushScores, figure: Figure) -> Estimate:

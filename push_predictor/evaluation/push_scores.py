@@ -1,4 +1,4 @@
-"""What predictions come to, push by push: sums that pool over folds and resample by whole pushes."""
+"""Scores of predictions by push: sums that can be pooled over folds and resampled by whole pushes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PushScores:
     covered: Array
 
     def totals(self, weights: Array | None = None) -> PooledScores:
-        """Figures for each row of weights (d, p) that says how often a push counts; each push once if None."""
+        """Pooled scores for each row of weights (d, p), how often each push counts; each push once if None."""
         w = np.ones((1, len(self.windows))) if weights is None else weights
         count = w @ self.windows
 
@@ -43,13 +43,13 @@ class PushScores:
         return PooledScores((w @ self.error) / (w @ self.spread), mean(self.nlpd), mean(self.exact_nlpd), shares)
 
     def resampled(self, seed: int = 0) -> PooledScores:
-        """Figures of 1000 draws of whole pushes with replacement; the same pushes drawn for every tally of them."""
+        """Pooled scores of 1000 bootstrap samples of whole pushes, the same for all models of these pushes."""
         return self.totals(push_bootstrap(self.push_id, seed))
 
 
 @dataclass(frozen=True, eq=False)
 class PooledScores:
-    """Figures of d draws: nmse, nlpd, exact_nlpd (d, 3) by output, coverage (d, 3, levels)."""
+    """Scores of d bootstrap samples: nmse, nlpd, exact_nlpd (d, 3) by output, coverage (d, 3, levels)."""
 
     nmse: Array
     nlpd: Array
@@ -57,8 +57,8 @@ class PooledScores:
     coverage: Array
 
 
-def tally(comparison: Comparison) -> PushScores:
-    """Sum what was predicted and observed over the windows of each push."""
+def push_scores(comparison: Comparison) -> PushScores:
+    """Sum the scores of a comparison over the windows of each push."""
     c = comparison
     pushes, push = np.unique(c.push_id, return_inverse=True)
     nlpd = gaussian_nlpd(c.mean, c.variance, c.observed)
@@ -69,12 +69,12 @@ def tally(comparison: Comparison) -> PushScores:
     return PushScores(pushes, np.bincount(push).astype(np.float64), *(by_push(push, column) for column in columns))
 
 
-def pooled(tallies: Sequence[PushScores]) -> PushScores:
-    """The pushes of several tallies as one: of folds (each push once), or of seeds (a push as often as it was seen)."""
-    names = np.concatenate([t.push_id for t in tallies])
+def pooled(parts: Sequence[PushScores]) -> PushScores:
+    """Scores of several folds (each push once) or seeds (a push as often as it occurs) as one."""
+    names = np.concatenate([part.push_id for part in parts])
     pushes, push = np.unique(names, return_inverse=True)
 
     def joined(field: str) -> Array:
-        return by_push(push, np.concatenate([getattr(t, field) for t in tallies]))
+        return by_push(push, np.concatenate([getattr(part, field) for part in parts]))
 
     return PushScores(pushes, *(joined(f) for f in ("windows", "error", "spread", "nlpd", "exact_nlpd", "covered")))

@@ -17,7 +17,7 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
-from push_predictor.evaluation.alarm.scores import PushJudge, calibrate
+from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.types import Array
@@ -43,7 +43,7 @@ class _Answer:
     state: AlarmState | None = None
     fired: int | None = None
     off: str = ""
-    left_out: tuple[str, ...] = ()
+    skipped: tuple[str, ...] = ()
 
 
 class PushAlarm:
@@ -62,7 +62,7 @@ class PushAlarm:
         self._score = 0
         self.state: AlarmState | None = None
         self.off = "the training pushes are being judged"
-        self.left_out: list[str] = []
+        self.skipped: list[str] = []
 
     @property
     def busy(self) -> bool:
@@ -91,7 +91,7 @@ class PushAlarm:
     def begin(self) -> None:
         """A new score: the pushes before are forgotten."""
         self._score += 1
-        self._waiting, self.state, self.left_out = [], None, []
+        self._waiting, self.state, self.skipped = [], None, []
 
     def add(self, push: JudgedPush) -> None:
         """Take a push of which every window was answered or refused."""
@@ -124,7 +124,7 @@ class PushAlarm:
             self.stop()
         if answer.score != self._score:
             return
-        self.left_out += answer.left_out
+        self.skipped += answer.skipped
         self.state = answer.state or self.state
         if answer.fired is not None and self.state is not None:
             self._fire(self.state, answer.fired)
@@ -140,20 +140,20 @@ def _serve(connection: Connection, model: PushModel, rate: float) -> None:
         connection.send(_Answer(0, off=str(error)))
         return
     connection.send(_Answer(0))
-    judge, current = PushJudge(calibration, rate), 0
+    monitor, current = AlarmMonitor(calibration, rate), 0
     try:
         while True:
             score, pushes = connection.recv()
             if score != current:
-                judge, current = PushJudge(calibration, rate), score
-            connection.send(_answer(judge, score, pushes))
+                monitor, current = AlarmMonitor(calibration, rate), score
+            connection.send(_answer(monitor, score, pushes))
     except (EOFError, OSError):
         return  # the node has ended
 
 
-def _answer(judge: PushJudge, score: int, pushes: list[JudgedPush]) -> _Answer:
-    before = len(judge.left_out)
+def _answer(monitor: AlarmMonitor, score: int, pushes: list[JudgedPush]) -> _Answer:
+    before = len(monitor.skipped)
     mean, covariance = np.concatenate([p.mean for p in pushes]), np.concatenate([p.covariance for p in pushes])
-    fired = judge.add(concatenate([p.windows for p in pushes]), mean, covariance)
+    fired = monitor.add(concatenate([p.windows for p in pushes]), mean, covariance)
     end = next((p.end for p in pushes if p.windows.pushes[0] == fired), None)
-    return _Answer(score, judge.state, end, left_out=tuple(judge.left_out[before:]))
+    return _Answer(score, monitor.state, end, skipped=tuple(monitor.skipped[before:]))

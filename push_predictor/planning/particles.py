@@ -18,21 +18,23 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.planning.push_windows import PushWindows, windows_of
-from push_predictor.planning.straight_drive import Meeting, drive_onto
+from push_predictor.planning.straight_drive import TipContact, start_drive
 from push_predictor.types import Array, BoolArray
 
 # Covariates that a sample tells; the tip touches, so its gap is none.
-OF_THE_POSE = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
+POSE_COVARIATES = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
 
 
 @dataclass(frozen=True, eq=False)
-class Pushed:
-    """p samples after a push: sliders (p, 3: x m, y m, heading rad, not wrapped); held (p,), whether the tip pushed
-    them in the last window; in_domain (p,), whether all that the model was asked of them lies in its domain.
+class PushedSamples:
+    """p samples after a push.
+
+    sliders (p, 3): x m, y m, heading rad, not wrapped; in_contact (p,): whether the tip pushed them in the last window;
+    in_domain (p,): whether all requests to the model were in its domain.
     """
 
     sliders: Array
-    held: BoolArray
+    in_contact: BoolArray
     in_domain: BoolArray
 
 
@@ -43,26 +45,26 @@ def push_particles(
     duration: float,
     persistence: Persistence,
     rng: np.random.Generator,
-    go_on: Callable[[], None] | None = None,
-) -> Pushed:
+    check_cancelled: Callable[[], None] | None = None,
+) -> PushedSamples:
     """Push sliders (p, 3), each by inputs (p, 3: velocity m/s, contact, angle rad) of its own, for duration s.
 
-    go_on: called before every window. Raises RequestError for a duration that the model cannot answer for; of the rest
-    the caller has made sure.
+    check_cancelled is called before every window and may raise. Raises RequestError for a duration that the model
+    cannot answer for; the caller has checked everything else.
     """
     model = model_of(predictor)
     windows, rig = windows_of(model, duration), model.rig
-    drive, meeting = drive_onto(rig.outline, rig.pusher_radius, sliders, inputs)
+    drive, contact = start_drive(rig.outline, rig.pusher_radius, sliders, inputs)
     deviations = Deviations(persistence, windows.duration * inputs[:, 0], rng)
     in_domain = np.ones(len(sliders), dtype=np.bool_)
     for window in range(windows.count):
-        if go_on is not None:
-            go_on()
+        if check_cancelled is not None:
+            check_cancelled()
         if window:
-            meeting = drive.meet(sliders, meeting, window * windows.duration, windows.duration)
-        moved, known = _displacements(predictor, sliders, meeting, windows, deviations.next())
-        sliders, in_domain = displaced(sliders, meeting.touch.heading, moved), in_domain & known
-    return Pushed(sliders, meeting.held, in_domain)
+            contact = drive.meet(sliders, contact, window * windows.duration, windows.duration)
+        moved, known = _displacements(predictor, sliders, contact, windows, deviations.next())
+        sliders, in_domain = displaced(sliders, contact.touch.heading, moved), in_domain & known
+    return PushedSamples(sliders, contact.in_contact, in_domain)
 
 
 def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
@@ -70,49 +72,51 @@ def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
     return predictor.model if isinstance(predictor, TabulatedModel) else predictor
 
 
-def refuse_other_covariates(model: PushModel) -> None:
+def check_covariates(model: PushModel) -> None:
     """Raise RequestError if the model needs what neither a push nor the pose of a slider tells."""
-    if foreign := [name for name in model.needs if name not in OF_THE_POSE]:
-        accepted = f"a model that needs no covariates but {', '.join(OF_THE_POSE)}: this one needs {', '.join(foreign)}"
+    if foreign := [name for name in model.needs if name not in POSE_COVARIATES]:
+        accepted = (
+            f"a model that needs no covariates but {', '.join(POSE_COVARIATES)}: this one needs {', '.join(foreign)}"
+        )
         raise RequestError("model", model.name, accepted)
 
 
 def _displacements(
-    predictor: PushModel | TabulatedModel, sliders: Array, meeting: Meeting, windows: PushWindows, deviation: Array
+    predictor: PushModel | TabulatedModel, sliders: Array, contact: TipContact, windows: PushWindows, deviation: Array
 ) -> tuple[Array, BoolArray]:
     """Displacements (p, 3) in the push frame, deviation (p, 3) standard ones off the mean, and which are in domain."""
     moved, known = np.zeros((len(sliders), 3)), np.ones(len(sliders), dtype=np.bool_)
-    held = np.flatnonzero(meeting.held)
-    if not len(held):
+    in_contact = np.flatnonzero(contact.in_contact)
+    if not len(in_contact):
         return moved, known
-    covariates = {name: column[held] for name, column in _covariates(sliders, meeting.touch.heading).items()}
-    asked = np.full(len(held), windows.asked)
-    prediction = predictor.predict_rows(meeting.touch.inputs[held], asked, covariates)
+    covariates = {name: column[in_contact] for name, column in _covariates(sliders, contact.touch.heading).items()}
+    asked = np.full(len(in_contact), windows.asked)
+    prediction = predictor.predict_rows(contact.touch.inputs[in_contact], asked, covariates)
     root = root_of(prediction.covariance)
-    drawn = prediction.mean + np.einsum("pij,pj->pi", root, deviation[held])
-    moved[held] = (windows.scale * meeting.share[held])[:, None] * drawn
-    known[held] = prediction.in_domain
+    drawn = prediction.mean + np.einsum("pij,pj->pi", root, deviation[in_contact])
+    moved[in_contact] = (windows.scale * contact.share[in_contact])[:, None] * drawn
+    known[in_contact] = prediction.in_domain
     return moved, known
 
 
 def _covariates(sliders: Array, push_heading: Array) -> dict[str, Array]:
     headings = wrap_angle(sliders[:, 2]), wrap_angle(push_heading)
     values = (sliders[:, 0], sliders[:, 1], *headings, np.zeros(len(sliders)))
-    return dict(zip(OF_THE_POSE, values, strict=True))
+    return dict(zip(POSE_COVARIATES, values, strict=True))
 
 
 class Deviations:
     """Standard normal deviations (p, 3) window by window, as persistent as told; way (p,) m of the tips a window."""
 
     def __init__(self, persistence: Persistence, way: Array, rng: np.random.Generator) -> None:
-        self._parts = persistence.lasting, persistence.passing, 1.0 - persistence.lasting - persistence.passing
-        self._keeps, self._rng = np.exp(-way[:, None] / persistence.length), rng
-        self._lasting, self._passing = rng.standard_normal((2, len(way), 3))
+        self._parts = persistence.persistent, persistence.decaying, 1.0 - persistence.persistent - persistence.decaying
+        self._keeps, self._rng = np.exp(-way[:, None] / persistence.decay_length), rng
+        self._persistent, self._decaying = rng.standard_normal((2, len(way), 3))
 
     def next(self) -> Array:
         """Those of the next window; the first call gives the first window's."""
-        lasting, passing, new = (np.sqrt(np.maximum(part, 0.0)) for part in self._parts)
-        fresh, change = self._rng.standard_normal((2, *self._lasting.shape))
-        deviation = lasting * self._lasting + passing * self._passing + new * fresh
-        self._passing = self._keeps * self._passing + np.sqrt(1.0 - self._keeps**2) * change
+        persistent, decaying, new = (np.sqrt(np.maximum(part, 0.0)) for part in self._parts)
+        fresh, change = self._rng.standard_normal((2, *self._persistent.shape))
+        deviation = persistent * self._persistent + decaying * self._decaying + new * fresh
+        self._decaying = self._keeps * self._decaying + np.sqrt(1.0 - self._keeps**2) * change
         return np.asarray(deviation)

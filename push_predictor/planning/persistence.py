@@ -1,16 +1,16 @@
-"""How long what a model does not foresee stays with a push: learnt from the windows of its training pushes.
+"""How long prediction errors persist along a push, estimated from the training pushes of a model.
 
-The windows of one push do not scatter independently. How slider and table touch changes only with the way, some of it
-lasts for the whole push, and an error of the learnt function is the same at the next window, which lies close by. Per
-output, residuals standardised by the model's own prediction are taken to correlate over a way s as
+Residuals in the windows of one push are correlated. Friction between slider and table changes only with the distance
+travelled, some of it is constant for the whole push, and the learnt function errs alike in neighbouring windows. The
+correlation of standardised residuals over a distance s of the tip is modelled per output as
 
-    lasting + passing exp(-s / length),     lasting, passing >= 0,   lasting + passing <= 1,
+    persistent + decaying exp(-s / decay_length),     persistent, decaying >= 0,   persistent + decaying <= 1,
 
-and what is left of the variance is new in every window. lasting, passing and length are fitted by least squares to the
-products of all pairs of windows of a push, no more than LAGS windows apart. For a learnt model the residuals are those
-of predictions without the whole push (left_out.py). They have heavy tails, and the few largest would decide alone, so
-they are replaced by the normal scores of their ranks. Few pushes tell little: the shares are multiplied by
-pushes / (pushes + FEW), towards windows that are independent.
+and the rest of the variance is independent from window to window. The three parameters are fitted by least squares to
+the products of all pairs of windows of a push that are at most LAGS windows apart. For a learnt model the residuals are
+leave-one-push-out (models/gaussian_process/cross_validation.py). They are replaced by their normal scores, because the
+few largest would otherwise decide. With few pushes the two fractions are shrunk by pushes / (pushes + FEW) towards
+independent windows.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ LENGTHS = np.geomspace(1e-3, 0.05, 18)  # m, tried
 
 @dataclass(frozen=True, eq=False)
 class Persistence:
-    """lasting (3,), passing (3,): shares of the variance of dx, dy, dtheta; length (3,) in m of the tip's way."""
+    """persistent, decaying (3,): fractions of the variance of dx, dy, dtheta; decay_length (3,), m."""
 
-    lasting: Array
-    passing: Array
-    length: Array
+    persistent: Array
+    decaying: Array
+    decay_length: Array
 
     def correlation(self, way: Array) -> Array:
         """Correlation (n, 3) of standardised residuals that lie a way (n,) > 0 m of the tip apart."""
-        return np.asarray(self.lasting + self.passing * np.exp(-way[:, None] / self.length))
+        return np.asarray(self.persistent + self.decaying * np.exp(-way[:, None] / self.decay_length))
 
 
 INDEPENDENT = Persistence(np.zeros(3), np.zeros(3), np.ones(3))
@@ -69,9 +69,9 @@ def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
     scores = normal_scores(residuals)
     products = scores[first] * scores[second] / np.maximum(np.mean(scores**2, axis=0), np.finfo(float).tiny)
     shares = [_fit(apart, column) for column in products.T]
-    lasting, passing, length = np.array(shares).T
+    persistent, decaying, decay_length = np.array(shares).T
     trust = pushes / (pushes + FEW)
-    return Persistence(trust * lasting, trust * passing, length)
+    return Persistence(trust * persistent, trust * decaying, decay_length)
 
 
 def whitened_residuals(model: PushModel) -> Array:
@@ -127,9 +127,9 @@ def _fit(apart: Array, products: Array) -> tuple[float, float, float]:
     fits = []
     for length in LENGTHS.tolist():
         decay = np.exp(-apart / length)
-        lasting, passing = nnls(np.column_stack([np.ones(len(apart)), decay]), products)[0]
-        if lasting + passing > 1.0:  # then nothing is new in a window
-            lasting = float(np.clip((products - decay) @ (1.0 - decay) / np.sum((1.0 - decay) ** 2), 0.0, 1.0))
-            passing = 1.0 - lasting
-        fits.append((float(np.sum((products - lasting - passing * decay) ** 2)), lasting, passing, length))
+        persistent, decaying = nnls(np.column_stack([np.ones(len(apart)), decay]), products)[0]
+        if persistent + decaying > 1.0:  # then nothing is new in a window
+            persistent = float(np.clip((products - decay) @ (1.0 - decay) / np.sum((1.0 - decay) ** 2), 0.0, 1.0))
+            decaying = 1.0 - persistent
+        fits.append((float(np.sum((products - persistent - decaying * decay) ** 2)), persistent, decaying, length))
     return min(fits)[1:]

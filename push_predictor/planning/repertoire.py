@@ -14,10 +14,10 @@ from push_predictor.planning.unscented import (
     FLOOR,
     Predict,
     PusherGeometry,
-    after_window,
-    at_the_touch,
-    lines_of,
+    initial_points,
     moments,
+    propagate,
+    tip_lines,
 )
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -68,24 +68,24 @@ class Repertoire:
 
 
 def repertoire(
-    predict: Predict, tip: PusherGeometry, inputs: Array, windows: Sequence[int], persistent_fraction: float = 0.0
+    predict: Predict, pusher: PusherGeometry, inputs: Array, windows: Sequence[int], persistent_fraction: float = 0.0
 ) -> Repertoire:
-    """What straight pushes do that begin with inputs (n, 3), each of them with every number of windows.
+    """Outcomes of straight pushes that begin with inputs (n, 3), each with every number of windows.
 
-    Left out are those that may leave the model's domain, or the slider, before the last window ends. predict: mean,
-    covariance and in_domain of one window for inputs (m, 3); only pushes within +-pi/2 are asked for. lasting: share
-    of a window's covariance that is the same in all windows of a push, 0 to 1 (persistence.py). Raises RequestError for
-    inputs that are not finite, for another share, and if no push is left.
+    Pushes that may leave the model's domain or the slider before their last window ends are dropped. predict: mean,
+    covariance and in_domain of one window for inputs (m, 3); it is called with angles within ±pi/2 only.
+    persistent_fraction: share of a window's covariance that is the same in all windows of a push (persistence.py).
+    Raises RequestError for inputs that are not finite, a fraction outside [0, 1], and if no push remains.
     """
     if not np.all(np.isfinite(inputs)):
         raise RequestError("inputs", "NaN or infinite", "finite velocities, contacts and angles")
     if not 0.0 <= persistent_fraction <= 1.0:
-        raise RequestError("lasting", persistent_fraction, "a share from 0 to 1")
-    lines = lines_of(tip, inputs)
-    rows, points = np.arange(len(inputs)), at_the_touch(len(inputs))
+        raise RequestError("persistent_fraction", persistent_fraction, "a number from 0 to 1")
+    lines = tip_lines(pusher, inputs)
+    rows, points = np.arange(len(inputs)), initial_points(len(inputs))
     ended: list[tuple[IntArray, IntArray, Array]] = []
     for window in range(max(windows, default=0)):
-        stays, points = after_window(predict, lines.take(rows), points, window, persistent_fraction)
+        stays, points = propagate(predict, lines.take(rows), points, window, persistent_fraction)
         rows = rows[stays]
         if window + 1 in windows:
             ended.append((rows, np.full(len(rows), window + 1), points[..., :3]))

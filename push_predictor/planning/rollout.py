@@ -17,7 +17,7 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.planning.particles import OF_THE_POSE, model_of, push_particles, refuse_other_covariates
+from push_predictor.planning.particles import POSE_COVARIATES, check_covariates, model_of, push_particles
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
 from push_predictor.types import Array
@@ -33,17 +33,17 @@ ROUNDING = 1e-6  # of a correlation: messages are often filled from single preci
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """mean (k, 3: x m, y m, heading rad) and covariance (k, 3, 3) of the slider's pose after each of k steps; samples
-    (p, 3) of it after the last; held (k,) and in_domain (k,): the share of the samples that the tip still pushed at
-    the end of the step, and of those for which the model has never been asked beyond the domain of its training data.
+    """Predicted poses of the slider after each of k steps.
 
-    The mean of the heading is that on the circle, and covariances are about it, by the shorter way.
+    mean (k, 3): x m, y m, heading rad (circular mean); covariance (k, 3, 3); samples (p, 3): poses after the last
+    step; in_contact (k,): share of the samples that the tip still pushes at the end of the step; in_domain (k,): share
+    of the samples for which all requests so far were in the model's domain.
     """
 
     mean: Array
     covariance: Array
     samples: Array
-    held: Array
+    in_contact: Array
     in_domain: Array
 
 
@@ -55,43 +55,45 @@ def rollout(
     particles: int = PARTICLES,
     seed: int = 0,
     persistence: Persistence | None = None,
-    go_on: Callable[[], None] | None = None,
+    check_cancelled: Callable[[], None] | None = None,
 ) -> Rollout:
     """Roll out steps (k, 4: velocity m/s, contact, angle rad, duration s) from a slider at slider_mean (3,) with
     slider_covariance (3, 3).
 
-    persistence: of what the model does not foresee, within a step; steps are independent of each other. None takes
-    what the model's training pushes show. The same seed gives the same samples. go_on: called before every window, to
-    raise where the rollout is not wanted any more. Raises RequestError.
+    persistence: correlation of the residuals within a step, None for that of the model's training pushes; steps are
+    independent of each other. The same seed gives the same samples. check_cancelled is called before every window and
+    may raise. Raises RequestError.
     """
     model, steps = model_of(predictor), np.asarray(steps, dtype=np.float64).reshape(-1, 4)
     _check(predictor, slider_mean, slider_covariance, steps, particles)
     persistence = persistence_of(model) if persistence is None else persistence
     rng = np.random.default_rng(seed)
-    sliders = drawn_poses(slider_mean, slider_covariance, particles, rng)
+    sliders = sample_poses(slider_mean, slider_covariance, particles, rng)
     known, rows = np.ones(particles, dtype=np.bool_), []
     for *inputs, duration in steps.tolist():
-        pushed = push_particles(predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng, go_on)
+        pushed = push_particles(
+            predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng, check_cancelled
+        )
         sliders, known = pushed.sliders, known & pushed.in_domain
-        rows.append((*moments_of(sliders), pushed.held.mean(), known.mean()))
-    mean, covariance, held, in_domain = zip(*rows, strict=True) if rows else ((), (), (), ())
+        rows.append((*pose_moments(sliders), pushed.in_contact.mean(), known.mean()))
+    mean, covariance, in_contact, in_domain = zip(*rows, strict=True) if rows else ((), (), (), ())
     return Rollout(
         np.reshape(mean, (-1, 3)),
         np.reshape(covariance, (-1, 3, 3)),
         _wrapped(sliders),
-        np.array(held, dtype=np.float64),
+        np.array(in_contact, dtype=np.float64),
         np.array(in_domain, dtype=np.float64),
     )
 
 
-def drawn_poses(mean: Array, covariance: Array, count: int, rng: np.random.Generator) -> Array:
+def sample_poses(mean: Array, covariance: Array, count: int, rng: np.random.Generator) -> Array:
     """Poses (count, 3) of a Gaussian; covariance (3, 3) may be singular."""
     matrix = np.asarray(covariance, dtype=np.float64)
     root = root_of(0.5 * (matrix + matrix.T)[None])[0]
     return np.asarray(mean + rng.standard_normal((count, 3)) @ root.T)
 
 
-def moments_of(poses: Array) -> tuple[Array, Array]:
+def pose_moments(poses: Array) -> tuple[Array, Array]:
     """Mean (3,) and covariance (3, 3) of poses (p, 3): heading on the circle, deviations by the shorter way."""
     heading = np.arctan2(np.mean(np.sin(poses[:, 2])), np.mean(np.cos(poses[:, 2])))
     mean = np.array([*poses[:, :2].mean(axis=0), heading])
@@ -105,7 +107,7 @@ def _wrapped(poses: Array) -> Array:
 
 def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
     model = model_of(predictor)
-    refuse_other_covariates(model)
+    check_covariates(model)
     if not np.all(np.abs(mean) <= FARTHEST):
         accepted = f"numbers up to {FARTHEST:g}: x, y in m, heading in rad"
         raise RequestError("slider_mean", np.asarray(mean).tolist(), accepted)
@@ -124,7 +126,7 @@ def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array
 def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
     try:
         windows = windows_of(model, step[3])
-        check_request(model, step[0], step[1], step[2], windows.asked, dict.fromkeys(OF_THE_POSE, 0.0))
+        check_request(model, step[0], step[1], step[2], windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
     except RequestError as error:
         raise error.within(f"steps[{index}]") from None
     return windows.count

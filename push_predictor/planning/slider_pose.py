@@ -21,8 +21,8 @@ from push_predictor.types import Array
 
 # m, as in the windows a model learns from: no force tells here, so the gap must be as small as where none was recorded;
 # a tip that reaches in does touch, and may do so by what tracker and outline may be off.
-LARGEST_GAP = WindowOptions().touch_gap_alone
-DEEPEST = WindowOptions().touch_gap
+MAX_GAP = WindowOptions().touch_gap_alone
+MAX_DEPTH = WindowOptions().touch_gap
 AGREEMENT = 1e-3  # m or rad by which a covariate may differ from what the poses say
 
 
@@ -116,10 +116,10 @@ def _check_contact(push: WorldPush, distance: float, radius: float) -> None:
     gap = distance - radius
     if distance < 0.0:
         wrong = f"outside the slider: its centre is {-distance:.3g} m inside the outline"
-    elif gap < -DEEPEST:
-        wrong = f"that touches from outside: it reaches {-gap:.3g} m into the outline, up to {DEEPEST:g} m is contact"
-    elif not gap <= LARGEST_GAP:  # nor is one that overflowed
-        wrong = f"that touches: the gap to the outline is {gap:.3g} m, up to {LARGEST_GAP:g} m is contact"
+    elif gap < -MAX_DEPTH:
+        wrong = f"that touches from outside: it reaches {-gap:.3g} m into the outline, up to {MAX_DEPTH:g} m is contact"
+    elif not gap <= MAX_GAP:  # nor is one that overflowed
+        wrong = f"that touches: the gap to the outline is {gap:.3g} m, up to {MAX_GAP:g} m is contact"
     else:
         return
     raise RequestError("pusher", _shown(push.pusher), f"a tip {wrong}")

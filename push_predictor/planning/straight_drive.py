@@ -21,14 +21,16 @@ AMISS = 0.1  # of the tip's radius: how far off it may be where it is taken to t
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
-    """p tips at p sliders in a window: where they touch; share (p,) of the window's way over which they push; held
-    (p,), whether they push at all. Where they do not, share is 0 and the touch means nothing.
+class TipContact:
+    """Contact of p tips with p sliders in a window.
+
+    share (p,): fraction of the tip's path in the window during which it pushes; in_contact (p,): whether it pushes at
+    all. Where it does not, share is 0 and touch is undefined.
     """
 
     touch: Touch
     share: Array
-    held: BoolArray
+    in_contact: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +42,10 @@ class StraightDrive:
     start: Array
     velocities: Array
 
-    def meet(self, sliders: Array, before: Meeting, time: float, window: float) -> Meeting:
+    def meet(self, sliders: Array, before: TipContact, time: float, window: float) -> TipContact:
         """How the tips push sliders (p, 3) in a window (s) that begins `time` s after the start.
 
-        before: the meeting in the last window; at a vertex a contact belongs to the edge that it slid along.
+        before: the contact in the previous window; at a vertex a contact belongs to the edge that it slid along.
         """
         tips, way = self.start + time * self.velocities, window * np.hypot(*self.velocities.T)
         nearest = self.outline.project(to_body(tips, sliders))
@@ -53,9 +55,9 @@ class StraightDrive:
         until = (nearest.distance - self.radius) / np.maximum(closing, np.finfo(float).tiny)
         until = np.clip(until, (1.0 - FARTHEST) * way, way)
         touch = self._touch(sliders, tips + until[:, None] * ahead, before.touch)
-        held = (closing > 0.0) & (until < way) & (np.abs(touch.inputs[:, 2]) < np.pi / 2.0)
-        held &= touch.distance - self.radius <= AMISS * self.radius
-        return Meeting(touch, np.where(held, 1.0 - until / way, 0.0), held)
+        in_contact = (closing > 0.0) & (until < way) & (np.abs(touch.inputs[:, 2]) < np.pi / 2.0)
+        in_contact &= touch.distance - self.radius <= AMISS * self.radius
+        return TipContact(touch, np.where(in_contact, 1.0 - until / way, 0.0), in_contact)
 
     def _touch(self, sliders: Array, tips: Array, before: Touch) -> Touch:
         touch = touches(self.outline, sliders, tips, self.velocities)
@@ -73,9 +75,9 @@ class StraightDrive:
         return replace(touch, inputs=np.column_stack([touch.inputs[:, 0], contact, angle]))
 
 
-def drive_onto(outline: Outline, radius: float, sliders: Array, inputs: Array) -> tuple[StraightDrive, Meeting]:
+def start_drive(outline: Outline, radius: float, sliders: Array, inputs: Array) -> tuple[StraightDrive, TipContact]:
     """Put tips of that radius (m) at sliders (p, 3), each at contact and angle of its inputs (p, 3: velocity m/s,
-    contact, angle rad); with the meeting in the first window.
+    contact, angle rad); with the contact in the first window.
     """
     velocity, contact, angle = inputs.T
     inward = outline.inward_normal(contact)
@@ -84,4 +86,4 @@ def drive_onto(outline: Outline, radius: float, sliders: Array, inputs: Array) -
     heading = np.arctan2(velocities[:, 1], velocities[:, 0])
     touch = Touch(inputs, heading, np.full(len(inputs), radius))
     everyone = np.ones(len(inputs), dtype=np.bool_)
-    return StraightDrive(outline, radius, start, velocities), Meeting(touch, np.ones(len(inputs)), everyone)
+    return StraightDrive(outline, radius, start, velocities), TipContact(touch, np.ones(len(inputs)), everyone)

@@ -39,7 +39,7 @@ class PusherGeometry:
     window: float
 
 
-def at_the_touch(count: int) -> Array:
+def initial_points(count: int) -> Array:
     """The points (count, 12, 6) before the first window: the pose is known, zero; what will last is not."""
     return np.broadcast_to(SIGMA * np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), (count, POINTS, 6))
 
@@ -69,18 +69,18 @@ class Lines:
         inward = touch.heading - touch.inputs[:, 2]
         gap = touch.distance - self.tip.radius
         shift = -gap[:, None] * np.column_stack([np.cos(inward), np.sin(inward), np.zeros_like(inward)])
-        held = gap.reshape(poses.shape[:2]).mean(axis=1) < LOST
-        return np.asarray(held), np.asarray(poses + shift.reshape(poses.shape))
+        in_contact = gap.reshape(poses.shape[:2]).mean(axis=1) < LOST
+        return np.asarray(in_contact), np.asarray(poses + shift.reshape(poses.shape))
 
 
-def lines_of(tip: PusherGeometry, inputs: Array) -> Lines:
+def tip_lines(tip: PusherGeometry, inputs: Array) -> Lines:
     """The lines of pushes that begin with inputs (n, 3)."""
     inward = tip.outline.inward_normal(inputs[:, 1])
     place = tip.outline.point(inputs[:, 1]) - tip.radius * inward
     return Lines(tip, place, inputs[:, :1] * rotate(inward, inputs[:, 2]))
 
 
-def after_window(
+def propagate(
     predict: Predict, lines: Lines, points: Array, window: int, persistent_fraction: float
 ) -> tuple[BoolArray, Array]:
     """Which pushes (n,) stay in the domain and at the slider, and the points of those afterwards.
@@ -102,9 +102,9 @@ def after_window(
         axis=1
     )
     spread = _spread(after[inside], anew[inside])
-    held, spread[..., :3] = lines.take(stays).settled(spread[..., :3], window + 1)
-    stays[stays] = held
-    return stays, spread[held]
+    in_contact, spread[..., :3] = lines.take(stays).settled(spread[..., :3], window + 1)
+    stays[stays] = in_contact
+    return stays, spread[in_contact]
 
 
 def _spread(points: Array, anew: Array) -> Array:

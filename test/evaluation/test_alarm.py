@@ -12,7 +12,7 @@ from synthetic import square_rig
 
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_json, with_alarm
-from push_predictor.evaluation.alarm.scores import PushJudge, calibrate, held_out, judged
+from push_predictor.evaluation.alarm.scores import AlarmMonitor, alarm_state, calibrate, held_out_moments
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import PushModel
@@ -45,9 +45,9 @@ def test_without_a_change_the_share_that_ever_fires_is_at_most_the_rate(rate: fl
     """With few calibration pushes just as with many; the union over two scores that depend leaves room."""
     runs, pushes = 1000, 60
     fired = sum(
-        fired_after(Alarm(KINDS, all_scores[:calibration], rate, seed), all_scores[calibration:]) is not None
+        fired_after(Alarm(KINDS, rows[:calibration], rate, seed), rows[calibration:]) is not None
         for seed in range(runs)
-        for all_scores in [scores(calibration + pushes, seed)]
+        for rows in [scores(calibration + pushes, seed)]
     )
     assert 0 < fired <= binom.ppf(0.999, runs, rate)
 
@@ -149,7 +149,7 @@ def models() -> dict[str, PushModel]:
 
 def alarm_of(model: PushModel, table: PushTable):
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
-    return judged(calibrate(model), table, prediction.mean, prediction.covariance)
+    return alarm_state(calibrate(model), table, prediction.mean, prediction.covariance)
 
 
 @pytest.mark.parametrize("kind", ["analytical", "gp"])
@@ -169,7 +169,9 @@ def test_training_pushes_are_judged_as_if_they_had_not_been_seen(models: dict[st
     training, new = models["gp"].training, made_up(200, 4)
     prediction = models["gp"].predict_rows(new.inputs, new.duration)
     fresh = standardised(prediction.mean, prediction.covariance, new.outcomes).std(axis=0)
-    assert standardised(*held_out(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(fresh, rel=0.15)
+    assert standardised(*held_out_moments(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(
+        fresh, rel=0.15
+    )
 
 
 def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushModel]):
@@ -178,31 +180,31 @@ def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushMod
     velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
     table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
     prediction, calibration = model.predict_rows(table.inputs, table.duration), calibrate(model)
-    judge = PushJudge(calibration)
+    monitor = AlarmMonitor(calibration)
     for push in table.pushes:
         rows = table.push_id == push
-        judge.add(table.take(rows), prediction.mean[rows], prediction.covariance[rows])
-    whole = judged(calibration, table, prediction.mean, prediction.covariance)
-    assert judge.state.log10_evidence == pytest.approx(whole.log10_evidence, abs=1e-9)
-    assert judge.state.fired_at == whole.fired_at
+        monitor.add(table.take(rows), prediction.mean[rows], prediction.covariance[rows])
+    whole = alarm_state(calibration, table, prediction.mean, prediction.covariance)
+    assert monitor.state.log10_evidence == pytest.approx(whole.log10_evidence, abs=1e-9)
+    assert monitor.state.fired_at == whole.fired_at
 
 
 def test_a_push_that_is_played_again_is_no_news(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 6)
-    judge, prediction = PushJudge(calibrate(model)), model.predict_rows(table.inputs, table.duration)
+    monitor, prediction = AlarmMonitor(calibrate(model)), model.predict_rows(table.inputs, table.duration)
     for _ in range(3):
-        judge.add(table, prediction.mean, prediction.covariance)
-    assert judge.state.pushes == 10
+        monitor.add(table, prediction.mean, prediction.covariance)
+    assert monitor.state.pushes == 10
 
 
 def test_a_push_without_a_covariate_is_left_out_and_named(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 7)
     heading = table.covariates["slider_heading"].copy()
     heading[4] = np.nan
-    judge, prediction = PushJudge(calibrate(model)), model.predict_rows(table.inputs, table.duration)
-    judge.add(replace(table, covariates={"slider_heading": heading}), prediction.mean, prediction.covariance)
-    assert judge.state.pushes == 9
-    (reason,) = judge.left_out
+    monitor, prediction = AlarmMonitor(calibrate(model)), model.predict_rows(table.inputs, table.duration)
+    monitor.add(replace(table, covariates={"slider_heading": heading}), prediction.mean, prediction.covariance)
+    assert monitor.state.pushes == 9
+    (reason,) = monitor.skipped
     assert "push 7-0001" in reason and "finite" in reason
 
 

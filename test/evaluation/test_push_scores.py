@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
-from push_predictor.evaluation.push_scores import pooled, tally
+from push_predictor.evaluation.push_scores import pooled, push_scores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.recordings.table import OUTPUTS
@@ -35,7 +35,7 @@ def rows_of(c: Comparison, rows: np.ndarray) -> Comparison:
 
 def test_the_totals_of_a_tally_are_those_of_the_json() -> None:
     c = comparison()
-    totals, told = tally(c).totals(), metrics_json(c)
+    totals, told = push_scores(c).totals(), metrics_json(c)
     for name in ("nmse", "nlpd", "exact_nlpd"):
         assert getattr(totals, name)[0] == pytest.approx([told[name][output] for output in OUTPUTS], rel=1e-12)
     for k, level in enumerate(COVERAGE_LEVELS):
@@ -45,21 +45,21 @@ def test_the_totals_of_a_tally_are_those_of_the_json() -> None:
 
 def test_the_resampled_totals_span_the_interval_of_the_json() -> None:
     c = comparison()
-    draws, told = tally(c).resampled(), metrics_json(c)["interval"]
+    draws, told = push_scores(c).resampled(), metrics_json(c)["interval"]
     for name in ("nmse", "nlpd"):
         low, high = np.quantile(getattr(draws, name).sum(axis=1), [0.025, 0.975])
         assert [low, high] == pytest.approx([told[name]["low"], told[name]["high"]], rel=1e-12)
 
 
 def test_without_an_exact_density_the_gaussian_one_is_exact() -> None:
-    t = tally(comparison(exact=False))
+    t = push_scores(comparison(exact=False))
     np.testing.assert_array_equal(t.exact_nlpd, t.nlpd)
 
 
 def test_folds_pooled_are_all_rows_at_once() -> None:
     c = comparison()
     fold = np.unique(c.push_id, return_inverse=True)[1] % 2
-    parts, whole = pooled([tally(rows_of(c, fold == k)) for k in (1, 0)]), tally(c)
+    parts, whole = pooled([push_scores(rows_of(c, fold == k)) for k in (1, 0)]), push_scores(c)
     for name in vars(whole):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
@@ -70,27 +70,27 @@ def test_each_fold_keeps_its_own_training_mean() -> None:
     moved = replace(second, training_mean=np.array([1e-3, 0.0, 0.1]))
     spread = np.sum(first.observed**2, axis=0) + np.sum((second.observed - moved.training_mean) ** 2, axis=0)
     expected = np.sum((c.observed - c.mean) ** 2, axis=0) / spread
-    np.testing.assert_allclose(pooled([tally(first), tally(moved)]).totals().nmse[0], expected)
+    np.testing.assert_allclose(pooled([push_scores(first), push_scores(moved)]).totals().nmse[0], expected)
 
 
 def test_a_push_seen_with_several_seeds_stays_one_push() -> None:
     one, other = comparison(seed=1), comparison(seed=2)
-    both = pooled([tally(one), tally(other)])
+    both = pooled([push_scores(one), push_scores(other)])
     assert both.push_id.tolist() == sorted(set(one.push_id.tolist()))
     assert both.windows.sum() == 2 * sum(SIZES)
 
 
 def test_a_push_drawn_twice_counts_as_if_it_had_been_made_twice() -> None:
     c = comparison()
-    t = tally(c)
+    t = push_scores(c)
     weights = np.array([2.0, 0.0, 1.0, 3.0, 0.0, 0.0])
     rows = np.repeat(np.arange(len(c.push_id)), weights[np.unique(c.push_id, return_inverse=True)[1]].astype(int))
-    expected, drawn = tally(rows_of(c, rows)).totals(), t.totals(weights[None])
+    expected, drawn = push_scores(rows_of(c, rows)).totals(), t.totals(weights[None])
     for name in ("nmse", "nlpd", "exact_nlpd", "coverage"):
         np.testing.assert_allclose(getattr(drawn, name), getattr(expected, name), rtol=1e-12)
 
 
 def test_two_models_of_the_same_pushes_are_resampled_alike() -> None:
-    t = tally(comparison())
+    t = push_scores(comparison())
     np.testing.assert_array_equal(t.resampled().nmse, t.totals(push_bootstrap(t.push_id)).nmse)
     np.testing.assert_array_equal(t.resampled(seed=5).nlpd, t.totals(push_bootstrap(t.push_id, 5)).nlpd)

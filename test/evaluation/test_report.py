@@ -24,6 +24,7 @@ from push_predictor.evaluation.report.figures.residuals import trend
 from push_predictor.evaluation.report.figures.slider import magnification, start_pose
 from push_predictor.evaluation.report.maps import (
     FEWEST,
+    arc_length,
     coarse_cells,
     commonest_condition,
     fine_cells,
@@ -31,7 +32,6 @@ from push_predictor.evaluation.report.maps import (
     push_map,
     recorded_map,
     sector_length,
-    way_along,
 )
 from push_predictor.evaluation.report.page import write_validation_report
 from push_predictor.evaluation.report.tables import paired_difference
@@ -170,7 +170,7 @@ class Shown(HTMLParser):
 @given(contact=st.floats(0.0, 0.2499), quarter=st.integers(0, 3))
 def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, quarter: int) -> None:
     outline = shape_outline("rect1")
-    along = way_along(outline, np.array([contact, contact + 0.25 * quarter]))
+    along = arc_length(outline, np.array([contact, contact + 0.25 * quarter]))
     assert along[0] == pytest.approx(contact * 0.36, abs=1e-12)
     assert along[1] == pytest.approx(along[0], abs=1e-12)
 
@@ -179,17 +179,17 @@ def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, qua
 def test_the_end_of_an_edge_stays_its_end(shape: str, edges: int, length: float) -> None:
     outline = shape_outline(shape)
     ends = outline.contact_on_edge(np.arange(edges), np.ones(edges))
-    assert way_along(outline, ends) == pytest.approx(np.full(edges, length))
+    assert arc_length(outline, ends) == pytest.approx(np.full(edges, length))
     starts = outline.contact_on_edge(np.arange(edges), np.zeros(edges))
-    assert way_along(outline, starts) == pytest.approx(np.zeros(edges), abs=1e-12)
+    assert arc_length(outline, starts) == pytest.approx(np.zeros(edges), abs=1e-12)
 
 
 def test_an_ellipse_folds_in_two_and_a_circle_not_at_all() -> None:
     ellipse_outline, circle = shape_outline("ellip2"), shape_outline("ellip1")
     contact = np.array([0.1, 0.6])
-    assert np.ptp(way_along(ellipse_outline, contact)) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(arc_length(ellipse_outline, contact)) == pytest.approx(0.0, abs=1e-12)
     assert sector_length(ellipse_outline) == pytest.approx(ellipse_outline.perimeter / 2.0)
-    assert way_along(circle, contact) == pytest.approx(contact * circle.perimeter)
+    assert arc_length(circle, contact) == pytest.approx(contact * circle.perimeter)
 
 
 # --- maps -----------------------------------------------------------------------------------------------------------
@@ -250,7 +250,7 @@ def test_a_recorded_cell_holds_mean_and_distance_from_the_prediction(square: Rig
     predicted = table.outcomes + [1e-3, -2e-3, 0.03]
     shown = recorded_map(square.outline, table, predicted, cells)
     row, column = np.argwhere(shown.windows >= FEWEST)[0]
-    along, angle = way_along(square.outline, table.inputs[:, 1]), table.inputs[:, 2]
+    along, angle = arc_length(square.outline, table.inputs[:, 1]), table.inputs[:, 2]
     inside_cell = (along >= cells.contact[column]) & (along < cells.contact[column + 1])
     inside_cell &= (angle >= cells.angle[row]) & (angle < cells.angle[row + 1])
     np.testing.assert_allclose(shown.mean[row, column], table.outcomes[inside_cell].mean(axis=0))

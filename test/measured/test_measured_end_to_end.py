@@ -123,7 +123,7 @@ def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: d
     """Steel run 3 alone turns clockwise: what was learnt from the others fails there, and says so."""
     folds = leave_one_run_out(block_runs(imported, "St"), "vhgp")
     outside = [fold.in_domain.mean() < 0.5 for fold in folds]
-    scores = [total(fold.tally, "nmse") for fold in folds]
+    scores = [total(fold.push_scores, "nmse") for fold in folds]
     assert outside == [False, False, True, False]
     assert scores[2] > 1.0 > 0.3 > max(scores[:2] + scores[3:])
 

@@ -69,6 +69,6 @@ def test_a_fit_of_the_paper_scores_what_the_docs_tell(
 ) -> None:
     fits = [(PAIR, Fit(kind, 100, split, k)) for k in range(FOLDS)]
     done = scores(Work(tmp_path, cores=1), found[0], fits)
-    tally = pooled([score.tally for score in done.values()])
-    assert by_push(tally, total_nmse).value == pytest.approx(nmse, abs=0.0015)
-    assert by_push(tally, total_nlpd).value == pytest.approx(nlpd, abs=0.015)
+    push_scores = pooled([score.push_scores for score in done.values()])
+    assert by_push(push_scores, total_nmse).value == pytest.approx(nmse, abs=0.0015)
+    assert by_push(push_scores, total_nlpd).value == pytest.approx(nlpd, abs=0.015)

@@ -30,7 +30,7 @@ from push_predictor_paper.work import Work
 from scipy.special import ndtr
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
-from push_predictor.evaluation.push_scores import tally
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.shapes import shape_outline
@@ -61,7 +61,7 @@ def outcomes(pushes: int, scatter: float = 1.0, gained: float = 0.1) -> Pits:
     compared = Comparison("vhgp", 100, ids(pushes), mean, variance, observed, density, np.full(3, 0.1))
     below = np.vectorize(lambda z: 0.5 * (1.0 + float(np.sign(z)) * (1.0 - np.exp(-np.abs(z)))))(observed)
     speed = np.repeat(np.resize([0.02, 0.15, 0.4], pushes), 4)
-    return Pits(compared.push_id, speed, below, below, tally(compared))
+    return Pits(compared.push_id, speed, below, below, push_scores(compared))
 
 
 def rig() -> Rig:
@@ -153,7 +153,7 @@ def test_where_the_predictive_is_gaussian_both_transforms_agree(kind: str) -> No
 def test_several_folds_are_put_together() -> None:
     folds = [pits(made_up_set(), Fit("gp", 30, "push", fold)) for fold in range(5)]
     whole = together(folds)
-    assert len(whole.push_id) == 160 and len(whole.tally.push_id) == 40
+    assert len(whole.push_id) == 160 and len(whole.push_scores.push_id) == 40
     assert whole.gaussian.shape == whole.exact.shape == (160, 3) and len(whole.speed) == 160
 
 
@@ -281,7 +281,7 @@ def uniform_pits(pushes: int) -> Pits:
     even = np.tile(np.r_[0.001, np.linspace(0.05, 0.95, 19)], pushes)
     speed = np.repeat(np.resize([0.02, 0.15, 0.4], pushes), 20)
     probabilities = np.column_stack([even] * 3)
-    return Pits(ids(pushes, 20), speed, probabilities, probabilities, outcomes(2).tally)
+    return Pits(ids(pushes, 20), speed, probabilities, probabilities, outcomes(2).push_scores)
 
 
 def test_speeds_fall_into_three_groups_with_all_windows_in_one() -> None:

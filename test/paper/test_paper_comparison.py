@@ -1,4 +1,4 @@
-"""The comparison of models, the crossing point and the gain in the mean: made-up tallies whose truth is known."""
+"""The comparison of models, the crossing point and the gain in the mean: made-up scores whose truth is known."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ CORPUS = made_up_corpus()
 SIZES = (10, 100, 1000)
 
 
-def tally(nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: float = 0.01, fold: int = 0) -> PushScores:
+def push_scores(
+    nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: float = 0.01, fold: int = 0
+) -> PushScores:
     """40 pushes of about these totals."""
     rng = np.random.default_rng(fold)
     one = np.ones((40, 3))
@@ -39,11 +41,11 @@ def tally(nmse: float, nlpd: float = 0.0, exact: float | None = None, noise: flo
 
 
 def curves_of(**kinds) -> Curves:
-    """Curves on the reference pair: by kind, the arguments of `tally` at each size, in five folds."""
+    """Curves on the reference pair: by kind, the arguments of `push_scores` at each size, in five folds."""
     return Curves(
         {
             (CORPUS.reference, kind, split, n): tuple(
-                Score(Fit(kind, n, split, k), tally(**arguments, fold=k), 1.0) for k in range(5)
+                Score(Fit(kind, n, split, k), push_scores(**arguments, fold=k), 1.0) for k in range(5)
             )
             for kind, by_size in kinds.items()
             for n, arguments in zip(SIZES, by_size, strict=True)
@@ -68,8 +70,8 @@ def test_a_gap_must_stay_below_zero_from_there_on():
 
 def test_the_crossing_of_two_known_curves():
     learnt, flat = (
-        [[tally(v, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)],
-        [[tally(0.9, fold=k) for k in range(5)]] * 3,
+        [[push_scores(v, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)],
+        [[push_scores(0.9, fold=k) for k in range(5)]] * 3,
     )
     found = crossing(SIZES, learnt, flat)
     assert found.value == pytest.approx(10**1.5, rel=0.01)
@@ -77,9 +79,9 @@ def test_the_crossing_of_two_known_curves():
 
 
 def test_noise_from_push_to_push_widens_the_interval():
-    flat = [[tally(0.9, noise=0.0, fold=k) for k in range(5)]] * 3
+    flat = [[push_scores(0.9, noise=0.0, fold=k) for k in range(5)]] * 3
     wide, narrow = (
-        crossing(SIZES, [[tally(v, noise=noise, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)], flat)
+        crossing(SIZES, [[push_scores(v, noise=noise, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)], flat)
         for noise in (1.0, 0.01)
     )
     assert wide.high / wide.low > 1.5 * narrow.high / narrow.low

@@ -30,10 +30,10 @@ CORPUS = Corpus(
 def score(fit: Fit, nmse: float, nlpd: float) -> Score:
     """A score of 6 pushes with these totals."""
     one = np.ones((6, 3))
-    tally = PushScores(
+    push_scores = PushScores(
         np.array(list("abcdef")), np.ones(6), one * nmse / 3, one, one * nlpd / 3, one * nlpd / 3, np.ones((6, 3, 3))
     )
-    return Score(fit, tally, 0.1)
+    return Score(fit, push_scores, 0.1)
 
 
 def made_up(nmse, nlpd=lambda shape, surface, n: -10.0, sizes=(500, 1000), noise=0.01) -> Curves:

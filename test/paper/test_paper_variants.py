@@ -48,7 +48,7 @@ def corpus(pushes: int = 60, origin: str = "simulated") -> Corpus:
 
 
 def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02) -> PushScores:
-    """A tally with that exact NLPD by output, a little different from push to push."""
+    """A push_scores with that exact NLPD by output, a little different from push to push."""
     jitter = noise * np.random.default_rng(abs(int(1000 * nlpd))).standard_normal((pushes, 3))
     rows = np.ones((pushes, 3))
     density = nlpd * rows + jitter - jitter.mean(axis=0)
@@ -59,13 +59,13 @@ def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02
 def made_up(gains: dict[tuple[int, str, str], float], noise: float = 0.02, nmse: float = 0.2) -> Variants:
     """Gains in exact NLPD by output over the plain kernel, by size, split and kernel; 0 where not told."""
     sizes = sorted({n for n, _, _ in gains} | {500})
-    tallies = {
+    scores = {
         (n, split, name): scored(-4.0 - gains.get((n, split, name), 0.0), 0.2 if name == PLAIN else nmse, noise=noise)
         for n in sizes
         for split in SPLITS
         for name in CHOICES
     }
-    return Variants(corpus(), tallies, dict.fromkeys(tallies, 1.0), dict.fromkeys(tallies, 5))
+    return Variants(corpus(), scores, dict.fromkeys(scores, 1.0), dict.fromkeys(scores, 5))
 
 
 def on_both(name: str, gain: float, n: int = 500) -> dict[tuple[int, str, str], float]:
@@ -214,9 +214,9 @@ def test_all_kernels_are_judged_on_the_same_windows(tmp_path: Path, monkeypatch:
     found = jobs.variant_scores(replace(QUICK, seeds=1), Work(tmp_path, cores=1), corpus(20))
     assert {name for name, _ in found} == set(CHOICES)
     for split in SPLITS:
-        tallies = [found[name, Fit("vhgp", 30, split, 0)].tally for name in CHOICES]
-        assert all(np.array_equal(t.push_id, tallies[0].push_id) for t in tallies)
-        assert all(np.array_equal(t.windows, tallies[0].windows) for t in tallies)
+        scores = [found[name, Fit("vhgp", 30, split, 0)].push_scores for name in CHOICES]
+        assert all(np.array_equal(t.push_id, scores[0].push_id) for t in scores)
+        assert all(np.array_equal(t.windows, scores[0].windows) for t in scores)
 
 
 def test_scores_of_folds_are_pooled() -> None:
@@ -225,7 +225,7 @@ def test_scores_of_folds_are_pooled() -> None:
     made = {(PLAIN, fit): Score(fit, part, 2.0 + fit.seed) for fit, part in zip(fits, parts, strict=True)}
     found = Variants.of(corpus(), made)
     cell = (100, "push", PLAIN)
-    assert len(found.tallies[cell].push_id) == 100
+    assert len(found.scores[cell].push_id) == 100
     assert found.cpu[cell] == 2.5 and found.fits[cell] == 2
 
 

@@ -24,8 +24,8 @@ from push_predictor.models.train import train_model
 from push_predictor.planning.particles import Deviations
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
-from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, moments_of, rollout
-from push_predictor.planning.straight_drive import drive_onto
+from push_predictor.planning.rollout import MOST_PARTICLES, is_covariance, pose_moments, rollout
+from push_predictor.planning.straight_drive import start_drive
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -150,8 +150,8 @@ def test_at_a_corner_the_contact_belongs_to_the_edge_it_slid_along(edge: int, en
     outline, towards = shape_outline("rect1"), -1.0 if end else 1.0
     contact = outline.contact_on_edge(edge, end + 0.002 * (0.5 - end))
     inputs, slider = np.array([[0.02, float(contact), 1.2 * towards]]), np.zeros((1, 3))
-    drive, meeting = drive_onto(outline, RADIUS, slider, inputs)
-    later = drive.meet(slider, meeting, 0.2, 0.2)
+    drive, contact = start_drive(outline, RADIUS, slider, inputs)
+    later = drive.meet(slider, contact, 0.2, 0.2)
     assert later.touch.inputs[0, 1] == pytest.approx(float(outline.contact_on_edge(edge, end)))
     assert later.touch.inputs[0, 2] == pytest.approx(1.2 * towards)
 
@@ -160,9 +160,9 @@ def test_a_slider_that_the_tip_has_passed_stays() -> None:
     model = model_with(CERTAIN)
     off, later = ([0.02, 0.24, -1.3, duration] for duration in (3.0, 5.0))
     poses = [rollout(model, AT_REST, CERTAIN, [step], 1) for step in (off, later)]
-    assert [rolled.held[0] for rolled in poses] == [0.0, 0.0]
+    assert [rolled.in_contact[0] for rolled in poses] == [0.0, 0.0]
     np.testing.assert_array_equal(poses[0].mean, poses[1].mean)
-    assert rollout(model, AT_REST, CERTAIN, [PUSH], 1).held[0] == 1.0
+    assert rollout(model, AT_REST, CERTAIN, [PUSH], 1).in_contact[0] == 1.0
 
 
 def test_pushes_of_one_mode_may_lead_to_two() -> None:
@@ -180,7 +180,7 @@ def test_pushes_of_one_mode_may_lead_to_two() -> None:
 
 def test_a_heading_is_averaged_on_the_circle() -> None:
     heading = np.pi + 0.1 * np.random.default_rng(0).standard_normal(2000)
-    mean, covariance = moments_of(np.column_stack([np.zeros((2000, 2)), heading]))
+    mean, covariance = pose_moments(np.column_stack([np.zeros((2000, 2)), heading]))
     assert abs(mean[2]) == pytest.approx(np.pi, abs=0.01)
     assert covariance[2, 2] == pytest.approx(0.01, rel=0.1)
     rolled = rollout(model_with(NOISY), np.array([0.0, 0.0, np.pi]), CERTAIN, [PUSH], 500)
@@ -325,13 +325,13 @@ def test_a_model_that_nobody_uses_any_more_is_not_kept_for_its_persistence() -> 
 def test_a_rollout_that_is_not_wanted_any_more_stops_between_windows() -> None:
     asked = []
 
-    def go_on() -> None:
+    def check_cancelled() -> None:
         asked.append(len(asked))
         if len(asked) == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.1, 0.0, 3.0]], 5, go_on=go_on)
+        rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.1, 0.0, 3.0]], 5, check_cancelled=check_cancelled)
     assert len(asked) == 3
 
 

@@ -23,7 +23,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import ExtendedPredictor, PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
-from push_predictor.planning.slider_pose import DEEPEST, LARGEST_GAP, SliderAfter, WorldPush, slider_after
+from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter, WorldPush, slider_after
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -319,16 +319,16 @@ def test_a_learnt_model_refuses_a_duration_that_it_never_saw() -> None:
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
     model = model_of(shape)
-    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=0.99 * LARGEST_GAP)) is not None
+    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=0.99 * MAX_GAP)) is not None
     message = refusal(push_at(shape, 0.1, 0.2, gap=0.0123), model)
     assert "the gap to the outline is 0.0123 m, up to 0.001 m is contact" in message
-    refusal(push_at(shape, 0.1, 0.2, gap=1.01 * LARGEST_GAP), model)
+    refusal(push_at(shape, 0.1, 0.2, gap=1.01 * MAX_GAP), model)
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_contact_from_inside_is_refused(shape: str) -> None:
     model = model_of(shape)
-    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=-0.99 * DEEPEST)) is not None
+    assert slider_after(model, push_at(shape, 0.1, 0.2, gap=-0.99 * MAX_DEPTH)) is not None
     assert "reaches 0.004 m into the outline" in refusal(push_at(shape, 0.1, 0.2, gap=-0.004), model)
     for angle in (0.2, np.pi - 0.2):
         message = refusal(push_at(shape, 0.1, angle, gap=-RADIUS - 0.002), model)

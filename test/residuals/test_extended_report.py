@@ -13,7 +13,7 @@ from repository import BAGS
 
 from push_predictor.cli import main
 from push_predictor.evaluation.report.figures.readme import readme_picture
-from push_predictor.evaluation.report.map_conditions import covariates_of_map, held_covariates, held_in_words
+from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text, map_covariates
 from push_predictor.evaluation.report.maps import fine_cells, push_map
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -62,7 +62,7 @@ def extended(base: PushModel, *effects: Effect) -> PushModel:
 
 def test_a_map_is_drawn_at_the_middle_of_the_covariates(base: PushModel, table: PushTable) -> None:
     model, cells = extended(base, slippery(), grain()), fine_cells(base.rig.outline, table)
-    held = held_covariates(model, table)
+    held = fixed_covariates(model, table)
     times = table.covariates["elapsed_time"]
     assert set(held) == {"elapsed_time", "slider_heading"}
     assert held["elapsed_time"] in times and 0.4 < np.mean(times <= held["elapsed_time"]) < 0.6
@@ -80,26 +80,26 @@ def test_beyond_what_was_seen_a_map_is_empty_and_says_so(base: PushModel, table:
     model, cells = extended(base, slippery()), fine_cells(base.rig.outline, table)
     held = {"elapsed_time": 1e4}
     assert np.isnan(push_map(model, 0.02, 0.2, cells, held).mean).all()
-    assert "Nothing is drawn: the model was extended on elapsed_time from " in held_in_words(model, held)
+    assert "Nothing is drawn: the model was extended on elapsed_time from " in fixed_covariates_text(model, held)
 
 
 def test_the_heading_of_a_push_follows_from_that_of_the_slider(base: PushModel, table: PushTable) -> None:
     model = extended(base, headed())
     assert model.needs == ("push_heading",)
-    held = held_covariates(model, table)
+    held = fixed_covariates(model, table)
     assert list(held) == ["slider_heading"]
     inside = {**held, "slider_heading": table.covariates["slider_heading"]}
     for row in range(0, len(table), 7):
         one = {name: float(np.atleast_1d(column)[row]) for name, column in inside.items()}
-        found = covariates_of_map(base.rig.outline, one, table.inputs[[row]])["push_heading"][0]
+        found = map_covariates(base.rig.outline, one, table.inputs[[row]])["push_heading"][0]
         assert abs(wrap_angle(found - table.covariates["push_heading"][row])) < 1e-9
-    assert "(push_heading follows from it); at another the map differs." in held_in_words(model, held)
+    assert "(push_heading follows from it); at another the map differs." in fixed_covariates_text(model, held)
     lacking = replace(table.take(np.arange(4)), covariates={"push_heading": np.array([3.1, -3.1, 3.0, 0.0])})
-    assert held_covariates(model, lacking) == {"push_heading": 3.1}
+    assert fixed_covariates(model, lacking) == {"push_heading": 3.1}
 
 
 def test_what_is_not_extended_holds_nothing(base: PushModel, table: PushTable) -> None:
-    assert held_covariates(base, table) == {} and held_in_words(base, {}) == ""
+    assert fixed_covariates(base, table) == {} and fixed_covariates_text(base, {}) == ""
 
 
 def test_the_report_of_an_extended_model_names_where_its_maps_are_drawn(
@@ -113,7 +113,7 @@ def test_the_report_of_an_extended_model_names_where_its_maps_are_drawn(
     assert main([*call, "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     page = html.unescape(Path(found["report"]).read_text())
-    time = held_covariates(model, table)["elapsed_time"]
+    time = fixed_covariates(model, table)["elapsed_time"]
     assert page.count(f"The map of extended is drawn at elapsed_time {time:.3g} s and slider_heading ") == 2
     assert "of the outline's 6 alike parts, the first is drawn." in page
     assert "The map of plain" not in page

@@ -55,10 +55,10 @@ class Calibration:
     alike: Array
 
 
-class PushJudge:
+class AlarmMonitor:
     """The alarm of one model: takes windows and what was predicted for them, push after push.
 
-    A push that was seen already, as in a replay that is played again, is no news and is not counted. left_out: pushes
+    A push that was seen already, as in a replay that is played again, is no news and is not counted. skipped: pushes
     that could not be judged, and why. Raises RequestError for a rate outside (0, 1).
     """
 
@@ -66,23 +66,23 @@ class PushJudge:
         self._calibration = calibration
         self._alarm = Alarm(calibration.kinds, calibration.scores, rate, seed)
         self._seen: set[str] = set()
-        self.left_out: list[str] = []
+        self.skipped: list[str] = []
 
     def add(self, windows: PushTable, mean: Array, covariance: Array) -> str | None:
         """Take whole pushes, predicted mean (n, 3), covariance (n, 3, 3); answers the push at which it fires."""
         fired = None
         scores = _scores_by_push(self._calibration, windows, mean, covariance)
         for push in windows.pushes:
-            if push not in self._seen and self._judged(push, scores[push]):
+            if push not in self._seen and self._counted(push, scores[push]):
                 fired = push
         return fired
 
-    def _judged(self, push: str, scores: Array) -> bool:
+    def _counted(self, push: str, scores: Array) -> bool:
         self._seen.add(push)
         try:
             return self._alarm.add(push, scores)
         except RequestError as error:
-            self.left_out.append(f"push {push}: {error}")
+            self.skipped.append(f"push {push}: {error}")
             return False
 
     @property
@@ -91,16 +91,16 @@ class PushJudge:
         return self._alarm.state
 
 
-def judged(
+def alarm_state(
     calibration: Calibration, windows: PushTable, mean: Array, covariance: Array, rate: float = DEFAULT_RATE
 ) -> AlarmState:
     """The alarm after all pushes of a table, in the order of its rows: what push_validator says in the end."""
-    judge = PushJudge(calibration, rate)
-    judge.add(windows, mean, covariance)
-    return judge.state
+    monitor = AlarmMonitor(calibration, rate)
+    monitor.add(windows, mean, covariance)
+    return monitor.state
 
 
-def alarm_about(
+def recording_alarm(
     model: PushModel, windows: PushTable, comparison: Comparison, rate: float = DEFAULT_RATE
 ) -> dict[str, object]:
     """The field `alarm` of the JSON of `validate`. Raises RequestError for a rate outside (0, 1)."""
@@ -109,7 +109,7 @@ def alarm_about(
         calibration = calibrate(model)
     except RequestError as error:
         return alarm_json(None, str(error))
-    return alarm_json(judged(calibration, windows, comparison.mean, comparison.covariance, rate))
+    return alarm_json(alarm_state(calibration, windows, comparison.mean, comparison.covariance, rate))
 
 
 def calibrate(model: PushModel) -> Calibration:
@@ -117,7 +117,7 @@ def calibrate(model: PushModel) -> Calibration:
     table = model.training
     if len(table.pushes) < FEWEST_PUSHES:
         raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
-    mean, covariance = held_out(model)
+    mean, covariance = held_out_moments(model)
     mechanisms = tuple(mechanism for mechanism in LIBRARY if _computable(mechanism, table))
     blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, _physics(model), np.empty(0))
     rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
@@ -126,7 +126,7 @@ def calibrate(model: PushModel) -> Calibration:
     return replace(known, scores=np.array([_scores(known, [(a[r], b[r]) for a, b in parts]) for r in rows]))
 
 
-def held_out(model: PushModel) -> tuple[Array, Array]:
+def held_out_moments(model: PushModel) -> tuple[Array, Array]:
     """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their fold of pushes."""
     table = model.training
     push = Push(table.inputs, table.duration, table.covariates)

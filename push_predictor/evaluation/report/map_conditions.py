@@ -17,7 +17,7 @@ from push_predictor.types import Array
 OF_SLIDER, OF_PUSH = HEADINGS
 
 
-def held_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
+def fixed_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
     """For each covariate that the model needs, the middle one of the table's values; empty where it needs none.
 
     Of a heading it is the one nearest to their mean direction. Where the slider's heading is known, that one is held
@@ -27,7 +27,7 @@ def held_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
     return {name: _middle(name, table.covariates[name]) for name in names}
 
 
-def covariates_of_map(outline: Outline, held: Mapping[str, float], inputs: Array) -> dict[str, Array]:
+def map_covariates(outline: Outline, held: Mapping[str, float], inputs: Array) -> dict[str, Array]:
     """The covariates (n,) of the pushes (n, 3) of a map, with these held."""
     columns = {name: np.full(len(inputs), value) for name, value in held.items()}
     if OF_SLIDER in held and OF_PUSH not in held:
@@ -36,7 +36,7 @@ def covariates_of_map(outline: Outline, held: Mapping[str, float], inputs: Array
     return columns
 
 
-def held_in_words(model: PushModel, held: Mapping[str, float]) -> str:
+def fixed_covariates_text(model: PushModel, held: Mapping[str, float]) -> str:
     """Sentences for a caption: at which values a model's map is drawn, and what that leaves out; empty for none."""
     if not held:
         return ""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.errors import TableError
-from push_predictor.evaluation.report.map_conditions import covariates_of_map
+from push_predictor.evaluation.report.map_conditions import map_covariates
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -86,7 +86,7 @@ def sector_length(outline: Outline) -> float:
     return outline.perimeter / fold_order(outline)
 
 
-def way_along(outline: Outline, contact: Array) -> Array:
+def arc_length(outline: Outline, contact: Array) -> Array:
     """Folded contacts (n,) in m, counter-clockwise from the start of their sector."""
     order = fold_order(outline)
     if outline.semi_axes is not None:
@@ -115,13 +115,13 @@ def push_map(
 ) -> PushMap:
     """What the model predicts at the centre of every cell; NaN outside the domain of its training.
 
-    held: the covariates that an extended model needs, see `map_conditions.held_covariates`.
+    held: the covariates that an extended model needs, see `map_conditions.fixed_covariates`.
     """
     contact = 0.5 * (cells.contact[1:] + cells.contact[:-1]) / model.rig.outline.perimeter
     angle = 0.5 * (cells.angle[1:] + cells.angle[:-1])
     angles, contacts = np.meshgrid(angle, contact, indexing="ij")
     inputs = np.column_stack([np.full(contacts.size, velocity), contacts.ravel(), angles.ravel()])
-    covariates = covariates_of_map(model.rig.outline, held or {}, inputs)
+    covariates = map_covariates(model.rig.outline, held or {}, inputs)
     prediction = model.predict_rows(inputs, np.full(len(inputs), duration), covariates)
     sd = np.sqrt(np.diagonal(prediction.covariance, axis1=1, axis2=2))
     hidden = ~prediction.in_domain[:, None]
@@ -180,7 +180,7 @@ def _cells(outline: Outline, table: PushTable, along_contact: int, along_angle: 
 
 def _members(outline: Outline, table: PushTable, cells: Cells) -> Iterator[tuple[tuple[int, int], IntArray]]:
     """Every cell that is not empty, with the rows in it; a row beyond the last edge by rounding stays in."""
-    column = _position(cells.contact, way_along(outline, table.inputs[:, 1]))
+    column = _position(cells.contact, arc_length(outline, table.inputs[:, 1]))
     row = _position(cells.angle, table.inputs[:, 2])
     flat = row * cells.shape[1] + column
     for index in np.unique(flat):

@@ -24,5 +24,7 @@ def answer_rollout(
     frame = frames.located(request.header)
     slider = world_slider(query, frame)
     particles = max(PARTICLES, query.samples)
-    rolled = rollout(tabulated, slider.planar, slider.covariance, query.steps, particles, query.seed, go_on=go_on)
+    rolled = rollout(
+        tabulated, slider.planar, slider.covariance, query.steps, particles, query.seed, check_cancelled=go_on
+    )
     fill_rollout_response(response, frame, slider, rolled, query.samples)

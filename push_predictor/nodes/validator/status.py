@@ -63,8 +63,8 @@ def _alarm_problems(alarm: PushAlarm) -> list[str]:
     found = []
     if alarm.state is not None and alarm.state.fired:
         found.append(fired_text(alarm.state))
-    if alarm.left_out:
-        found.append(f"{len(alarm.left_out)} pushes are unknown to the alarm, the last one: {alarm.left_out[-1]}")
+    if alarm.skipped:
+        found.append(f"{len(alarm.skipped)} pushes are unknown to the alarm, the last one: {alarm.skipped[-1]}")
     return found
 
 

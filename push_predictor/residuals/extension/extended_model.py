@@ -17,7 +17,7 @@ import numpy as np
 
 from push_predictor import __version__
 from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.push_scores import tally
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
@@ -106,7 +106,7 @@ def gain(
     training_mean (3,): the reference of the NMSE; the refit's if None.
     """
     reference = refit.training_mean if training_mean is None else training_mean
-    first, second = (tally(compared(model, held_out, reference)) for model in (refit, after))
+    first, second = (push_scores(compared(model, held_out, reference)) for model in (refit, after))
 
     def difference(figure: Figure) -> Gain:
         return Gain(**vars(difference_by_push(first, second, figure)))

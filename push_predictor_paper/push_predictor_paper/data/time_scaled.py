@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PushScores, tally
+from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.splits import FOLDS
 from push_predictor.evaluation.validation import compare
 from push_predictor.geometry.frames import rotate
@@ -91,7 +91,7 @@ def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> P
         _scaled(table, bracket.told), rig, bracket.kind, name=bracket.kind, options=TrainingOptions(n_train=len(table))
     )
     held = concatenate([table.take(np.flatnonzero(fold_of(table) == bracket.fold)) for table in windows])
-    return tally(compare(model, _scaled(held, bracket.told)))
+    return push_scores(compare(model, _scaled(held, bracket.told)))
 
 
 def training_rows(table: PushTable, bracket: Bracket) -> IntArray:

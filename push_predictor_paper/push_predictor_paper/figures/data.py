@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import binomtest
 
-from push_predictor.evaluation.report.maps import sector_length, way_along
+from push_predictor.evaluation.report.maps import arc_length, sector_length
 from push_predictor.reporting.canvas import COLOURS, grid
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid
@@ -35,7 +35,7 @@ def paint_data(figure: Figure, counts: list[SpeedCount], pushes: PushSet, repeat
     speeds, inputs, seen = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     _paint_speeds(speeds, counts)
     outline = pushes.rig.outline
-    fraction = way_along(outline, pushes.table.inputs[:, 1]) / sector_length(outline)
+    fraction = arc_length(outline, pushes.table.inputs[:, 1]) / sector_length(outline)
     inputs.plot(fraction, np.degrees(pushes.table.inputs[:, 2]), ".", color=COLOURS[0], markersize=2.0, alpha=0.6)
     _frame_of_pushes(inputs)
     inputs.set_title(f"windows of {pushes.rig.shape} on {pushes.rig.surface}")

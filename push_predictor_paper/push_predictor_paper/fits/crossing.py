@@ -47,7 +47,7 @@ def crossing(
 ) -> Crossing:
     """From where on the learnt model's total NMSE stays below the baseline's, up to the last size.
 
-    By size, by seed (fold) the tallies of both on the same windows. The interval draws pushes anew, the same for both
+    By size, by seed (fold) the scores of both on the same windows. The interval draws pushes anew, the same for both
     and for all sizes and seeds, and the seeds as well.
     """
     gaps = [_gap(first, second) for first, second in zip(learnt, baseline, strict=True)]
@@ -78,17 +78,17 @@ def _gap(learnt: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
     return _total(learnt, weights) - _total(baseline, weights)
 
 
-def _weights(tallies: Sequence[PushScores]) -> list[Array]:
+def _weights(scores: Sequence[PushScores]) -> list[Array]:
     """By seed how often each of its pushes counts, (1 + draws, p)."""
-    names = np.unique(np.concatenate([tally.push_id for tally in tallies]))
+    names = np.unique(np.concatenate([push_scores.push_id for push_scores in scores]))
     pushes = push_bootstrap(names)
-    count = len(tallies)
+    count = len(scores)
     seeds = np.random.default_rng(1).multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS)
-    drawn = [pushes[:, np.searchsorted(names, t.push_id)] * seeds[:, k, None] for k, t in enumerate(tallies)]
+    drawn = [pushes[:, np.searchsorted(names, t.push_id)] * seeds[:, k, None] for k, t in enumerate(scores)]
     return [np.vstack([np.ones((1, weights.shape[1])), weights]) for weights in drawn]
 
 
-def _total(tallies: Sequence[PushScores], weights: Sequence[Array]) -> Array:
-    error = sum((w @ tally.error for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
-    spread = sum((w @ tally.spread for w, tally in zip(weights, tallies, strict=True)), np.zeros(()))
+def _total(scores: Sequence[PushScores], weights: Sequence[Array]) -> Array:
+    error = sum((w @ push_scores.error for w, push_scores in zip(weights, scores, strict=True)), np.zeros(()))
+    spread = sum((w @ push_scores.spread for w, push_scores in zip(weights, scores, strict=True)), np.zeros(()))
     return np.asarray((error / spread).sum(axis=1))

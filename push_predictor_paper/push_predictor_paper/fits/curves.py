@@ -49,9 +49,9 @@ class Curves:
         """The mean of a measure over pairs and seeds, with its interval over seeds."""
         return over_seeds(self.values(pairs, kind, split, n, measure))
 
-    def tally(self, pair: Pair, kind: str, split: SplitName, n: int) -> PushScores:
+    def push_scores(self, pair: Pair, kind: str, split: SplitName, n: int) -> PushScores:
         """All seeds' pushes as one."""
-        return pooled([score.tally for score in self.cells[pair, kind, split, n]])
+        return pooled([score.push_scores for score in self.cells[pair, kind, split, n]])
 
 
 def curves(study: Study, corpus: Corpus, pairs: Sequence[Pair], kinds: Sequence[str]) -> Curves:

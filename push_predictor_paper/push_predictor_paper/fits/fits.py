@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PushScores, tally
+from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.evaluation.splits import Split, random_split, split_by_push
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
@@ -47,23 +47,23 @@ class Score:
     """How a fit did on the windows that its split holds back; cpu: s to train it."""
 
     fit: Fit
-    tally: PushScores
+    push_scores: PushScores
     cpu: float
 
     @property
     def nmse(self) -> Array:
         """By output (3,)."""
-        return np.asarray(self.tally.totals().nmse[0])
+        return np.asarray(self.push_scores.totals().nmse[0])
 
     @property
     def nlpd(self) -> Array:
         """By output (3,), moment-matched Gaussian, SI units."""
-        return np.asarray(self.tally.totals().nlpd[0])
+        return np.asarray(self.push_scores.totals().nlpd[0])
 
     @property
     def exact_nlpd(self) -> Array:
         """By output (3,), exact predictive density, SI units."""
-        return np.asarray(self.tally.totals().exact_nlpd[0])
+        return np.asarray(self.push_scores.totals().exact_nlpd[0])
 
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
@@ -76,7 +76,7 @@ def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict
 def score(pushes: PushSet, fit: Fit) -> Score:
     """Train and judge one."""
     comparison, cpu = compared(pushes, fit)
-    return Score(fit, tally(comparison), cpu)
+    return Score(fit, push_scores(comparison), cpu)
 
 
 def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import tally
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.train import TrainingOptions, train_model
@@ -63,4 +63,4 @@ def score_variant(pushes: PushSet, fit: Fit, choice: KernelChoice) -> Score:
         options=TrainingOptions(n_train=fit.n, seed=fit.seed, kernels=choice),
     )
     cpu = time.process_time() - start
-    return Score(fit, tally(compare(model, pushes.table.take(split.test))), cpu)
+    return Score(fit, push_scores(compare(model, pushes.table.take(split.test))), cpu)

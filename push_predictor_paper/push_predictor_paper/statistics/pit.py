@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.push_scores import PushScores, pooled, tally
+from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.quadrature import exact_cdf
@@ -34,7 +34,7 @@ class Pits:
     speed: Array
     gaussian: Array
     exact: Array
-    tally: PushScores
+    push_scores: PushScores
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def pits(pushes: PushSet, fit: Fit) -> Pits:
     model = trained(pushes, fit)
     table = pushes.table.take(split_of(pushes, fit).test)
     comparison = compare(model, table)
-    return Pits(table.push_id, table.inputs[:, 0], pit(comparison), exact_pit(model, table), tally(comparison))
+    return Pits(table.push_id, table.inputs[:, 0], pit(comparison), exact_pit(model, table), push_scores(comparison))
 
 
 def exact_pit(model: PushModel, table: PushTable) -> Array:
@@ -77,7 +77,7 @@ def together(several: Sequence[Pits]) -> Pits:
         np.concatenate([p.speed for p in several]),
         np.concatenate([p.gaussian for p in several]),
         np.concatenate([p.exact for p in several]),
-        pooled([p.tally for p in several]),
+        pooled([p.push_scores for p in several]),
     )
 
 

@@ -14,7 +14,7 @@ from push_predictor.evaluation.report.figures.nearby import ENOUGH, examples
 from push_predictor.evaluation.report.figures.push_maps import Panel, paint_maps
 from push_predictor.evaluation.report.figures.residuals import course_of, paint_residuals
 from push_predictor.evaluation.report.figures.tracks import paint_tracks
-from push_predictor.evaluation.report.map_conditions import held_covariates, held_in_words
+from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
     FEWEST,
     Condition,
@@ -101,7 +101,7 @@ def _map_panels(shown: Validation, condition: Condition) -> list[Panel]:
     alike = shown.table.take(rows)
     fine, coarse = fine_cells(outline, alike), coarse_cells(outline, alike)
     main = shown.comparisons[0]
-    held = [held_covariates(model, alike) for model in shown.models]
+    held = [fixed_covariates(model, alike) for model in shown.models]
     velocity, duration = condition.velocity, condition.duration
     panels = [Panel(m.name, push_map(m, velocity, duration, fine, h)) for m, h in zip(shown.models, held, strict=True)]
     same = predicted_at_windows(outline, alike, main.mean[rows], main.variance[rows], coarse)
@@ -139,7 +139,7 @@ def _sd_caption(condition: Condition, main: str) -> str:
 def _held_caption(shown: Validation, condition: Condition) -> str:
     """At which covariates the maps of extended models are drawn; empty if none is extended."""
     alike, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
-    told = [held_in_words(model, held_covariates(model, alike)) for model in shown.models]
+    told = [fixed_covariates_text(model, fixed_covariates(model, alike)) for model in shown.models]
     extended = [model.name for model in shown.models if isinstance(model.predictor, ExtendedPredictor)]
     if extended and (sides := fold_order(outline)) > 1:
         told.append(f"Effects may differ between sides: of the outline's {sides} alike parts, the first is drawn.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.report.maps import sector_length, way_along
+from push_predictor.evaluation.report.maps import arc_length, sector_length
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.table import PushTable
@@ -60,7 +60,7 @@ def spread_rows(points: Array, push_id: np.ndarray, count: int) -> IntArray:
 def _scaled_inputs(outline: Outline, table: PushTable) -> Array:
     """Contact (none on a circle), angle and log speed (n, 3); a unit apart is as far as counts as near."""
     velocity, contact, angle = table.inputs.T
-    along = way_along(outline, contact) / (NEAR_CONTACT * sector_length(outline))
+    along = arc_length(outline, contact) / (NEAR_CONTACT * sector_length(outline))
     if outline.rotational_symmetry == 0:
         along = np.zeros_like(along)
     return np.column_stack([along, angle / NEAR_ANGLE, np.log(velocity) / NEAR_SPEED])

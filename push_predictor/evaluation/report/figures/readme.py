@@ -11,7 +11,7 @@ import numpy as np
 from push_predictor.evaluation.report.figures.ellipses import inside, paint_ellipse
 from push_predictor.evaluation.report.figures.nearby import Example, examples
 from push_predictor.evaluation.report.figures.push_maps import colour_scale, paint_panel
-from push_predictor.evaluation.report.map_conditions import held_covariates
+from push_predictor.evaluation.report.map_conditions import fixed_covariates
 from push_predictor.evaluation.report.maps import coarse_cells, commonest_condition, fine_cells, push_map, recorded_map
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SIZE = (11.0, 3.4)
 SHOWN_OUTPUT = 2  # dtheta: its scatter depends on the push most visibly
 EXAMPLES = 5
-TOLD_APART = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a6d00")
+EXAMPLE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a6d00")
 
 
 def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
@@ -41,7 +41,7 @@ def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
 def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, duration: float) -> None:
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
     outline = model.rig.outline
-    held = held_covariates(model, table)
+    held = fixed_covariates(model, table)
     predicted = push_map(model, velocity, duration, fine_cells(outline, table), held)
     comparison = compare(model, table)
     recorded = recorded_map(outline, table, comparison.mean, coarse_cells(outline, table))
@@ -64,7 +64,7 @@ def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, 
 def _paint_outcomes(ax: Axes, comparison: Comparison, shown: Sequence[Example]) -> None:
     grid(ax)
     hits = total = 0
-    for colour, example in zip(TOLD_APART, shown, strict=False):
+    for colour, example in zip(EXAMPLE_COLOURS, shown, strict=False):
         mean, covariance = comparison.mean[example.row], comparison.covariance[example.row]
         outcomes = np.vstack([example.nearby, comparison.observed[example.row]])
         paint_ellipse(ax, mean, covariance, colour=colour)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.report.maps import commonest_condition, sector_length, way_along
+from push_predictor.evaluation.report.maps import arc_length, commonest_condition, sector_length
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.effect import Effect, design_of
@@ -79,7 +79,7 @@ def course_of(effect: Effect, outline: Outline, rows: Rows) -> Course:
     table, alike = rows.table, commonest_condition(rows.table).rows
     if "push_heading" in table.covariates and (effect.covariate == "push_heading" or "slider_heading" in effect.needs):
         return Course(np.degrees(table.covariates["push_heading"]), "push_heading (deg)", (("all pushes", alike),))
-    third = np.minimum((way_along(outline, table.inputs[:, 1]) / sector_length(outline) * 3.0).astype(int), 2)
+    third = np.minimum((arc_length(outline, table.inputs[:, 1]) / sector_length(outline) * 3.0).astype(int), 2)
     groups = tuple((name, alike & (third == k)) for k, name in enumerate(PLACES))
     return Course(np.degrees(table.inputs[:, 2]), "push angle (deg)", groups)
 

@@ -39,7 +39,7 @@ class Calibrated:
     def windows(self, split: SplitName) -> str:
         """How much was judged, in words."""
         judged = self.judged["vhgp", split]
-        return f"{len(judged.push_id)} windows of {len(judged.tally.push_id)} pushes"
+        return f"{len(judged.push_id)} windows of {len(judged.push_scores.push_id)} pushes"
 
 
 def calibrated(study: Study, corpus: Corpus) -> Calibrated | None:
@@ -68,7 +68,7 @@ def fitting_size(study: Study, corpus: Corpus) -> int | None:
 
 def density_gain(judged: Pits) -> Estimate:
     """Exact NLPD less the Gaussian's, sum of the outputs, of the same windows."""
-    return by_push(judged.tally, lambda totals: total_exact_nlpd(totals) - total_nlpd(totals))
+    return by_push(judged.push_scores, lambda totals: total_exact_nlpd(totals) - total_nlpd(totals))
 
 
 def _judged(study: Study, corpus: Corpus, size: int) -> dict[tuple[str, SplitName], Pits]:

@@ -106,9 +106,9 @@ def _shape_table(found: Calibrated) -> Table:
 def _density_table(found: Calibrated) -> Table:
     rows = []
     for split in SPLITS:
-        tally = found.judged["vhgp", split].tally
-        single = [by_push(tally, partial(_gain_of, k)) for k in range(len(OUTPUTS))]
-        columns = [by_push(tally, total_nlpd), by_push(tally, total_exact_nlpd), found.gains[split]]
+        push_scores = found.judged["vhgp", split].push_scores
+        single = [by_push(push_scores, partial(_gain_of, k)) for k in range(len(OUTPUTS))]
+        columns = [by_push(push_scores, total_nlpd), by_push(push_scores, total_exact_nlpd), found.gains[split]]
         rows.append((split, *(e.cell("+.3f") for e in (*columns, *single))))
     return Table(
         f"NLPD of the VHGP (nats, SI units): moment-matched Gaussian, exact predictive, and the paired difference "

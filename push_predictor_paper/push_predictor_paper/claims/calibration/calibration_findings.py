@@ -50,7 +50,7 @@ def shape_finding(found: Calibrated) -> Finding:
     shape = found.shapes[EXACT, "push"]
     flat = [not p <= UNEVEN for p in shape.p.tolist()]
     told = "; ".join(f"{n} {m:.1%}, p = {p:.3f}" for n, m, p in zip(OUTPUTS, shape.misplaced, shape.p, strict=True))
-    few = len(found.judged["vhgp", "push"].tally.push_id) < FEWEST_PUSHES
+    few = len(found.judged["vhgp", "push"].push_scores.push_id) < FEWEST_PUSHES
     return Finding(
         f"Outcomes are spread over the VHGP's exact predictive distribution as it says ({found.name})",
         _all_of(flat, all(flat) and few),

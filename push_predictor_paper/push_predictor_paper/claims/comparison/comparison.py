@@ -86,16 +86,16 @@ def output_figure(measure: str, output: int | None) -> Figure:
 
 
 def _table(corpus: Corpus, found: Curves, split: SplitName, n: int) -> Table:
-    tallies = {kind: found.tally(corpus.reference, kind, split, n) for kind in KINDS}
+    scores = {kind: found.push_scores(corpus.reference, kind, split, n) for kind in KINDS}
     rows = []
     for label, measure, form in MEASURES:
         for output, name in ((None, "total"), *enumerate(OUTPUTS)):
             figure = output_figure(measure, output)
-            cells = [by_push(tallies[kind], figure).cell(form) for kind in KINDS]
-            gaps = [difference_by_push(tallies[a], tallies[b], figure).cell(form) for a, b in PAIRS_OF_KINDS]
+            cells = [by_push(scores[kind], figure).cell(form) for kind in KINDS]
+            gaps = [difference_by_push(scores[a], scores[b], figure).cell(form) for a, b in PAIRS_OF_KINDS]
             rows.append((f"{label}, {name}", *cells, *gaps))
     caption = (
-        f"{_pair(corpus)}, n = {n}, {SPLIT_WORDS[split]}. Pushes: {corpus.name}; {len(tallies['gp'].windows)} judged, "
+        f"{_pair(corpus)}, n = {n}, {SPLIT_WORDS[split]}. Pushes: {corpus.name}; {len(scores['gp'].windows)} judged, "
         "interval by drawing whole pushes anew, differences of the same pushes. NLPD in SI units; the analytical "
         "model's is that of a Gaussian with the covariance of its training residuals."
     )
@@ -105,14 +105,14 @@ def _table(corpus: Corpus, found: Curves, split: SplitName, n: int) -> Table:
 
 def _beside_paper(corpus: Corpus, found: Curves, n: int) -> Table:
     """The paper's table, and ours in its units."""
-    tallies = {kind: found.tally(corpus.reference, kind, "push", n) for kind in KINDS}
+    scores = {kind: found.push_scores(corpus.reference, kind, "push", n) for kind in KINDS}
     rows = []
     for label, measure, shift in (("NMSE", "nmse", 0.0), ("NLPD (mm, rad)", "nlpd", SI_TO_MM)):
-        ours = [_shifted(by_push(tallies[kind], output_figure(measure, None)), shift).cell() for kind in KINDS]
+        ours = [_shifted(by_push(scores[kind], output_figure(measure, None)), shift).cell() for kind in KINDS]
         rows.append((label, *PAPER[label[:4]], *ours))
     caption = (
         f"The paper's table, and the same from: {corpus.name}; {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
-        f"{len(tallies['gp'].windows)} pushes, interval by push. What differs: the paper learns from the MIT push data "
+        f"{len(scores['gp'].windows)} pushes, interval by push. What differs: the paper learns from the MIT push data "
         "set, and names neither test set, split, size nor units of its table; its NLPD are in the range that mm and "
         "rad give, so ours are told in these here (SI + 13.8155)."
     )
@@ -186,7 +186,7 @@ def _lines(
             NAMES[kind],
             KIND_LOOKS[kind],
             sizes[split],
-            tuple(by_push(found.tally(corpus.reference, kind, split, n), figure) for n in sizes[split]),
+            tuple(by_push(found.push_scores(corpus.reference, kind, split, n), figure) for n in sizes[split]),
         )
         for kind in KINDS
     )
@@ -215,8 +215,8 @@ def _data(corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ..
     for split in SPLITS:
         for n in sizes[split]:
             for kind in KINDS:
-                tally = found.tally(corpus.reference, kind, split, n)
-                told = {m: by_push(tally, output_figure(m, None)).json() for _, m, _ in MEASURES}
+                push_scores = found.push_scores(corpus.reference, kind, split, n)
+                told = {m: by_push(push_scores, output_figure(m, None)).json() for _, m, _ in MEASURES}
                 seeds = {
                     m: over_seeds([f(s) for s in found.cells[corpus.reference, kind, split, n]]).json()
                     for m, f in (("nmse_by_seed", nmse_of), ("nlpd_by_seed", nlpd_of))

@@ -34,12 +34,12 @@ def crossings_of(
 ) -> Mapping[SplitName, Crossings]:
     """From where on GP and VHGP beat the analytical model, on each split."""
 
-    def tallies(kind: str, split: SplitName) -> list[list[PushScores]]:
+    def scores(kind: str, split: SplitName) -> list[list[PushScores]]:
         cells = [found.cells[corpus.reference, kind, split, n] for n in sizes[split]]
-        return [[score.tally for score in cell] for cell in cells]
+        return [[score.push_scores for score in cell] for cell in cells]
 
     return {
-        split: {kind: crossing(sizes[split], tallies(kind, split), tallies("analytical", split)) for kind in LEARNT}
+        split: {kind: crossing(sizes[split], scores(kind, split), scores("analytical", split)) for kind in LEARNT}
         for split in SPLITS
     }
 
@@ -71,9 +71,9 @@ def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
 
 def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
     """GP and VHGP show a similar NMSE."""
-    tallies = [found.tally(corpus.reference, kind, "push", n) for kind in LEARNT]
-    value = total_nmse(tallies[1].totals())[0] / total_nmse(tallies[0].totals())[0]
-    ratio = of_draws(value, total_nmse(tallies[1].resampled()) / total_nmse(tallies[0].resampled()))
+    scores = [found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNT]
+    value = total_nmse(scores[1].totals())[0] / total_nmse(scores[0].totals())[0]
+    ratio = of_draws(value, total_nmse(scores[1].resampled()) / total_nmse(scores[0].resampled()))
     sentence = (
         f"NMSE of the VHGP over that of the GP at n = {n}: {ratio.text()} (paper: 0.97); {_how(corpus, found, n)}. "
         f"Similar means within {SIMILAR:.0%}: holds if the interval lies there, in part if only the figure does, does "
@@ -84,7 +84,7 @@ def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
 
 def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
     """The VHGP has the smaller NLPD."""
-    gp, vhgp = (found.tally(corpus.reference, kind, "push", n) for kind in LEARNT)
+    gp, vhgp = (found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNT)
     gaussian, exact = (difference_by_push(gp, vhgp, figure) for figure in (total_nlpd, total_exact_nlpd))
     sentence = (
         f"NLPD of the VHGP less that of the GP at n = {n}: {gaussian.text()} nats, by its exact density {exact.text()} "
@@ -95,12 +95,12 @@ def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
 
 
 def _gap(corpus: Corpus, found: Curves, first: str, second: str, n: int) -> Estimate:
-    baseline, model = (found.tally(corpus.reference, kind, "push", n) for kind in (first, second))
+    baseline, model = (found.push_scores(corpus.reference, kind, "push", n) for kind in (first, second))
     return difference_by_push(baseline, model, total_nmse)
 
 
 def _how(corpus: Corpus, found: Curves, n: int) -> str:
-    pushes = len(found.tally(corpus.reference, "gp", "push", n).windows)
+    pushes = len(found.push_scores(corpus.reference, "gp", "push", n).windows)
     return f"{SPLIT_WORDS['push']}, {pushes} pushes, {_set(corpus)}, interval by push"
 
 

@@ -38,7 +38,7 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
     if windows is None or not all(gains.values()):
         return Section("", "", (), notes=(f"{corpus.name}: too few windows to compare models.",))
     groups = list(range(len(windows.speeds)))
-    pushes = len(found.tally(corpus.reference, "gp", "push", min(gains["push"])).windows)
+    pushes = len(found.push_scores(corpus.reference, "gp", "push", min(gains["push"])).windows)
     tables = (_table(corpus, gains), _speed_table(corpus, windows, groups))
     improvement = improves(corpus, gains["push"], pushes)
     findings = (improvement, where_it_counts(corpus, windows, groups, improvement.verdict))
@@ -83,7 +83,7 @@ def where_it_counts(corpus: Corpus, windows: HeldOut, groups: Sequence[int], imp
 
 
 def _gains(corpus: Corpus, found: Curves, split: SplitName, n: int) -> tuple[Estimate, ...]:
-    gp, vhgp = (found.tally(corpus.reference, kind, split, n) for kind in ("gp", "vhgp"))
+    gp, vhgp = (found.push_scores(corpus.reference, kind, split, n) for kind in ("gp", "vhgp"))
     return tuple(difference_by_push(gp, vhgp, output_figure("nmse", output)) for output in (None, 0, 1, 2))
 
 

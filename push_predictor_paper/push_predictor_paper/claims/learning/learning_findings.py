@@ -35,7 +35,7 @@ def pushes_of(corpus: Corpus, pairs: Sequence[Pair]) -> int:
 
 def judged(found: Curves, pairs: Sequence[Pair], n: int) -> int:
     """How many pushes of these sets were judged, split by push."""
-    return sum(len(found.tally(pair, KIND, "push", n).windows) for pair in pairs)
+    return sum(len(found.push_scores(pair, KIND, "push", n).windows) for pair in pairs)
 
 
 def circle(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
@@ -129,9 +129,9 @@ def _spreads(found: Curves, whole: list[list[Pair]], n: int, figure: Figure) -> 
     """Spread over surfaces / over shapes; then the spreads: over surfaces, over shapes, of a set by push."""
     values, draws = [], []
     for k, pair in enumerate(pair for row in whole for pair in row):
-        tally = found.tally(pair, KIND, "push", n)
-        values.append(figure(tally.totals()))
-        draws.append(figure(tally.resampled(k)))  # a seed of its own: the sets are of different pushes
+        push_scores = found.push_scores(pair, KIND, "push", n)
+        values.append(figure(push_scores.totals()))
+        draws.append(figure(push_scores.resampled(k)))  # a seed of its own: the sets are of different pushes
     shape = (len(whole), len(whole[0]), -1)
     cube, drawn = np.reshape(values, shape), np.reshape(draws, shape)
     surfaces, shapes = _sides(cube)
@@ -173,7 +173,7 @@ def _last_gains(found: Curves, pairs: Sequence[Pair], n: int, more: int) -> tupl
 
 
 def _gains_by_push(found: Curves, pair: Pair, n: int, more: int) -> tuple[Estimate, Estimate]:
-    before, after = (found.tally(pair, KIND, "push", size) for size in (n, more))
+    before, after = (found.push_scores(pair, KIND, "push", size) for size in (n, more))
     doublings = float(np.log2(more / n))
 
     def nmse(a: PooledScores, b: PooledScores) -> Array:

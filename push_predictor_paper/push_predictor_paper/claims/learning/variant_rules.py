@@ -35,10 +35,10 @@ RULE = (
 
 @dataclass(frozen=True, eq=False)
 class Variants:
-    """All variants of one corpus: tallies pooled over seeds and folds, mean CPU time of a training, s."""
+    """All variants of one corpus: scores pooled over seeds and folds, mean CPU time of a training, s."""
 
     corpus: Corpus
-    tallies: Mapping[Cell, PushScores]
+    scores: Mapping[Cell, PushScores]
     cpu: Mapping[Cell, float]
     fits: Mapping[Cell, int]
 
@@ -50,7 +50,7 @@ class Variants:
             cells.setdefault((fit.n, fit.split, name), []).append(score)
         return cls(
             corpus,
-            {cell: pooled([score.tally for score in several]) for cell, several in cells.items()},
+            {cell: pooled([score.push_scores for score in several]) for cell, several in cells.items()},
             {cell: sum(score.cpu for score in several) / len(several) for cell, several in cells.items()},
             {cell: len(several) for cell, several in cells.items()},
         )
@@ -58,7 +58,7 @@ class Variants:
     @property
     def sizes(self) -> list[int]:
         """Training windows, ascending."""
-        return sorted({n for n, _, _ in self.tallies})
+        return sorted({n for n, _, _ in self.scores})
 
     @property
     def name(self) -> str:
@@ -69,9 +69,9 @@ class Variants:
     def differences(self) -> dict[tuple[str, int, SplitName, str], Estimate]:
         """By quantity and cell: the variant's less the plain kernel's, of the same pushes."""
         return {
-            (quantity, n, split, name): difference_by_push(self.tallies[n, split, PLAIN], tally, figure)
+            (quantity, n, split, name): difference_by_push(self.scores[n, split, PLAIN], push_scores, figure)
             for quantity, figure in QUANTITIES.items()
-            for (n, split, name), tally in self.tallies.items()
+            for (n, split, name), push_scores in self.scores.items()
             if name != PLAIN
         }
 
@@ -154,8 +154,10 @@ def _told(variants: Variants, split: SplitName) -> str:
 
 def _pushes(variants: Variants) -> str:
     largest = variants.sizes[-1]
-    tally, fits = variants.tallies[largest, "push", PLAIN], variants.fits[largest, "push", PLAIN]
+    push_scores, fits = variants.scores[largest, "push", PLAIN], variants.fits[largest, "push", PLAIN]
     most = max(variants.fits[n, "push", PLAIN] for n in variants.sizes)
     fewer = f" (of {most} at smaller sizes)" if fits < most else ""
-    tested = f"{len(tally.push_id)} tested pushes of {fits} {'fold' if fits == 1 else 'folds'} at {largest} windows"
+    tested = (
+        f"{len(push_scores.push_id)} tested pushes of {fits} {'fold' if fits == 1 else 'folds'} at {largest} windows"
+    )
     return f"{tested}{fewer}, {SPLIT_WORDS['push']}"

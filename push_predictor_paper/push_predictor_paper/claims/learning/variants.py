@@ -64,13 +64,13 @@ def _table(variants: Variants) -> Table:
 
 def _row(variants: Variants, n: int, split: SplitName, name: str) -> tuple[str, ...]:
     cell = (n, split, name)
-    tally = variants.tallies[cell]
+    push_scores = variants.scores[cell]
     forms = dict(zip(QUANTITIES, (".3f", ".2f", ".2f"), strict=True))
-    figures = [by_push(tally, figure).cell(forms[quantity]) for quantity, figure in QUANTITIES.items()]
+    figures = [by_push(push_scores, figure).cell(forms[quantity]) for quantity, figure in QUANTITIES.items()]
     differences = [
         NOTHING if name == PLAIN else variants.differences[(quantity, *cell)].cell("+.3f") for quantity in QUANTITIES
     ]
-    much = f"{variants.fits[cell]}\n{len(tally.push_id)} pushes"
+    much = f"{variants.fits[cell]}\n{len(push_scores.push_id)} pushes"
     return (f"{n}, {split}: {name}", *figures, *differences, much, f"{variants.cpu[cell]:.1f}")
 
 
@@ -85,7 +85,7 @@ def _picture(study: Study, number: int, variants: Variants) -> Picture:
     path = draw(
         study.out / f"variants_{number}.png", (9.0, 6.0), lambda figure: paint_variants(figure, variants.sizes, panels)
     )
-    pushes = ", ".join(f"{len(variants.tallies[n, 'push', PLAIN].push_id)} at n = {n}" for n in variants.sizes)
+    pushes = ", ".join(f"{len(variants.scores[n, 'push', PLAIN].push_id)} at n = {n}" for n in variants.sizes)
     return Picture(
         path,
         f"Exact NLPD and NMSE of three kernels less those of the plain one, by training size ({variants.name})",
@@ -113,13 +113,13 @@ def _data(variants: Variants) -> dict[str, Any]:
         "accepted": accepted(variants),
         "cells": [
             {"n": n, "split": split, "kernel": name, "fits": variants.fits[n, split, name]}
-            | {"pushes": len(tally.push_id), "cpu": variants.cpu[n, split, name]}
-            | {quantity: by_push(tally, figure).json() for quantity, figure in QUANTITIES.items()}
+            | {"pushes": len(push_scores.push_id), "cpu": variants.cpu[n, split, name]}
+            | {quantity: by_push(push_scores, figure).json() for quantity, figure in QUANTITIES.items()}
             | {
                 f"difference in {quantity}": variants.differences[quantity, n, split, name].json()
                 for quantity in QUANTITIES
                 if name != PLAIN
             }
-            for (n, split, name), tally in variants.tallies.items()
+            for (n, split, name), push_scores in variants.scores.items()
         ],
     }

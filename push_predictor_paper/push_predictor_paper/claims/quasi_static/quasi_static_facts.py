@@ -49,7 +49,7 @@ class Facts:
     def judged_on(self) -> str:
         """Which pushes, which split, which interval."""
         return (
-            f"{len(self.judged.tallies[MAIN][-1].push_id)} held-out pushes, whole pushes left out; intervals draw "
+            f"{len(self.judged.scores[MAIN][-1].push_id)} held-out pushes, whole pushes left out; intervals draw "
             "folds with their models anew, and pushes within."
         )
 
@@ -75,8 +75,8 @@ def facts_of(study: Study) -> Facts:
     rig = study.simulated.sets[pair].rig
     done = study.work.run("models of time-scaled pushes", score_bracket, [(usable, rig, b) for b in brackets.values()])
     found = dict(zip(brackets, done, strict=True))
-    tallies = {s: [pooled([found[s, k, f] for f in folds]) for k in range(len(numbers))] for s in SERIES}
-    judged = Judged(tuple(plan.speeds[k] for k in numbers), numbers, tallies)
+    scores = {s: [pooled([found[s, k, f] for f in folds]) for k in range(len(numbers))] for s in SERIES}
+    judged = Judged(tuple(plan.speeds[k] for k in numbers), numbers, scores)
     return Facts(plan.speed_pushes, plan.speeds, tuple(equal), tuple(windows), judged, rows, same_size)
 
 

@@ -23,12 +23,12 @@ KEPT = 0.9  # share of a window on which the tip touches
 class Judged:
     """Models of growing brackets of speeds, all judged on the same held-out pushes.
 
-    speeds (m/s) the brackets end at; tallies: by series, one a bracket; numbers: places of these speeds in the plan.
+    speeds (m/s) the brackets end at; scores: by series, one a bracket; numbers: places of these speeds in the plan.
     """
 
     speeds: tuple[float, ...]
     numbers: tuple[int, ...]
-    tallies: Mapping[str, Sequence[PushScores]]
+    scores: Mapping[str, Sequence[PushScores]]
 
     def same(self, series: str) -> Array:
         """NMSE (brackets, 1 + draws) of each bracket on held-out pushes of its own speeds; see draws."""
@@ -45,11 +45,11 @@ class Judged:
 
     def _draws(self, series: str, bracket: int, numbers: Sequence[int]) -> Array:
         """The figure, then its draws: of folds with their models, and of pushes within."""
-        tally = self.tallies[series][bracket]
-        speed, push = np.array([number_of(name) for name in tally.push_id.tolist()]).T
+        push_scores = self.scores[series][bracket]
+        speed, push = np.array([number_of(name) for name in push_scores.push_id.tolist()]).T
         weights = _weights(push) * np.isin(speed, numbers)
         with np.errstate(invalid="ignore", divide="ignore"):  # a draw without any such push
-            return total_nmse(tally.totals(weights))
+            return total_nmse(push_scores.totals(weights))
 
 
 def _weights(push: np.ndarray) -> Array:
