@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from push_predictor_paper.data.corpus import PushSet
-from push_predictor_paper.fits.fits import KINDS, Fit, Score, SplitName, score
+from push_predictor_paper.fits.fit import KINDS, Fit, Score, SplitName, score
 
 from benchmarks.measured.scores import HEAD, difference, figures
 from push_predictor.evaluation.push_scores import pooled

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from push_predictor_paper.fits.fits import SPLIT_WORDS, Fit, SplitName, split_of
-from push_predictor_paper.fits.fits import trained as trained_on_split
+from push_predictor_paper.fits.fit import SPLIT_WORDS, Fit, SplitName, split_of
+from push_predictor_paper.fits.fit import trained as trained_on_split
 
 from benchmarks.measured.square import SIZES, imported_square
 from push_predictor.evaluation.estimate import Estimate, of_draws

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 KINDS = ("vhgp", "gp", "analytical")
 SPEEDS = (0.01, 0.02, 0.05)
+PAPER_IS_MISSING = (
+    "`report paper` needs the package push_predictor_paper: pip install ./push_predictor_paper in the repository"
+)
 OF_ONE_KIND = {"paper": ("data", "recordings", "jobs", "cluster"), "validation": ("model", "recording")}
 
 
@@ -61,10 +64,14 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _paper(options: argparse.Namespace) -> None:
-    from push_predictor_paper.plan import FULL, QUICK
-    from push_predictor_paper.report import report_paper
-    from push_predictor_paper.work import Work
-
+    try:
+        from push_predictor_paper.plan import FULL, QUICK
+        from push_predictor_paper.report import report_paper
+        from push_predictor_paper.work import Work
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith("push_predictor_paper"):
+            raise
+        raise PushPredictorError(PAPER_IS_MISSING) from None
     from push_predictor.commands.progress_bar import ProgressBar
 
     if options.jobs is not None and options.jobs < 1:

@@ -1,4 +1,5 @@
-"""Bauza and Rodriguez (ICRA 2017) reproduced: every claim on simulated and on measured pushes.
+"""The results of Bauza and Rodriguez (ICRA 2017), reproduced on simulated and on measured pushes.
 
-Import `report`, `plan` and `work`, as the command `push_predictor report paper` does.
+Import `report`, `plan` and `work`, as the command `push_predictor report paper` does. push_predictor itself imports
+nothing of this package except in that command.
 """

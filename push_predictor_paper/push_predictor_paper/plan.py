@@ -1,4 +1,4 @@
-"""How much of the paper is computed: at its full size, or so little that it takes minutes."""
+"""The size of the report: the paper's full size, or a quick one that takes a minute."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ GRID_SPEED, GRID_TRAVEL = 0.02, 0.01  # m/s, m
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes of everything in the report.
+    """Sizes of everything that the report computes.
 
     pushes: of each training recording; reference_pushes: of that of the reference pair. sizes: training windows of
     the learning curves; largest: tried on the reference pair only. seeds: draws of training rows, and folds of the
     split by push. contacts, angle_step (rad), repetitions: the grid of repeated pushes on the reference surface;
-    other_repetitions: on the other surfaces. speed_pushes: pushes at each speed of the quasi-static study.
+    other_repetitions: on the other surfaces. speed_pushes: pushes at each speed of the quasi-static claim.
     """
 
     name: str
@@ -54,12 +54,12 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Training windows of the models that are shown: as many as the curves' last point."""
+        """Training windows of the models that are shown: the last point of the learning curves."""
         return self.sizes[-1]
 
     @property
     def grid_fractions(self) -> Array:
-        """Contact points of the grid as fractions of a side; the outermost ones lie half a millimetre inside."""
+        """Contact points of the grid as fractions of a side; the outermost lie half a millimetre inside the corners."""
         return np.clip(np.linspace(0.0, 1.0, self.contacts), 0.0055, 0.9945)
 
     @property

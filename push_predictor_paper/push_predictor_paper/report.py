@@ -1,4 +1,4 @@
-"""The report: every claim of the paper with its figure, its number and whether it holds here; HTML, JSON beside it."""
+"""The report: every claim of the paper with picture, numbers and verdict, as HTML and as JSON."""
 
 from __future__ import annotations
 
@@ -16,71 +16,77 @@ from push_predictor import __version__
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor_paper.claims import data
-from push_predictor_paper.claims.calibration import calibration
-from push_predictor_paper.claims.comparison import comparison, mean_gain, speed_error
-from push_predictor_paper.claims.divergence import divergence
+from push_predictor_paper.claims.calibration import section as calibration
+from push_predictor_paper.claims.comparison import mean_gain, speed_error
+from push_predictor_paper.claims.comparison import section as comparison
+from push_predictor_paper.claims.divergence import section as divergence
 from push_predictor_paper.claims.learning import learning_curves, variants
-from push_predictor_paper.claims.maps import maps
-from push_predictor_paper.claims.noise import noise
-from push_predictor_paper.claims.quasi_static import quasi_static
+from push_predictor_paper.claims.maps import section as maps
+from push_predictor_paper.claims.noise import section as noise
+from push_predictor_paper.claims.quasi_static import section as quasi_static
 from push_predictor_paper.claims.repeated_pushes import kinds_of_push, modality
 from push_predictor_paper.data.corpus import simulated_corpus
 from push_predictor_paper.data.measured import measured_corpora
 from push_predictor_paper.data.repetitions import repeated_grid
 from push_predictor_paper.plan import Plan
-from push_predictor_paper.section import Origin, Section, Table
+from push_predictor_paper.section import VERDICTS, Origin, Section, Table
 from push_predictor_paper.study import Study
 from push_predictor_paper.work import Work, fingerprint
 
 PAPER = "Bauza and Rodriguez, A Probabilistic Data-Driven Model for Planar Pushing, ICRA 2017"
-CLAIMS: tuple[Callable[[Study], Section], ...] = (
-    data.section,
-    kinds_of_push.section,
-    maps.section,
-    noise.section,
-    learning_curves.section,
-    comparison.section,
-    mean_gain.section,
-    speed_error.section,
-    divergence.section,
-    modality.section,
-    quasi_static.section,
-    calibration.section,
-    variants.section,
-)
+CLAIMS: Mapping[str, Callable[[Study], Section]] = {  # by what the progress bar shows
+    "data": data.section,
+    "kinds of push": kinds_of_push.section,
+    "maps": maps.section,
+    "noise": noise.section,
+    "learning curves": learning_curves.section,
+    "comparison": comparison.section,
+    "mean gain": mean_gain.section,
+    "speed error": speed_error.section,
+    "divergence": divergence.section,
+    "modality": modality.section,
+    "quasi-static": quasi_static.section,
+    "calibration": calibration.section,
+    "variants": variants.section,
+}
 HOW_TO_READ = (
-    "Intervals are 95 %. Windows of one push are not independent: intervals draw whole pushes anew or span seeds and "
-    "folds, as each caption says, and the split that counts leaves whole pushes out. A random split of windows is "
-    "shown beside it because the paper used one.",
-    "NMSE and NLPD are sums over dx, dy and dtheta. NLPD is in SI units (m, m, rad); in mm and rad it is 13.8155 more.",
-    "A verdict follows from the numbers by the rule that its sentence tells. Simulated and measured pushes never share "
-    "a table. What holds in our simulator shows that the method works and that the physics suffices for the effect, "
-    "not that the world is so.",
+    "Each verdict follows from the numbers by a rule that its finding states. Intervals are 95 %.",
+    "Windows of one push are not independent. Intervals therefore resample whole pushes, or span seeds and folds, "
+    "as each caption states. The split that counts holds out whole pushes. The paper used a random split of "
+    "windows; it is shown for comparison.",
+    "NMSE and NLPD are sums over dx, dy and dtheta. NLPD is in SI units (m, m, rad). In mm and rad it is 13.8155 "
+    "higher.",
+    "Simulated and measured pushes never share a table. A claim that holds in the simulator shows that the method "
+    "works and that the simulated physics suffices for the effect. It does not show that real pushes behave so.",
+)
+QUICK_WARNING = (
+    "Made with --quick: a few small recordings, to check that everything runs. Intervals are wide, and verdicts "
+    "rest on little data. Without --quick the paper's full size is computed."
 )
 
 
 class Stages(Protocol):
-    """Hears which part of the report is being made."""
+    """Shows which part of the report is being computed."""
 
     def stage(self, number: int, of: int, title: str) -> None:
-        """A part begins."""
+        """Show that part `number` of `of` begins."""
 
 
 def report_paper(
     plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None, stages: Stages
 ) -> tuple[Path, dict[str, Any]]:
-    """Compute everything and write out/paper.html, its pictures, out/paper.json; returns page and content of the JSON.
+    """Compute all claims; write out/paper.html and out/paper.json. Returns the page and the content of the JSON.
 
-    measured: a folder of measured pushes (paper.measured). keep: a folder that receives all simulated recordings.
+    measured: a folder of measured pushes (see data.measured). keep: a folder that receives all simulated recordings.
     """
     out.mkdir(parents=True, exist_ok=True)
     begun, count = time.monotonic(), len(CLAIMS) + 1
     stages.stage(1, count, "recordings")
     study = gather(plan, work, out, measured, keep)
     sections = []
-    for number, claim in enumerate(CLAIMS, 2):
-        stages.stage(number, count, claim.__module__.rpartition(".")[2].replace("_", " "))
-        sections.append(claim(study))
+    for number, (title, section) in enumerate(CLAIMS.items(), 2):
+        stages.stage(number, count, title)
+        sections.append(section(study))
     content = _content(plan, sections, time.monotonic() - begun)
     write_whole(out / "paper.json", (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
     write_whole(out / "paper.html", _page(plan, study, sections, content["made"]).encode())
@@ -88,7 +94,7 @@ def report_paper(
 
 
 def gather(plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None) -> Study:
-    """All data: recordings simulated and their windows cut, measured sets imported."""
+    """Simulate the recordings, find their windows, import the measured sets."""
     simulated = simulated_corpus(plan, work, keep)
     reference = simulated.reference[1]
     again = {s: plan.repetitions if s == reference else plan.other_repetitions for s in plan.surfaces}
@@ -125,22 +131,29 @@ def _section_json(section: Section) -> dict[str, Any]:
 
 def _page(plan: Plan, study: Study, sections: list[Section], made: Mapping[str, Any]) -> str:
     parts = [
-        html.paragraph(f"What {PAPER} reports, made again from {_origin(study)}.", "lead"),
+        html.paragraph(_summary_sentence(sections), "lead"),
         *([html.paragraph(QUICK_WARNING, "warning")] if plan.name == "quick" else []),
-        *map(html.paragraph, HOW_TO_READ),
-        html.heading("What holds here"),
-        *_summary(sections),
+        *_summary_tables(sections),
+        html.heading("How to read this page"),
+        *map(html.paragraph, (_origin(study), *HOW_TO_READ)),
     ]
     for section in sections:
         parts += _section_html(section)
     facts = {name: str(value) for name, value in made.items()} | {"plan": plan.name, "seed": str(plan.seed)}
-    parts += [html.heading("How this was made"), html.definitions(facts)]
+    parts += [html.heading("How this page was made"), html.definitions(facts)]
     return html.page("Planar pushing: the paper, claim by claim", parts)
 
 
-def _summary(sections: Sequence[Section]) -> list[str]:
-    """What the paper claims, and what is asked beyond it, in a table each."""
-    heads: dict[Origin, str] = {"paper": "claim of the paper", "beyond the paper": "asked beyond the paper"}
+def _summary_sentence(sections: Sequence[Section]) -> str:
+    """How many of the paper's claims hold, hold in part, do not hold, are not decided."""
+    verdicts = [f.verdict for section in sections for f in section.findings if f.origin == "paper"]
+    counts = ", ".join(f"{verdict}: {verdicts.count(verdict)}" for verdict in VERDICTS)
+    return f"{len(verdicts)} claims of {PAPER}, tried here. {counts.capitalize()}."
+
+
+def _summary_tables(sections: Sequence[Section]) -> list[str]:
+    """One table of the paper's claims, one of the questions beyond the paper."""
+    heads: dict[Origin, str] = {"paper": "claim of the paper", "beyond the paper": "question beyond the paper"}
     tables = []
     for origin, head in heads.items():
         rows = [(s.key, s.title, f.claim, f.verdict) for s in sections for f in s.findings if f.origin == origin]
@@ -148,17 +161,9 @@ def _summary(sections: Sequence[Section]) -> list[str]:
     return tables
 
 
-QUICK_WARNING = (
-    "Made with --quick: a few small recordings, to see that everything runs. Its intervals are wide and its verdicts "
-    "are those of little data; without --quick the paper's full size is made."
-)
-
-
 def _origin(study: Study) -> str:
     measured = "; ".join(corpus.name for corpus in study.measured)
-    return study.simulated.title + (
-        f"; and {measured}" if measured else "; no measured data were given (--data FOLDER)"
-    )
+    return f"Data: {study.simulated.title}; " + (measured or "no measured pushes (give them with --data FOLDER)") + "."
 
 
 def _section_html(section: Section) -> list[str]:

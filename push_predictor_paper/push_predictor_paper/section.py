@@ -1,23 +1,23 @@
-"""What one claim gives to the report: findings, tables, pictures, numbers."""
+"""What a claim contributes to the report: findings, tables, pictures, numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from push_predictor.reporting.canvas import Picture
 
 Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 Origin = Literal["paper", "beyond the paper"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim in our words, whether it holds here, and the sentence with number and interval for it.
+    """A claim in our words, its verdict, and the evidence: numbers with intervals, then the rule of the verdict.
 
-    The verdict follows from the numbers by a rule that the sentence lets the reader see. origin: who claims it; what
-    the paper does not say is ours to ask.
+    origin: the paper, or a question that the paper does not ask.
     """
 
     claim: str
@@ -28,7 +28,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text: caption (which pushes, which split, which interval), head, rows; see html.table."""
+    """A table of text for html.table. The caption states the pushes, the split and the kind of interval."""
 
     caption: str
     head: tuple[str, ...]
@@ -37,7 +37,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """One section of the report. data: the numbers behind it, for the JSON; NaN is not allowed, give None."""
+    """One section of the report. data: its numbers, for the JSON, with None in place of NaN."""
 
     key: str
     title: str
@@ -49,7 +49,7 @@ class Section:
 
 
 def joined(key: str, title: str, parts: Sequence[tuple[str, Section]]) -> Section:
-    """One section of what each corpus gave, with the corpus' title; the parts' own keys and titles are dropped."""
+    """Join sections into one; parts: (title of the corpus, its section). The parts' own keys and titles are dropped."""
 
     def every(field_name: str) -> tuple[Any, ...]:
         return tuple(item for _, part in parts for item in getattr(part, field_name))

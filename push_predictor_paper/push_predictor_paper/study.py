@@ -1,4 +1,4 @@
-"""What the claims are computed from: the plan, the data, the means to compute, the folder for pictures."""
+"""The input of every claim: plan, data, work queue, folder for pictures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor_paper.work import Work
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """simulated: the training recordings. measured: sets of others, each by itself. grids: by surface."""
+    """Plan, data and tools. simulated: the training recordings; measured: one corpus per source; grids: by surface."""
 
     plan: Plan
     work: Work
@@ -25,7 +25,7 @@ class Study:
 
     @property
     def corpora(self) -> tuple[Corpus, ...]:
-        """All sets, the simulated ones first."""
+        """All corpora, the simulated one first."""
         return (self.simulated, *self.measured)
 
     @property

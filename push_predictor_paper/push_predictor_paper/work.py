@@ -1,6 +1,6 @@
-"""Many independent pieces of work: over all cores (or a cluster) by joblib, kept on disk, with a progress bar.
+"""Independent calls, run on all cores or on a cluster by joblib, and cached on disk.
 
-What is kept belongs to one state of the library's sources: change a module and its results are made anew.
+The cache belongs to one state of the sources: after a change of a module that matters, results are computed again.
 """
 
 from __future__ import annotations
@@ -19,45 +19,54 @@ import push_predictor
 from push_predictor.errors import PushPredictorError
 
 Result = TypeVar("Result")
-# They change how results look, not what they are.
-LOOKS = (
+LOOKS = (  # modules that change how results look, not what they are
     "push_predictor/evaluation/report/page.py",
     "push_predictor/evaluation/report/tables.py",
     "push_predictor_paper/report.py",
     "push_predictor_paper/section.py",
 )
-NO_RESULTS = ("reporting", "figures", "nodes", "replay", "online", "commands", "claims", "residuals")
+NO_RESULTS = (  # folders on which no cached result depends
+    "reporting",
+    "figures",
+    "nodes",
+    "replay",
+    "online",
+    "commands",
+    "claims",
+    "residuals",
+)
 
 
 class Watch(Protocol):
-    """Sees the work go on: the terminal's progress bar."""
+    """Shows the progress of the work."""
 
     def begin(self, doing: str, count: int) -> None:
-        """A batch of pieces of work begins."""
+        """Show that a batch of `count` calls begins."""
 
     def advance(self) -> None:
-        """One of them is done."""
+        """Show that one call of the batch is done."""
 
 
 class Work:
-    """Runs functions of values once: a call that was made before, also by an earlier process, is read from disk.
+    """A cache of calls, and the processes that fill it. A call made before, also by another process, is read from disk.
 
-    folder: where results are kept; cores: how many pieces at once, -1 for all. Under `joblib.parallel_config` with
-    another back end (dask, say) the pieces go there; its workers must see the folder. Raises PushPredictorError if
-    joblib is not installed.
+    folder: of the cache; cores: calls at the same time, -1 for one per core. With `joblib.parallel_config` another back
+    end (dask, say) runs the calls; its workers must see the folder. Raises PushPredictorError if joblib is missing.
     """
 
     def __init__(self, folder: Path, cores: int = -1, watch: Watch | None = None) -> None:
         try:
             import joblib
         except ImportError as error:
-            raise PushPredictorError(f"the work needs joblib ({error}); pip install 'push_predictor[report]'") from None
+            raise PushPredictorError(
+                f"the report needs joblib ({error}); pip install 'push_predictor[report]'"
+            ) from None
         self._joblib, self._cores, self._watch = joblib, cores, watch
         self.folder = folder / fingerprint()
         self._memory = joblib.Memory(self.folder, verbose=0)
 
     def run(self, doing: str, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> list[Result]:
-        """Results of function(*arguments) for each call, in their order. The function stands at a module's top."""
+        """Results of function(*arguments) for each call, in order. The function is one at the top of a module."""
         if self._watch is not None:
             self._watch.begin(doing, len(calls))
         kept = self._memory.cache(function)
@@ -73,7 +82,7 @@ class Work:
 
 @cache
 def fingerprint() -> str:
-    """A digest of the sources on which results depend, and of the versions of numpy and scipy."""
+    """A digest of the sources of both packages on which results depend, and of the versions of numpy and scipy."""
     digest = hashlib.sha256(f"numpy {np.__version__}, scipy {scipy.__version__}".encode())
     for package in (Path(push_predictor.__file__).parent, Path(__file__).parent):
         for path in sorted(package.rglob("*.py")):
@@ -84,6 +93,6 @@ def fingerprint() -> str:
 
 
 def _numbered(i: int, function: Callable[..., Result], arguments: tuple[Any, ...]) -> tuple[int, Result]:
-    with warnings.catch_warnings():  # that a busy machine takes long to keep arguments is no news to the user
+    with warnings.catch_warnings():  # joblib warns when a busy machine is slow to store arguments
         warnings.filterwarnings("ignore", message="Persisting input arguments")
         return i, function(*arguments)

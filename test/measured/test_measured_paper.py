@@ -9,7 +9,7 @@ import pytest
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.measured import measured_corpora
 from push_predictor_paper.estimate import by_push, total_nlpd, total_nmse
-from push_predictor_paper.fits.fits import Fit, SplitName, scores
+from push_predictor_paper.fits.fit import Fit, SplitName, scores
 from push_predictor_paper.work import Work
 
 from push_predictor.evaluation.push_scores import pooled

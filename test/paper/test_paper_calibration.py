@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from push_predictor_paper.claims.calibration import calibration
 from push_predictor_paper.claims.calibration.calibrated import EXACT, Calibrated, density_gain, fitting_size
-from push_predictor_paper.claims.calibration.calibration_findings import (
+from push_predictor_paper.claims.calibration.coverage_by_speed import coverage_by_speed, missed, speed_finding
+from push_predictor_paper.claims.calibration.findings import (
     calibration_findings,
     coverage_finding,
     density_finding,
     promise,
     shape_finding,
 )
-from push_predictor_paper.claims.calibration.coverage_by_speed import coverage_by_speed, missed, speed_finding
+from push_predictor_paper.claims.calibration.section import section
 from push_predictor_paper.claims.corrected import corrected
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.fits.fits import Fit
+from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.plan import QUICK, SPEEDS
 from push_predictor_paper.statistics import pit as pit_module
 from push_predictor_paper.statistics.pit import BARS, Pits, coverage, exact_pit, histogram, pits, together
@@ -343,7 +343,7 @@ def study(tmp_path: Path, simulated: Corpus, *measured: Corpus) -> Study:
 
 
 def test_a_section_has_its_tables_and_pictures_for_every_corpus(tmp_path: Path) -> None:
-    made = calibration.section(study(tmp_path, corpus(), corpus("measured")))
+    made = section(study(tmp_path, corpus(), corpus("measured")))
     assert len(made.tables) == 4 + 3 and len(made.findings) == 5 + 4  # speeds: of the simulated set only
     assert [picture.path.name for picture in made.pictures] == [
         "calibration_0.png", "coverage_by_speed.png", "calibration_1.png",
@@ -357,6 +357,6 @@ def test_a_section_has_its_tables_and_pictures_for_every_corpus(tmp_path: Path) 
 def test_a_set_too_small_for_the_plan_gets_a_note(tmp_path: Path) -> None:
     small = corpus("measured", pushes=5)
     assert fitting_size(study(tmp_path, small), small) is None
-    made = calibration.section(study(tmp_path, small))
+    made = section(study(tmp_path, small))
     assert made.findings == () and made.tables == ()
     assert any("too few windows" in note for note in made.notes)

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study
-from push_predictor_paper.claims.comparison import comparison, mean_gain
-from push_predictor_paper.claims.comparison.comparison_findings import (
+from push_predictor_paper.claims.comparison import mean_gain
+from push_predictor_paper.claims.comparison.findings import (
     better_density,
     crossings_of,
     early,
@@ -16,10 +16,11 @@ from push_predictor_paper.claims.comparison.comparison_findings import (
     similar_mean,
 )
 from push_predictor_paper.claims.comparison.mean_gain import improves, where_it_counts
+from push_predictor_paper.claims.comparison.section import section
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing, below_zero_from, crossing
 from push_predictor_paper.fits.curves import Curves
-from push_predictor_paper.fits.fits import SPLITS, Fit, Score
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score
 from push_predictor_paper.fits.held_out import HeldOut
 
 from push_predictor.evaluation.push_scores import PushScores
@@ -219,7 +220,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def compared(study):
-    return comparison.section(study)
+    return section(study)
 
 
 def test_the_section_compares_all_three_kinds_beside_the_paper(compared):

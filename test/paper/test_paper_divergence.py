@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study, truth
-from push_predictor_paper.claims.divergence.divergence import section
-from push_predictor_paper.claims.divergence.divergence_models import trainings
-from push_predictor_paper.claims.divergence.divergence_rules import divergences, estimate, good, lower
+from push_predictor_paper.claims.divergence.models import trainings
+from push_predictor_paper.claims.divergence.rules import divergences, estimate, good, lower
+from push_predictor_paper.claims.divergence.section import section
 from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.section import Section
 from push_predictor_paper.statistics.grid_maps import block_weights, mean_of, median_of
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from paper_studies import made_up_corpus, made_up_study, rig_of
 from push_predictor_paper.claims.learning import learning_curves
+from push_predictor_paper.claims.learning.findings import circle, saturation, surface
 from push_predictor_paper.claims.learning.learning_curves import band_or_range
-from push_predictor_paper.claims.learning.learning_findings import circle, saturation, surface
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.fits.curves import Curves, gathered, nmse_of
-from push_predictor_paper.fits.fits import SPLITS, Fit, Score
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score
 from push_predictor_paper.study import Study
 
 from push_predictor.evaluation.push_scores import PushScores

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_study, rig_of
-from push_predictor_paper.claims.maps.map_agreement import Likeness, agreement_findings, likenesses
-from push_predictor_paper.claims.maps.map_peaks import MIRRORED, NAMED, Peaks, agreed, peak_findings, peaks_of, region
-from push_predictor_paper.claims.maps.maps import examples, section
+from push_predictor_paper.claims.maps.agreement import Likeness, agreement_findings, likenesses
+from push_predictor_paper.claims.maps.peaks import MIRRORED, NAMED, Peaks, agreed, peak_findings, peaks_of, region
+from push_predictor_paper.claims.maps.section import examples, section
 from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Verdict

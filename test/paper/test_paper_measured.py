@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.measured import measured_corpora
-from push_predictor_paper.fits.fits import Fit, scores
+from push_predictor_paper.fits.fit import Fit, scores
 from push_predictor_paper.work import Work
 
 from push_predictor.errors import ImportSourceError

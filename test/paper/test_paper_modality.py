@@ -22,7 +22,7 @@ from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.figures.histograms import moments
-from push_predictor_paper.fits.fits import Fit, trained
+from push_predictor_paper.fits.fit import Fit, trained
 from push_predictor_paper.section import Section
 from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
 from push_predictor_paper.statistics.grid_maps import told

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.noise.noise import section
-from push_predictor_paper.claims.noise.noise_learnt import learnt_figures
-from push_predictor_paper.claims.noise.noise_shape import shape_finding
-from push_predictor_paper.claims.noise.noise_size import size_finding, sized, span_finding
+from push_predictor_paper.claims.noise.learned import learnt_figures
+from push_predictor_paper.claims.noise.section import section
+from push_predictor_paper.claims.noise.shape import shape_finding
+from push_predictor_paper.claims.noise.size import size_finding, sized, span_finding
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.map_models import ModelMap

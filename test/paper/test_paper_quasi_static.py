@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import paper_studies
 import pytest
-from push_predictor_paper.claims.quasi_static.quasi_static import section
-from push_predictor_paper.claims.quasi_static.quasi_static_rules import (
+from push_predictor_paper.claims.quasi_static.rules import (
     Judged,
     breaks_beyond,
     departure,
@@ -21,6 +20,7 @@ from push_predictor_paper.claims.quasi_static.quasi_static_rules import (
     turning_bracket,
     turns_there,
 )
+from push_predictor_paper.claims.quasi_static.section import section
 from push_predictor_paper.data.time_scaled import (
     TRAVEL,
     Bracket,

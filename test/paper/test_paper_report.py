@@ -55,7 +55,7 @@ def test_the_page_stands_alone_and_warns_that_it_is_quick(made: Path) -> None:
 def test_what_the_paper_does_not_claim_is_listed_apart(made: Path) -> None:
     page = (made / "paper.html").read_text()
     paper, ours = re.findall(r'<table class="verdicts">.*?</table>', page, re.DOTALL)
-    assert "claim of the paper" in paper and "asked beyond the paper" in ours
+    assert "claim of the paper" in paper and "question beyond the paper" in ours
     for section in ("calibration", "variants"):
         assert f'href="#{section}"' in ours and f'href="#{section}"' not in paper
     findings = [f for s in json.loads((made / "paper.json").read_text())["sections"].values() for f in s["findings"]]

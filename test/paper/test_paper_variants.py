@@ -19,7 +19,7 @@ from push_predictor_paper.claims.learning.variant_rules import (
 )
 from push_predictor_paper.data.corpus import Corpus, PushSet
 from push_predictor_paper.fits import variants as jobs
-from push_predictor_paper.fits.fits import SPLITS, Fit, Score, score
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score, score
 from push_predictor_paper.fits.variants import CHOICES, PLAIN, score_variant, variant_fits
 from push_predictor_paper.plan import FULL, QUICK
 from push_predictor_paper.study import Study

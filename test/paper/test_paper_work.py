@@ -22,7 +22,7 @@ import push_predictor
 from push_predictor.errors import PushPredictorError
 from push_predictor_paper import work as work_module
 
-REPOSITORY = Path(push_predictor.__file__).parents[1]
+SOURCES = [Path(module.__file__).parents[1] for module in (push_predictor, work_module)]  # what workers import from
 PIECES = textwrap.dedent(
     """
     import os
@@ -51,7 +51,7 @@ def pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     """A module of small pieces of work, importable here and in every process started from here."""
     (tmp_path / "pieces_of_work.py").write_text(PIECES)
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(REPOSITORY)]))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *map(str, SOURCES)]))
     get_reusable_executor().shutdown(wait=True)  # processes that other tests have left know nothing of the module
     import pieces_of_work
 
@@ -161,39 +161,58 @@ def wait_for(condition, timeout: float = 120.0) -> None:
 
 
 @pytest.fixture
-def copied_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the sources, which the fingerprint is then made of."""
-    copy = tmp_path / "push_predictor"
-    shutil.copytree(Path(push_predictor.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(work_module.push_predictor, "__file__", str(copy / "__init__.py"))
-    return copy
+def copied_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with copies of both packages; the fingerprint is made from them."""
+    packages = {push_predictor: tmp_path / "push_predictor", work_module: tmp_path / "push_predictor_paper"}
+    for module, copy in packages.items():
+        shutil.copytree(Path(module.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        monkeypatch.setattr(module, "__file__", str(copy / Path(module.__file__).name))
+    return tmp_path
 
 
 def fresh_fingerprint() -> str:
     return fingerprint.__wrapped__()
 
 
-@pytest.mark.parametrize("name", ["models/gp.py", "simulation/dynamics.py", "paper/fits.py", "recordings/windows.py"])
-def test_a_change_of_a_source_that_matters_changes_the_fingerprint(copied_package: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "push_predictor/models/gaussian_process/gp.py",
+        "push_predictor/simulation/dynamics.py",
+        "push_predictor/recordings/windows/finder.py",
+        "push_predictor_paper/fits/fit.py",
+        "push_predictor_paper/data/corpus.py",
+    ],
+)
+def test_a_change_of_a_source_that_matters_changes_the_fingerprint(copied_packages: Path, name: str) -> None:
     before = fresh_fingerprint()
-    (copied_package / name).write_text((copied_package / name).read_text() + "\nANOTHER = 1\n")
+    (copied_packages / name).write_text((copied_packages / name).read_text() + "\nANOTHER = 1\n")
     assert fresh_fingerprint() != before
 
 
 @pytest.mark.parametrize(
-    "name", ["evaluation/html.py", "evaluation/figures/canvas.py", "paper/claims/data.py", "paper/figures/__init__.py"]
+    "name",
+    [
+        "push_predictor/reporting/html.py",
+        "push_predictor/evaluation/report/figures/slider.py",
+        "push_predictor/evaluation/report/page.py",
+        "push_predictor_paper/claims/data.py",
+        "push_predictor_paper/figures/__init__.py",
+        "push_predictor_paper/report.py",
+    ],
 )
-def test_a_change_of_looks_does_not(copied_package: Path, name: str) -> None:
+def test_a_change_of_looks_does_not(copied_packages: Path, name: str) -> None:
     before = fresh_fingerprint()
-    (copied_package / name).write_text((copied_package / name).read_text() + "\nANOTHER = 1\n")
+    (copied_packages / name).write_text((copied_packages / name).read_text() + "\nANOTHER = 1\n")
     assert fresh_fingerprint() == before
 
 
-def test_a_new_and_a_renamed_source_change_the_fingerprint(copied_package: Path) -> None:
+def test_a_new_and_a_renamed_source_change_the_fingerprint(copied_packages: Path) -> None:
     before = fresh_fingerprint()
-    (copied_package / "models" / "another.py").write_text("")
+    another = copied_packages / "push_predictor" / "models" / "another.py"
+    another.write_text("")
     added = fresh_fingerprint()
-    (copied_package / "models" / "another.py").rename(copied_package / "models" / "renamed.py")
+    another.rename(another.with_name("renamed.py"))
     assert len({before, added, fresh_fingerprint()}) == 3
 
 

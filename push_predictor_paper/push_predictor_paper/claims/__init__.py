@@ -1,4 +1,4 @@
-"""One folder or module per claim: its computation, figure, table, and whether it is reproduced.
+"""One folder or module per claim: computation, picture, table and verdict.
 
-`report` lists the claims; each offers `section(study)`.
+Each section module has a function `section(study)`; `push_predictor_paper.report` lists them.
 """

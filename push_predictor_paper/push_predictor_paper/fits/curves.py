@@ -10,7 +10,7 @@ import numpy as np
 from push_predictor.evaluation.push_scores import PushScores, pooled
 from push_predictor_paper.data.corpus import Corpus, Pair
 from push_predictor_paper.estimate import Estimate, over_seeds
-from push_predictor_paper.fits.fits import SPLITS, Fit, Score, SplitName, scores
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score, SplitName, scores
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.study import Study
 

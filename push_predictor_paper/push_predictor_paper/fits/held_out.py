@@ -11,7 +11,7 @@ from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fits import KINDS, Fit, compared, split_of, trainable
+from push_predictor_paper.fits.fit import KINDS, Fit, compared, split_of, trainable
 from push_predictor_paper.study import Study
 
 SAME_SPEED = 1.12  # pushes whose speeds lie closer than this ratio belong together

@@ -10,7 +10,7 @@ import numpy as np
 from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus, Pair, PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid, contact_on_first_side
-from push_predictor_paper.fits.fits import Answer, Fit, ask, trainable
+from push_predictor_paper.fits.fit import Answer, Fit, ask, trainable
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.study import Study
 from push_predictor_paper.work import Work

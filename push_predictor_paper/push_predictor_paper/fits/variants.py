@@ -11,7 +11,7 @@ from push_predictor.evaluation.validation import compare
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor_paper.data.corpus import Corpus, PushSet
-from push_predictor_paper.fits.fits import SPLITS, Fit, Score, scores, split_of, trainable
+from push_predictor_paper.fits.fit import SPLITS, Fit, Score, scores, split_of, trainable
 from push_predictor_paper.plan import Plan
 from push_predictor_paper.work import Work
 

@@ -13,7 +13,7 @@ from push_predictor.models.gaussian_process.quadrature import exact_log_density,
 from push_predictor.models.push_model import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
-from push_predictor_paper.fits.fits import Fit, trained
+from push_predictor_paper.fits.fit import Fit, trained
 
 RESOLUTION = 50  # draws of the uniform for each test: 2 % is the least family-wise p value
 FOLDS = 5

@@ -16,7 +16,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fits import Fit, split_of, trained
+from push_predictor_paper.fits.fit import Fit, split_of, trained
 
 BARS = 10
 EDGES = np.linspace(0.0, 1.0, BARS + 1)

@@ -1,4 +1,4 @@
-"""Claim: predicted intervals and distributions are calibrated (goes beyond the paper).
+"""Beyond the paper: are the predicted intervals and distributions calibrated?
 
-Import `calibration.section`.
+`section.section` is the section of the report; the other modules belong to it.
 """

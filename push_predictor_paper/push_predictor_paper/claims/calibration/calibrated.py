@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, by_push, total_exact_nlpd, total_nlpd
-from push_predictor_paper.fits.fits import KINDS, SPLITS, Fit, SplitName, trainable
+from push_predictor_paper.fits.fit import KINDS, SPLITS, Fit, SplitName, trainable
 from push_predictor_paper.statistics.pit import Histogram, Pits, coverage, histogram, pits, together
 from push_predictor_paper.study import Study
 

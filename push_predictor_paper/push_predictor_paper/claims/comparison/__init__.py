@@ -1,4 +1,4 @@
-"""Claims of section V-B: analytical model, GP and VHGP compared, also over speed.
+"""Claims of section V-B: analytical model, GP and VHGP compared, also by speed.
 
-Import `comparison`, `mean_gain` and `speed_error`.
+Sections of the report: `section`, `mean_gain` and `speed_error`.
 """

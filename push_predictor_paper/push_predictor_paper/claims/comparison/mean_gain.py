@@ -9,12 +9,12 @@ import numpy as np
 
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import COLOURS, Picture, draw
-from push_predictor_paper.claims.comparison.comparison import common_sizes, output_figure
+from push_predictor_paper.claims.comparison.section import common_sizes, output_figure
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, difference_by_push
 from push_predictor_paper.figures.curves import DASHES, MARKERS, Line, Panel, paint_panels
 from push_predictor_paper.fits.curves import Curves, curves
-from push_predictor_paper.fits.fits import KINDS, SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.fit import KINDS, SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.fits.held_out import HeldOut, held_out, within_nmse
 from push_predictor_paper.section import Finding, Section, Table, Verdict, joined
 from push_predictor_paper.study import Study

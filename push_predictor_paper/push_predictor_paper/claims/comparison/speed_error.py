@@ -13,7 +13,7 @@ from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.figures.speed_error import SpeedCurve, paint_speed_error
-from push_predictor_paper.fits.fits import KINDS, SPLIT_WORDS
+from push_predictor_paper.fits.fit import KINDS, SPLIT_WORDS
 from push_predictor_paper.fits.held_out import FEWEST_PUSHES, HeldOut, bias, held_out, within_nmse
 from push_predictor_paper.section import Finding, Section, Table, Verdict, joined
 from push_predictor_paper.study import Study

@@ -1,4 +1,4 @@
 """Claim: KL divergence of the models from repeated pushes.
 
-Import `divergence.section`.
+`section.section` is the section of the report; the other modules belong to it.
 """

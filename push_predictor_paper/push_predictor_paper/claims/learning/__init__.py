@@ -1,4 +1,4 @@
-"""Claims of section V-A: learning curves; other kernels (goes beyond the paper).
+"""Claims of section V-A: learning curves. Beyond the paper: other kernels.
 
-Import `learning_curves` and `variants`.
+Sections of the report: `learning_curves` and `variants`.
 """

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.reporting.canvas import Picture, draw
-from push_predictor_paper.claims.learning.learning_findings import (
+from push_predictor_paper.claims.learning.findings import (
     KIND,
     MEASURES,
     circle,
@@ -21,7 +21,7 @@ from push_predictor_paper.data.corpus import Corpus, Pair
 from push_predictor_paper.estimate import Estimate, over_seeds
 from push_predictor_paper.figures.curves import Line, Panel, look_of, paint_panels
 from push_predictor_paper.fits.curves import Curves, Measure, curves, sizes_tried
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.section import Section, Table, joined
 from push_predictor_paper.study import Study
 

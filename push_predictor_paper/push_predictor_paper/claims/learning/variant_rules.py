@@ -17,7 +17,7 @@ from push_predictor_paper.estimate import (
     total_nlpd,
     total_nmse,
 )
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS, Fit, Score, SplitName
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS, Fit, Score, SplitName
 from push_predictor_paper.fits.variants import CHOICES, PLAIN
 from push_predictor_paper.section import Finding, Verdict
 

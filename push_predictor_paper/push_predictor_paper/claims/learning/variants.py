@@ -18,7 +18,7 @@ from push_predictor_paper.claims.learning.variant_rules import (
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import by_push
 from push_predictor_paper.figures.variants import paint_variants
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.fits.variants import CHOICES, LARGE, PLAIN, SEEDS_OF_LARGE, SIZES, variant_scores
 from push_predictor_paper.section import Section, Table
 from push_predictor_paper.study import Study

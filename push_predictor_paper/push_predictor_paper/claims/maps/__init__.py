@@ -1,4 +1,4 @@
-"""Claims about maps of mean and standard deviation over contact and angle.
+"""Claims about the maps of mean and standard deviation over contact and angle.
 
-Import `maps.section`; `map_peaks` is shared with the noise claims.
+`section.section` is the section of the report; the noise claims also use `peaks`.
 """

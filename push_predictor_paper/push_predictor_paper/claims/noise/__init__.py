@@ -1,4 +1,4 @@
-"""Claims about the size and shape of the noise.
+"""Claims about the size and the shape of the noise.
 
-Import `noise.section`.
+`section.section` is the section of the report; the other modules belong to it.
 """

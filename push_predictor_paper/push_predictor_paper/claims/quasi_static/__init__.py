@@ -1,4 +1,4 @@
-"""Claim: up to which speed the quasi-static assumption holds.
+"""Claim: the speed up to which the quasi-static assumption holds.
 
-Import `quasi_static.section`.
+`section.section` is the section of the report; the other modules belong to it.
 """

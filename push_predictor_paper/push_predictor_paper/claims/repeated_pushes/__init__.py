@@ -1,4 +1,4 @@
 """Claims about repeated pushes: convergent, divergent, multi-modal.
 
-Import `kinds_of_push` and `modality`.
+Sections of the report: `kinds_of_push` and `modality`.
 """

@@ -34,7 +34,7 @@ from push_predictor_paper.claims.repeated_pushes.modality_tables import (
 )
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.figures.histograms import WIDTHS, Histogram, paint_histograms, shown_values
-from push_predictor_paper.fits.fits import Fit
+from push_predictor_paper.fits.fit import Fit
 from push_predictor_paper.section import Finding, Section
 from push_predictor_paper.statistics.densities import LogDensities, Shape, found_at, log_densities, shape
 from push_predictor_paper.statistics.grid_maps import BLOCK, block_weights, in_degrees

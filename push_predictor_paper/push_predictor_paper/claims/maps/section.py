@@ -9,13 +9,13 @@ import numpy as np
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
-from push_predictor_paper.claims.maps.map_agreement import (
+from push_predictor_paper.claims.maps.agreement import (
     agreement_findings,
     agreement_json,
     agreement_table,
     likenesses,
 )
-from push_predictor_paper.claims.maps.map_peaks import (
+from push_predictor_paper.claims.maps.peaks import (
     NAMED,
     PART,
     model_peaks,
@@ -28,7 +28,7 @@ from push_predictor_paper.claims.maps.map_peaks import (
 )
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.figures.repetition_maps import paint_differences, paint_map_figure
-from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import (
     ANGLES,
     FRACTIONS,

@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from push_predictor.types import Array
-from push_predictor_paper.claims.divergence.divergence_models import (
+from push_predictor_paper.claims.divergence.models import (
     DRAWN,
     SPEED_TOLERANCE,
     Found,
     Training,
     slow_windows,
 )
-from push_predictor_paper.claims.divergence.divergence_rules import STATISTICS, Divergences, by_seed, estimate
+from push_predictor_paper.claims.divergence.rules import STATISTICS, Divergences, by_seed, estimate
 from push_predictor_paper.figures.divergence import NAMES
-from push_predictor_paper.fits.fits import KINDS
+from push_predictor_paper.fits.fit import KINDS
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Table
 from push_predictor_paper.statistics.grid_maps import mean_of, median_of

@@ -11,7 +11,7 @@ from push_predictor.evaluation.divergence import gaussian_kl, kl_of_mean, printe
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate, of_draws
-from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.section import Verdict
 from push_predictor_paper.statistics.grid_maps import Statistic, block_weights, mean_of, median_of
 

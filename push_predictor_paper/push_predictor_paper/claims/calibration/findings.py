@@ -9,7 +9,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor_paper.claims.calibration.calibrated import EXACT, Calibrated
 from push_predictor_paper.claims.corrected import corrected
 from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS
 from push_predictor_paper.section import Finding, Origin, Verdict
 from push_predictor_paper.statistics.pit import BARS
 

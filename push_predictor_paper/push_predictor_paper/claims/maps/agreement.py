@@ -11,7 +11,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import Repetitions
 from push_predictor_paper.estimate import Estimate
-from push_predictor_paper.fits.fits import Answer
+from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.section import Finding, Table, Verdict
 from push_predictor_paper.statistics.grid_maps import block_weights, by_blocks, correlation, relative_error
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from push_predictor.evaluation.divergence import expected_kl, gaussian_kl
 from push_predictor.reporting.canvas import Picture, draw
-from push_predictor_paper.claims.divergence.divergence_models import Found, Training, all_divergences, slow_windows
-from push_predictor_paper.claims.divergence.divergence_rules import (
+from push_predictor_paper.claims.divergence.models import Found, Training, all_divergences, slow_windows
+from push_predictor_paper.claims.divergence.rules import (
     STATISTICS,
     TOO_NARROW,
     TOO_WIDE,
@@ -20,10 +20,10 @@ from push_predictor_paper.claims.divergence.divergence_rules import (
     good,
     lower,
 )
-from push_predictor_paper.claims.divergence.divergence_tables import main_table, training_table
+from push_predictor_paper.claims.divergence.tables import main_table, training_table
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.figures.divergence import NAMES, paint_divergence
-from push_predictor_paper.fits.fits import KINDS
+from push_predictor_paper.fits.fit import KINDS
 from push_predictor_paper.section import Finding, Section
 from push_predictor_paper.statistics.grid_maps import BLOCK, block_weights, in_degrees, mean_of, median_of
 from push_predictor_paper.study import Study

@@ -11,7 +11,7 @@ from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus, Pair
 from push_predictor_paper.estimate import Estimate, Figure, of_draws, over_seeds, total_nlpd, total_nmse
 from push_predictor_paper.fits.curves import Curves, Measure, nlpd_of, nmse_of
-from push_predictor_paper.fits.fits import SPLIT_WORDS
+from push_predictor_paper.fits.fit import SPLIT_WORDS
 from push_predictor_paper.section import Finding, Verdict
 
 KIND, CIRCLE = "vhgp", "ellip1"

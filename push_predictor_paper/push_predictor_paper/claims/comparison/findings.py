@@ -18,7 +18,7 @@ from push_predictor_paper.estimate import (
 )
 from push_predictor_paper.fits.crossing import Crossing, crossing
 from push_predictor_paper.fits.curves import Curves
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.section import Finding, Verdict
 
 Crossings = Mapping[str, Crossing]  # by kind

@@ -11,7 +11,7 @@ from push_predictor.evaluation.push_scores import PooledScores
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
-from push_predictor_paper.claims.comparison.comparison_findings import (
+from push_predictor_paper.claims.comparison.findings import (
     PAPER_SIZE,
     SI_TO_MM,
     Crossings,
@@ -25,7 +25,7 @@ from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, Figure, by_push, difference_by_push, over_seeds
 from push_predictor_paper.figures.curves import KIND_LOOKS, Line, Panel, paint_panels
 from push_predictor_paper.fits.curves import Curves, curves, nlpd_of, nmse_of
-from push_predictor_paper.fits.fits import KINDS, SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.fit import KINDS, SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.section import Section, Table, joined
 from push_predictor_paper.study import Study
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor_paper.claims.maps.map_peaks import agreed
-from push_predictor_paper.claims.noise.noise_size import WIDE
+from push_predictor_paper.claims.maps.peaks import agreed
+from push_predictor_paper.claims.noise.size import WIDE
 from push_predictor_paper.section import Finding, Table, Verdict
 from push_predictor_paper.statistics.grid_maps import BLOCK, in_degrees
 from push_predictor_paper.statistics.noise_shapes import Shape, ceiling

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor_paper.claims.quasi_static.quasi_static_facts import MAIN, SAME_SIZE, SERIES, Facts
-from push_predictor_paper.claims.quasi_static.quasi_static_rules import KEPT, SLOW, departure, estimated
+from push_predictor_paper.claims.quasi_static.facts import MAIN, SAME_SIZE, SERIES, Facts
+from push_predictor_paper.claims.quasi_static.rules import KEPT, SLOW, departure, estimated
 from push_predictor_paper.data.time_scaled import TRAVEL, WINDOWS
 from push_predictor_paper.section import Table
 

@@ -13,17 +13,17 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
 from push_predictor_paper.claims.calibration.calibrated import MODELS, Calibrated, calibrated
-from push_predictor_paper.claims.calibration.calibration_findings import calibration_findings
 from push_predictor_paper.claims.calibration.coverage_by_speed import (
     GroupCoverage,
     coverage_by_speed,
     speed_finding,
     speed_table,
 )
+from push_predictor_paper.claims.calibration.findings import calibration_findings
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import by_push, total_exact_nlpd, total_nlpd
 from push_predictor_paper.figures.pit import paint_by_speed, paint_pits
-from push_predictor_paper.fits.fits import SPLIT_WORDS, SPLITS
+from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS
 from push_predictor_paper.section import Section, Table
 from push_predictor_paper.statistics.pit import BARS, Histogram
 from push_predictor_paper.study import Study

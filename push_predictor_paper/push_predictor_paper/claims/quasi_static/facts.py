@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from push_predictor.evaluation.push_scores import pooled
 from push_predictor.recordings.table import PushTable
-from push_predictor_paper.claims.quasi_static.quasi_static_rules import Judged
+from push_predictor_paper.claims.quasi_static.rules import Judged
 from push_predictor_paper.data.time_scaled import (
     Bracket,
     EqualTravel,

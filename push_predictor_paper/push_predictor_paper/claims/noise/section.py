@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from push_predictor.reporting.canvas import SYMBOLS, Picture, draw
-from push_predictor_paper.claims.noise.noise_learnt import learnt_parts
-from push_predictor_paper.claims.noise.noise_shape import shape_finding, shape_json, shape_tables
-from push_predictor_paper.claims.noise.noise_size import (
+from push_predictor_paper.claims.noise.learned import learnt_parts
+from push_predictor_paper.claims.noise.shape import shape_finding, shape_json, shape_tables
+from push_predictor_paper.claims.noise.size import (
     NAMES,
     WIDE,
     ratio_json,

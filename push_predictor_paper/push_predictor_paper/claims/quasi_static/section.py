@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
-from push_predictor_paper.claims.quasi_static.quasi_static_facts import (
+from push_predictor_paper.claims.quasi_static.facts import (
     FEWEST,
     GP,
     MAIN,
@@ -19,7 +19,7 @@ from push_predictor_paper.claims.quasi_static.quasi_static_facts import (
     Facts,
     facts_of,
 )
-from push_predictor_paper.claims.quasi_static.quasi_static_rules import (
+from push_predictor_paper.claims.quasi_static.rules import (
     NOTABLE,
     SLOW,
     breaks_beyond,
@@ -31,7 +31,7 @@ from push_predictor_paper.claims.quasi_static.quasi_static_rules import (
     turning_bracket,
     turns_there,
 )
-from push_predictor_paper.claims.quasi_static.quasi_static_tables import bracket_table, single_table, speed_table, told
+from push_predictor_paper.claims.quasi_static.tables import bracket_table, single_table, speed_table, told
 from push_predictor_paper.data.time_scaled import TRAVEL
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.figures.quasi_static import Curve, paint_quasi_static

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.types import IntArray
-from push_predictor_paper.claims.divergence.divergence_rules import Divergences, divergences
+from push_predictor_paper.claims.divergence.rules import Divergences, divergences
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.data.repetitions import RepeatedGrid
-from push_predictor_paper.fits.fits import KINDS, Fit, ask
+from push_predictor_paper.fits.fit import KINDS, Fit, ask
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.study import Study
 
