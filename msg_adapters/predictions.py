@@ -1,4 +1,4 @@
-"""PredictPush and PredictPushBatch, both ends: arrays -> request -> arrays -> response -> arrays."""
+"""PredictPush and PredictPushBatch, client and server side: pushes <-> request, prediction <-> response."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import Prediction
+from push_predictor.models.request import PushRequest
 from push_predictor.types import Array
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
@@ -51,10 +52,10 @@ def query_to_batch_request(query: PushQuery) -> PredictPushBatch.Request:
     return request
 
 
-def query_from_request(request: Any) -> PushQuery:
-    """The query of a PredictPush request, n = 1. Raises RequestError if names and values of covariates do not match."""
-    inputs = np.array([[request.velocity, request.contact, request.angle]])
-    return PushQuery(request.model, inputs, request.duration, covariates_of(request, 1))
+def push_from_request(request: Any) -> PushRequest:
+    """The push that a PredictPush request describes. Raises RequestError unless each covariate has one value."""
+    covariates = covariates_of_push(request)
+    return PushRequest(request.velocity, request.contact, request.angle, request.duration, covariates)
 
 
 def query_from_batch_request(request: Any) -> PushQuery:
@@ -64,7 +65,7 @@ def query_from_batch_request(request: Any) -> PushQuery:
         if (length := len(getattr(request, name))) != count:
             raise RequestError(f"{name} length", length, f"{count} values, as many as velocity has")
     inputs = np.array([request.velocity, request.contact, request.angle], dtype=np.float64).T
-    return PushQuery(request.model, inputs, request.duration, covariates_of(request, count))
+    return PushQuery(request.model, inputs, request.duration, _covariates(request, count))
 
 
 def fill_response(response: PredictPush.Response, prediction: Prediction) -> None:
@@ -105,7 +106,12 @@ def prediction_from_response(response: Any) -> Prediction:
     )
 
 
-def covariates_of(request: Any, count: int) -> dict[str, Array]:
+def covariates_of_push(request: Any) -> dict[str, float]:
+    """The covariates of a request for one push. Raises RequestError if values and names do not match."""
+    return {name: float(values[0]) for name, values in _covariates(request, 1).items()}
+
+
+def _covariates(request: Any, count: int) -> dict[str, Array]:
     """The covariates (count,) of each push by name. Raises RequestError if values and names do not match."""
     names: Sequence[str] = request.covariate_names
     if not names and not len(request.covariate_values):

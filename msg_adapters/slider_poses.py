@@ -9,7 +9,7 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from msg_adapters.poses import NORM_TOLERANCE
-from msg_adapters.predictions import covariates_of
+from msg_adapters.predictions import covariates_of_push
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import yaw_of_quaternion
@@ -50,7 +50,7 @@ def query_from_slider_request(request: Any) -> SliderPoseQuery:
         _vector("pusher", request.pusher),
         _vector("pusher_velocity", request.pusher_velocity),
         request.duration,
-        {name: float(value[0]) for name, value in covariates_of(request, 1).items()},
+        covariates_of_push(request),
     )
 
 

@@ -31,15 +31,14 @@ def run(options: argparse.Namespace) -> None:
     """Check, predict, print."""
     import numpy as np
 
-    from push_predictor.models.request import check_request
+    from push_predictor.models.request import PushRequest, check_request
     from push_predictor.models.store.model_file import load_model
 
     model = load_model(options.model)
     covariates = dict(_covariate(text) for text in options.covariate)
-    check_request(model, options.velocity, options.contact, options.angle, options.duration, covariates)
-    inputs = np.array([[options.velocity, options.contact, options.angle]])
-    brought = {name: np.array([value]) for name, value in covariates.items()}
-    prediction = model.predict_rows(inputs, np.array([options.duration]), brought)
+    push = PushRequest(options.velocity, options.contact, options.angle, options.duration, covariates)
+    check_request(model, push)
+    prediction = model.predict_rows(*push.arrays)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
     result = {
         "model": model.name,

@@ -1,10 +1,11 @@
-"""Is this a push that a model may answer for? One place, for the services, the command line and the library."""
+"""The rules of a request: which pushes a model answers. Services, command line and library share them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf, isfinite, pi
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from math import inf, pi
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from push_predictor.errors import RequestError
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.pushes import Pushes
 from push_predictor.recordings.table import PushTable
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, BoolArray
 
 if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
+
+Numbers: TypeAlias = "float | Array"  # one push, or a column (n,)
 
 UNITS = {
     "elapsed_time": "s",
@@ -31,92 +34,107 @@ UNITS = {
     "contact_gap": "m",
     "normal_force": "N",
     "tangential_force": "N",
-}  # of the covariates that windows have; a recorded topic's is its sender's
-FARTHEST = 1.0  # m a push; mechanics is integrated along the way, some milliseconds for a centimetre
+}  # of the covariates that every window has; the unit of a recorded topic is its publisher's
+FARTHEST = 1.0  # m per push; the mechanics is integrated along the path, some milliseconds per centimetre
 
 
-def check_request(
-    model: PushModel, velocity: float, contact: float, angle: float, duration: float, covariates: Mapping[str, float]
-) -> None:
-    """Raise RequestError naming field, value and what is accepted, unless the model can answer this push."""
-    low, high = model.duration_range
-    if (
-        0.0 < velocity < inf
-        and 0.0 <= contact < 1.0
-        and abs(angle) < pi / 2.0
-        and 0.0 < duration < inf
-        and low <= duration <= high
-        and velocity * duration <= _farthest(model)
-        and all(map(isfinite, covariates.values()))
-        and all(name in covariates for name in model.needs)
-    ):
-        return  # in a microsecond; the rest is for saying what is wrong
-    _check(model, np.array([[velocity, contact, angle]]), duration, {k: np.array([v]) for k, v in covariates.items()})
+@dataclass(frozen=True)
+class PushRequest:
+    """One push: velocity (m/s), contact (fraction of the perimeter), angle (rad), duration (s), covariates by name."""
+
+    velocity: float
+    contact: float
+    angle: float
+    duration: float
+    covariates: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def arrays(self) -> tuple[Array, Array, dict[str, Array]]:
+        """The arguments of PushModel.predict: inputs (1, 3), duration (1,), covariates (1,) by name."""
+        columns = {name: np.array([value]) for name, value in self.covariates.items()}
+        return np.array([[self.velocity, self.contact, self.angle]]), np.array([self.duration]), columns
 
 
-def check_requests(model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array]) -> None:
-    """The same for n pushes (n, 3) of one duration; the field in the error carries the index of the first bad push."""
-    _check(model, inputs, duration, covariates, places=np.arange(len(inputs)))
+def check_request(model: PushModel, push: PushRequest) -> None:
+    """Raise RequestError unless the model answers this push; it names field, value and what is accepted."""
+    _check(model, push.velocity, push.contact, push.angle, push.duration, push.covariates)
 
 
-def _check(
-    model: PushModel, inputs: Array, duration: float, covariates: Mapping[str, Array], places: IntArray | None = None
-) -> None:
-    """Places (n,): index of each push in the caller's list, for the error; None for a single push."""
+def check_requests(model: PushModel, inputs: Array, duration: float | Array, covariates: Mapping[str, Array]) -> None:
+    """Raise RequestError unless the model answers n pushes: inputs (n, 3), duration one for all or (n,) s.
+
+    The field in the error carries the index of the first push that breaks the rule.
+    """
     velocity, contact, angle = inputs.T
-    rules: list[tuple[str, Array, BoolArray, str]] = [
-        ("velocity", velocity, velocity > 0.0, "a finite number above 0, in m/s"),
-        ("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)"),
-        ("angle", angle, np.abs(angle) < np.pi / 2.0, "an angle in (-pi/2, pi/2), in rad"),
-        *((f"covariate {name}", column, np.isfinite(column), _meaning(name)) for name, column in covariates.items()),
-    ]
-    for field, column, accepted, meaning in rules:
-        bad = np.flatnonzero(~(accepted & np.isfinite(column)))
-        if bad.size:
-            place = field if places is None else f"{field}[{places[bad[0]]}]"
-            raise RequestError(place, float(column[bad[0]]), meaning)
-    for name in model.needs:
-        if name not in covariates:
-            raise RequestError(f"covariate {name}", "missing", f"{_meaning(name)}: {model.name} needs it")
-    _check_duration(model, duration)
-    if (too_fast := np.flatnonzero(velocity * duration > _farthest(model))).size:
-        place = "velocity" if places is None else f"velocity[{places[too_fast[0]]}]"
-        most = f"at most {FARTHEST / duration:.3g} m/s for {duration:g} s: a way of {FARTHEST:g} m"
-        raise RequestError(place, float(velocity[too_fast[0]]), most)
-
-
-def _farthest(model: PushModel) -> float:
-    """How long (m) a push may be that a model answers for."""
-    return inf if isinstance(model.predictor, GaussianProcessPredictor) else FARTHEST
-
-
-def _meaning(covariate: str) -> str:
-    return f"a finite number, in {UNITS[covariate]}" if covariate in UNITS else "a finite number"
-
-
-def _check_duration(model: PushModel, duration: float) -> None:
-    low, high = model.duration_range
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise RequestError("duration", duration, "a finite number above 0, in s")
-    if not low <= duration <= high:
-        raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, near what {model.name} was trained on")
+    _check(model, velocity, contact, angle, duration, covariates)
 
 
 def check_pushes(model: PushModel, pushes: Pushes) -> None:
-    """The same for pushes that may differ in duration; covariates that the model does not need are ignored."""
+    """Raise RequestError unless the model answers these pushes; covariates that it does not need are ignored."""
     needed = {name: column for name, column in pushes.covariates.items() if name in model.needs}
-    for duration in np.unique(pushes.duration):
-        rows = np.flatnonzero(pushes.duration == duration)
-        columns = {name: column[rows] for name, column in needed.items()}
-        _check(model, pushes.inputs[rows], float(duration), columns, places=rows if len(pushes) > 1 else None)
+    if len(pushes) > 1:
+        check_requests(model, pushes.inputs, pushes.duration, needed)
+    else:
+        velocity, contact, angle = pushes.inputs[0].tolist()
+        covariates = {name: float(column[0]) for name, column in needed.items()}
+        check_request(model, PushRequest(velocity, contact, angle, float(pushes.duration[0]), covariates))
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
-    """The same for the rows of a table, each with its own duration, and the covariates that the model needs of it.
+    """Raise RequestError unless the model answers every row of a table; covariates that it does not need are ignored.
 
-    Raises RequestError.
+    The index in the error is that of the row.
     """
-    for duration in np.unique(table.duration):
-        rows = table.take(table.duration == duration)
-        needed = {name: column for name, column in rows.covariates.items() if name in model.needs}
-        check_requests(model, rows.inputs, float(duration), needed)
+    needed = {name: column for name, column in table.covariates.items() if name in model.needs}
+    check_requests(model, table.inputs, table.duration, needed)
+
+
+def _check(
+    model: PushModel,
+    velocity: Numbers,
+    contact: Numbers,
+    angle: Numbers,
+    duration: Numbers,
+    covariates: Mapping[str, Numbers],
+) -> None:
+    """Raise RequestError for the first rule that is broken. Comparisons with NaN are false, so NaN breaks each rule."""
+    _require("velocity", velocity, (velocity > 0.0) & (velocity < inf), "a finite number above 0, in m/s")
+    _require("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)")
+    _require("angle", angle, (angle > -pi / 2.0) & (angle < pi / 2.0), "an angle in (-pi/2, pi/2), in rad")
+    for name, values in covariates.items():
+        _require(f"covariate {name}", values, (values > -inf) & (values < inf), _finite_number(name))
+    for name in model.needs:
+        if name not in covariates:
+            raise RequestError(f"covariate {name}", "missing", f"{_finite_number(name)}: {model.name} needs it")
+    _require("duration", duration, (duration > 0.0) & (duration < inf), "a finite number above 0, in s")
+    low, high = model.duration_range
+    near = "{:.3g} to {:.3g} s, near what {} was trained on"
+    _require("duration", duration, (duration >= low) & (duration <= high), near, low, high, model.name)
+    if not isinstance(model.predictor, GaussianProcessPredictor):
+        most = "at most {:.3g} m/s for {:g} s: a path of {:g} m"
+        within = velocity * duration <= FARTHEST
+        _require("velocity", velocity, within, most, FARTHEST / duration, duration, FARTHEST)
+
+
+def _require(name: str, values: Numbers, accepted: bool | BoolArray, meaning: str, *details: object) -> None:
+    """Raise RequestError for the first value that is not accepted; in a column its index is added to the name.
+
+    meaning: what is accepted, a format string for details, which are columns too or apply to all. It is filled only
+    for an error.
+    """
+    if not isinstance(accepted, np.ndarray):
+        if not accepted:
+            raise RequestError(name, float(values), meaning.format(*details))
+    elif not accepted.all():
+        index = int(np.argmin(accepted))
+        filled = meaning.format(*(_at(detail, index) for detail in details))
+        raise RequestError(f"{name}[{index}]", _at(values, index), filled)
+
+
+def _at(values: object, index: int) -> object:
+    """The value of one push: a column's entry, or what applies to all."""
+    return float(values[index]) if isinstance(values, np.ndarray) else values
+
+
+def _finite_number(covariate: str) -> str:
+    return f"a finite number, in {UNITS[covariate]}" if covariate in UNITS else "a finite number"

@@ -15,7 +15,7 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import check_request
+from push_predictor.models.request import PushRequest, check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.particles import POSE_COVARIATES, check_covariates, model_of, push_particles
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
@@ -126,7 +126,8 @@ def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array
 def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
     try:
         windows = windows_of(model, step[3])
-        check_request(model, step[0], step[1], step[2], windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
+        push = PushRequest(*step[:3], windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
+        check_request(model, push)
     except RequestError as error:
         raise error.within(f"steps[{index}]") from None
     return windows.count

@@ -13,7 +13,7 @@ from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import check_request
+from push_predictor.models.request import PushRequest, check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions
@@ -60,11 +60,10 @@ def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> Slid
     """
     model = predictor.model if isinstance(predictor, TabulatedModel) else predictor
     touch = touch_of(model.rig, push)
-    velocity, contact, angle = touch.inputs[0].tolist()
     covariates = completed_covariates(push, touch, model.rig)
-    check_request(model, velocity, contact, angle, push.duration, covariates)
-    columns = {name: np.array([value]) for name, value in covariates.items()}
-    prediction = predictor.predict_rows(touch.inputs, np.array([push.duration]), columns)
+    request = PushRequest(*touch.inputs[0].tolist(), push.duration, covariates)
+    check_request(model, request)
+    prediction = predictor.predict_rows(*request.arrays)
     return SliderAfter(
         displaced(push.slider[None], touch.heading, prediction.mean)[0],
         covariance_in_world(prediction.covariance, touch.heading)[0],

@@ -30,7 +30,7 @@ from msg_adapters.predictions import PushQuery, query_to_batch_request, query_to
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import FARTHEST, check_request, check_requests
+from push_predictor.models.request import FARTHEST, PushRequest, check_request, check_requests
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
@@ -214,13 +214,13 @@ def test_mechanics_is_integrated_over_a_metre_and_no_more(models: dict[str, Push
     """A way without end would keep the service busy for ever."""
     for name in ("analytical", "drifting"):
         given = dict.fromkeys(models[name].needs, 1.0)
-        check_request(models[name], FARTHEST / 0.2, 0.1, 0.2, 0.2, given)
+        check_request(models[name], PushRequest(FARTHEST / 0.2, 0.1, 0.2, 0.2, given))
         with pytest.raises(RequestError, match=r"^velocity: 5.1 is not accepted, give at most 5 m/s for 0.2 s"):
-            check_request(models[name], 5.1, 0.1, 0.2, 0.2, given)
+            check_request(models[name], PushRequest(5.1, 0.1, 0.2, 0.2, given))
         columns = {key: np.ones(2) for key in given}
         with pytest.raises(RequestError, match=r"^velocity\[1\]: 1e\+300 is not accepted"):
             check_requests(models[name], np.array([[0.02, 0.1, 0.2], [1e300, 0.1, 0.2]]), 0.2, columns)
-    check_request(models["vhgp"], 5.1, 0.1, 0.2, 0.2, {})  # a learnt model integrates nothing
+    check_request(models["vhgp"], PushRequest(5.1, 0.1, 0.2, 0.2))  # a learnt model integrates nothing
 
 
 def test_what_has_no_finite_answer_gets_no_number(

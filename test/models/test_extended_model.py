@@ -24,7 +24,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import KINDS, ExtendedPredictor, Prediction, PushModel
-from push_predictor.models.request import check_request, check_table
+from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import tabulate
@@ -248,11 +248,12 @@ def test_a_request_without_what_it_needs_is_refused_by_name(
     bases: dict[str, PushModel], brought: dict[str, float], message: str
 ) -> None:
     with pytest.raises(RequestError, match=message):
-        check_request(extended(bases["gp"], slippery(0.1)), 0.02, 0.1, 0.2, 0.2, brought)
+        check_request(extended(bases["gp"], slippery(0.1)), PushRequest(0.02, 0.1, 0.2, 0.2, brought))
 
 
 def test_what_it_does_not_need_is_no_matter(bases: dict[str, PushModel]) -> None:
-    check_request(extended(bases["gp"], slippery(0.1)), 0.02, 0.1, 0.2, 0.2, {"elapsed_time": 1.0, "other": 2.0})
+    push = PushRequest(0.02, 0.1, 0.2, 0.2, {"elapsed_time": 1.0, "other": 2.0})
+    check_request(extended(bases["gp"], slippery(0.1)), push)
     table = pushes(5, 1)
     table.covariates["topic:/warmth"][:] = np.nan
     check_table(extended(bases["gp"], slippery(0.1)), table)

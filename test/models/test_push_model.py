@@ -19,7 +19,7 @@ from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.features import push_features
 from push_predictor.models.push_model import KINDS, PushModel
-from push_predictor.models.request import check_request, check_requests
+from push_predictor.models.request import PushRequest, check_request, check_requests
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model, training_rows
 from push_predictor.recordings.table import PushTable
@@ -122,9 +122,9 @@ def test_a_bad_request_names_field_value_and_what_is_accepted(
     models: dict[str, PushModel], change: dict[str, object], message: str
 ) -> None:
     request = {"velocity": 0.02, "contact": 0.1, "angle": 0.2, "duration": 0.2, "covariates": {}}
-    check_request(models["vhgp"], **request)
+    check_request(models["vhgp"], PushRequest(**request))
     with pytest.raises(RequestError, match=message):
-        check_request(models["vhgp"], **{**request, **change})
+        check_request(models["vhgp"], PushRequest(**{**request, **change}))
 
 
 def test_the_first_bad_push_of_a_batch_is_named_by_its_index(models: dict[str, PushModel]) -> None:
@@ -135,7 +135,7 @@ def test_the_first_bad_push_of_a_batch_is_named_by_its_index(models: dict[str, P
 
 
 def test_the_analytical_model_takes_any_duration(models: dict[str, PushModel]) -> None:
-    check_request(models["analytical"], 0.02, 0.1, 0.0, 6.0, {})
+    check_request(models["analytical"], PushRequest(0.02, 0.1, 0.0, 6.0))
 
 
 # --- files ----------------------------------------------------------------------------------------------------------

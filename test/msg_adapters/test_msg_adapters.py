@@ -27,8 +27,8 @@ from msg_adapters.predictions import (
     extend_batch_response,
     fill_response,
     prediction_from_response,
+    push_from_request,
     query_from_batch_request,
-    query_from_request,
     query_to_batch_request,
     query_to_request,
     refuse,
@@ -39,6 +39,7 @@ from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.push_model import Prediction
+from push_predictor.models.request import PushRequest
 
 METRES = st.floats(-10.0, 10.0)
 ANGLES = st.floats(-20.0, 20.0)
@@ -232,12 +233,10 @@ def test_a_query_survives_with_its_covariates_push_by_push(count, width):
     assert first_push == [column[0] for column in covariates.values() if count]
 
 
-def test_one_push_is_a_batch_of_one():
-    request = query_to_request("m", np.array([0.05, 0.1, -0.2]), 0.2, {"a": 1.0, "b": 2.0})
-    query = query_from_request(over_the_wire(request))
-    assert query.inputs.tolist() == [[0.05, 0.1, -0.2]]
-    assert (query.model, query.duration) == ("m", 0.2)
-    assert {name: column.tolist() for name, column in query.covariates.items()} == {"a": [1.0], "b": [2.0]}
+def test_one_push_survives_with_its_covariates():
+    request = over_the_wire(query_to_request("m", np.array([0.05, 0.1, -0.2]), 0.2, {"a": 1.0, "b": 2.0}))
+    assert request.model == "m"
+    assert push_from_request(request) == PushRequest(0.05, 0.1, -0.2, 0.2, {"a": 1.0, "b": 2.0})
 
 
 @pytest.mark.parametrize("field", ["contact", "angle"])
@@ -252,10 +251,10 @@ def test_covariates_must_match_their_names():
     request = query_to_request("", np.ones(3), 0.2, {"a": 1.0})
     request.covariate_names = ["a", "b"]
     with pytest.raises(RequestError, match=r"covariate_values length: 1 .* give 2"):
-        query_from_request(request)
+        push_from_request(request)
     request.covariate_names, request.covariate_values = ["a", "a"], [1.0, 2.0]
     with pytest.raises(RequestError, match=r"covariate_names: \['a'\] .* once"):
-        query_from_request(request)
+        push_from_request(request)
 
 
 # --- residuals --------------------------------------------------------------------------------------------------

@@ -25,6 +25,7 @@ from push_predictor.models.push_model import (
     Prediction,
     PushModel,
 )
+from push_predictor.models.request import PushRequest
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
 from push_predictor.types import Array, BoolArray
@@ -84,6 +85,13 @@ class TabulatedModel:
         push = Push(inputs, duration, covariates or {})
         moments = predictor.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
+
+    def predict_one(self, push: PushRequest) -> Prediction:
+        """The same for one push (n = 1); the table is read in plain numbers."""
+        prediction = None
+        if self.domain is not None and self.model.base is self.model:
+            prediction = self.domain.predict_one((push.velocity, push.contact, push.angle))
+        return prediction or self.predict_rows(*push.arrays)
 
     def exact_count(self, inputs: Array) -> int:
         """How many of the pushes (n, 3) are answered by the model itself, not from a table."""

@@ -14,8 +14,8 @@ import numpy as np
 from msg_adapters.predictions import (
     extend_batch_response,
     fill_response,
+    push_from_request,
     query_from_batch_request,
-    query_from_request,
 )
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.push_model import Prediction
@@ -34,11 +34,10 @@ class PredictionError(PushPredictorError):
 
 def answer_push(shelf: ModelRegistry, request: Any, response: Any) -> None:
     """Answer PredictPush. Raises RequestError."""
-    query = query_from_request(request)
-    tabulated = shelf.get(query.model)
-    covariates = {name: float(column[0]) for name, column in query.covariates.items()}
-    check_request(tabulated.model, request.velocity, request.contact, request.angle, query.duration, covariates)
-    prediction = tabulated.predict_rows(query.inputs, np.array([query.duration]), query.covariates)
+    push = push_from_request(request)
+    tabulated = shelf.get(request.model)
+    check_request(tabulated.model, push)
+    prediction = tabulated.predict_one(push)
     _check_finite(tabulated, prediction, 0)
     fill_response(response, prediction)
 
@@ -54,7 +53,7 @@ def answer_batch(go_on: Callable[[], None], shelf: ModelRegistry, request: Any, 
     tabulated = shelf.get(query.model)
     check_requests(tabulated.model, query.inputs, query.duration, query.covariates)
     if count > MOST_EXACT and (slow := tabulated.exact_count(query.inputs)) > MOST_EXACT:
-        accepted = f"at most {MOST_EXACT} pushes that no table answers (docs/reference/predict_server.md) a call"
+        accepted = f"at most {MOST_EXACT} pushes that no table answers (docs/services.md) a call"
         raise RequestError("velocity length", f"{slow} pushes without a table", accepted)
     for start in range(0, len(query.inputs), ROWS_AT_ONCE):
         go_on()
