@@ -1,3 +1,68 @@
-"""Models of planar pushing: learnt from recordings, served over ROS 2, checked against outcomes."""
+"""Models of planar pushing, learnt from recorded pushes: what a push does, and how certain that is.
+
+The names below are the public Python interface. Each is imported when it is first used, so that importing the package
+takes milliseconds.
+
+    from push_predictor import Pushes, train, validate
+
+    model = train("bags/square_abs_train")
+    print(model.predict(Pushes(velocity=0.02, contact=0.1, angle=0.3)))
+    print(validate(model, "bags/square_abs_test"))
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from push_predictor.front_door import Validation, choose_push, find_windows, trace, train, validate
+    from push_predictor.models.push_model import PushModel
+    from push_predictor.models.pushes import Pushes
+    from push_predictor.models.store.model_file import load_model
+    from push_predictor.planning.goal import Goal
+    from push_predictor.recordings.read import read_recording
+
+_PLACES = {
+    "Goal": "planning.goal",
+    "PushModel": "models.push_model",
+    "Pushes": "models.pushes",
+    "Validation": "front_door",
+    "choose_push": "front_door",
+    "find_windows": "front_door",
+    "load_model": "models.store.model_file",
+    "read_recording": "recordings.read",
+    "trace": "front_door",
+    "train": "front_door",
+    "validate": "front_door",
+}
+
+__all__ = [
+    "Goal",
+    "PushModel",
+    "Pushes",
+    "Validation",
+    "__version__",
+    "choose_push",
+    "find_windows",
+    "load_model",
+    "read_recording",
+    "trace",
+    "train",
+    "validate",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name on first use (PEP 562)."""
+    if name not in _PLACES:
+        raise AttributeError(f"module 'push_predictor' has no attribute {name!r}")
+    found: object = getattr(import_module(f"push_predictor.{_PLACES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

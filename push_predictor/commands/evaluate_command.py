@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.metrics_text import print_metrics
 from push_predictor.commands.output import add_command, add_rig, check_data, progress, warn, write_json
 
 
@@ -25,6 +24,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Evaluate and print; warn where a push was trained on, or the data are of another slider."""
+    from push_predictor.evaluation.metrics_text import metrics_lines
     from push_predictor.evaluation.offline import rig_difference
     from push_predictor.evaluation.validation import compare, metrics_json, trained_on
     from push_predictor.models.request import check_table
@@ -46,4 +46,4 @@ def run(options: argparse.Namespace) -> None:
     if seen := trained_on(model, table):
         warn(f"{len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out")
     if not write_json(options, metrics):
-        print_metrics(metrics)
+        print("\n".join(metrics_lines(metrics)))

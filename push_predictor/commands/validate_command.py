@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.metrics_text import print_metrics
 from push_predictor.commands.output import add_command, add_rig, check_output, progress, warn, write_json
 
 
@@ -28,6 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Validate and print; warn where the model is of another rig, or a push was trained on."""
     from push_predictor.evaluation.alarm.scores import recording_alarm
+    from push_predictor.evaluation.metrics_text import metrics_lines
     from push_predictor.evaluation.offline import recording_rig, rig_difference, validate_recording
     from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
@@ -49,6 +49,6 @@ def run(options: argparse.Namespace) -> None:
     if options.windows:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):
-        print_metrics(metrics)
+        print("\n".join(metrics_lines(metrics)))
         if alarm["fired"]:
             print(f"alarm at push {alarm['push_id']}, the {alarm['pushes']}th: {alarm['score']}")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from push_predictor.models.effects.covariate_range import CovariateRange, range_of
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,
@@ -41,21 +44,6 @@ DURATION_TOLERANCE = 0.1  # a learnt model answers for durations this close (rel
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """n predicted outcomes in the push frame (dx m, dy m, dtheta rad).
-
-    mean (n, 3); covariance (n, 3, 3) of an observed outcome; process_covariance (n, 3, 3), the noise alone;
-    in_domain (n,), whether the push, with the covariates that the model needs, lies inside the domain of the training
-    data.
-    """
-
-    mean: Array
-    covariance: Array
-    process_covariance: Array
-    in_domain: BoolArray
-
-
 @dataclass(frozen=True)
 class Provenance:
     """Where a model comes from: names of its recordings or tables, how many pushes, seed, version of this package."""
@@ -66,7 +54,7 @@ class Provenance:
     version: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PushModel:
     """A named model with everything that is needed to use it and to judge it.
 
@@ -79,6 +67,23 @@ class PushModel:
     predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor
     training: PushTable
     provenance: Provenance
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a model file; an older file is replaced when the new one is complete. Raises OSError."""
+        from push_predictor.models.store.model_file import save_model  # the store knows models, not the reverse
+
+        save_model(self, Path(path))
+
+    def __repr__(self) -> str:
+        speeds, durations = 1e3 * self.training.inputs[:, 0], self.training.duration
+        origin = f" from {', '.join(self.provenance.sources)}" if self.provenance.sources else ""
+        return (
+            f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
+            f"  trained on {len(self.training)} windows of {self.provenance.pushes} pushes{origin}\n"
+            f"  pusher speed {speeds.min():.3g} to {speeds.max():.3g} mm/s, windows of {np.median(durations):.3g} s\n"
+            f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
+            f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
+        )
 
     def predict(self, pushes: Pushes) -> Prediction:
         """Predict the outcomes of n pushes.

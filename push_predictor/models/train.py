@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from push_predictor import __version__
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
 from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.features import push_features
@@ -30,10 +31,15 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
 
+Watch = Callable[[str, float], None]
 DEFAULT_ROWS = 1000
 FEWEST_ROWS = 10
 MOST_DENSE_ROWS = 2000  # a dense VHGP takes 46 CPU s and 240 MB; with twice the rows eight and four times as much
 CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
+
+
+def no_watch(stage: str, done: float) -> None:
+    """Report nothing."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +72,12 @@ def train_model(
     name: str,
     sources: Sequence[str] = (),
     options: TrainingOptions = TrainingOptions(),
+    watch: Watch = no_watch,
 ) -> PushModel:
     """Train a model of one of KINDS on rows of the table.
 
     name: the model's name in files and requests. sources: names of the recordings or tables, for its provenance.
+    watch: called with each stage and the share of the work done, 0 to 1, when the stage begins.
     Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or options that the kind does not
     have.
     """
@@ -79,11 +87,13 @@ def train_model(
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     inducing = inducing_inputs(kind, len(rows), options.inducing)
-    predictor: GaussianProcessPredictor | AnalyticalPredictor = (
-        _analytical(rows, rig, options.fit)
-        if kind == "analytical"
-        else _learned(rows, rig, kind, options.kernels, inducing)
-    )
+    with one_blas_thread():
+        predictor: GaussianProcessPredictor | AnalyticalPredictor = (
+            _analytical(rows, rig, options.fit)
+            if kind == "analytical"
+            else _learned(rows, rig, kind, options.kernels, inducing, watch)
+        )
+    watch(f"trained {kind} on {len(rows)} windows of {len(rows.pushes)} pushes", 1.0)
     provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
     return PushModel(name, kind, rig, predictor, rows, provenance)
 
@@ -119,12 +129,16 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
 
 
 def _learned(
-    rows: PushTable, rig: Rig, kind: str, kernels: KernelChoice, inducing: int | None
+    rows: PushTable, rig: Rig, kind: str, kernels: KernelChoice, inducing: int | None, watch: Watch
 ) -> GaussianProcessPredictor:
     scaling = _scaling(rows, rig)
     features = scaled_features(rig, scaling, rows.inputs)
     scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    regressions = (_regression(features, column, kind, kernels, inducing) for column in scaled.T)
+    regressions: list[GaussianProcess | VHGP | SparseVHGP] = []
+    for output, column in zip(OUTPUTS, scaled.T, strict=True):
+        watch(f"train {kind}: {output}", 0.3 * len(regressions))
+        regressions.append(_regression(features, column, kind, kernels, inducing))
+    watch(f"train {kind}: correlation of the outputs", 0.9)
     predictor = GaussianProcessPredictor(rig, scaling, tuple(regressions))
     return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
 

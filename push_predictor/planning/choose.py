@@ -38,7 +38,7 @@ LEAST = 1e-6  # m, rad; a way is measured by the longest push, even if no push m
 TIE = 1e-6  # what a distance of one tolerance counts against a probability
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Choice:
     """The chosen push (one), the probability that it reaches the goal, the pushes to be expected, this one included
     (J; of a push that is as likely as wanted 1 / P, as if a miss cost one more of its kind), and where it should leave
@@ -50,6 +50,15 @@ class Choice:
     expected: float
     mean: Array
     covariance: Array
+
+    def __repr__(self) -> str:
+        (velocity, contact, angle), windows = self.push.inputs[0], int(self.push.windows[0])
+        x, y, heading = self.mean
+        return (
+            f"Choice: contact {contact:.3f}, angle {angle:+.2f} rad, {1e3 * velocity:.1f} mm/s, for {windows} windows\n"
+            f"  reaches the goal with probability {self.probability:.2f}; {self.expected:.1f} pushes expected in all\n"
+            f"  slider expected at x {x:.4f} m, y {y:.4f} m, heading {heading:.3f} rad"
+        )
 
 
 def choose_push(repertoire: Repertoire, slider: Array, goal: Goal, probability: float = 0.9) -> Choice | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,7 +44,9 @@ FAULTS = {
 }
 
 
-def read_recording(path: Path, *, rig: Rig | None = None, topics: TopicNames = TopicNames()) -> Recording:
+def read_recording(
+    path: str | os.PathLike[str], *, rig: Rig | None = None, topics: TopicNames = TopicNames()
+) -> Recording:
     """Read a .mcap file or a bag folder.
 
     Streams keep file order. Stamps are header stamps; a scalar without a header has its log time. Samples that

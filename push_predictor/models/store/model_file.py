@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -66,8 +67,9 @@ def save_model(model: PushModel, path: Path) -> None:
     write_whole(path, buffer.getvalue())
 
 
-def load_model(path: Path) -> PushModel:
+def load_model(path: str | os.PathLike[str]) -> PushModel:
     """Read a model file. Raises ModelFileError if it is absent, damaged, foreign or of a newer version."""
+    path = Path(path)
     arrays = read_arrays(path)
     header = _read_header(path, arrays)
     try:

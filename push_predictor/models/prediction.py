@@ -1,0 +1,46 @@
+"""Predicted outcomes of pushes: mean, covariance, and whether the training data support them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.types import Array, BoolArray
+
+ROWS_SHOWN = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction:
+    """n predicted outcomes in the push frame (dx m, dy m, dtheta rad).
+
+    mean (n, 3); covariance (n, 3, 3) of an observed outcome; process_covariance (n, 3, 3), the noise alone;
+    in_domain (n,), whether the push, with the covariates that the model needs, lies inside the domain of the training
+    data.
+    """
+
+    mean: Array
+    covariance: Array
+    process_covariance: Array
+    in_domain: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.mean)
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations (n, 3) of an observed outcome: m, m, rad."""
+        return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)))
+
+    def __repr__(self) -> str:
+        head = f"Prediction of {len(self)} pushes, mean ± standard deviation"
+        columns = f"{'dx [mm]':>18}{'dy [mm]':>18}{'dtheta [mrad]':>18}  in domain"
+        rows = zip(self.mean[:ROWS_SHOWN], self.std[:ROWS_SHOWN], self.in_domain[:ROWS_SHOWN], strict=True)
+        lines = [f"{_cells(mean, std)}  {'yes' if inside else 'NO'}" for mean, std, inside in rows]
+        more = [f"... and {len(self) - ROWS_SHOWN} more"] if len(self) > ROWS_SHOWN else []
+        return "\n".join([head, columns, *lines, *more])
+
+
+def _cells(mean: Array, std: Array) -> str:
+    return "".join(f"{f'{1e3 * m:.3f} ± {1e3 * s:.3f}':>18}" for m, s in zip(mean, std, strict=True))

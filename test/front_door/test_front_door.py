@@ -1,0 +1,241 @@
+"""The Python interface: what `from push_predictor import ...` gives, from data to a choice."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import threadpoolctl
+from repository import BAGS, REPOSITORY
+
+import push_predictor
+from push_predictor import (
+    Goal,
+    Pushes,
+    PushModel,
+    choose_push,
+    find_windows,
+    load_model,
+    read_recording,
+    trace,
+    train,
+    validate,
+)
+from push_predictor.errors import PushPredictorError, RecordingError, RequestError, RigError, TrainingError
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.table_file import write_table
+from push_predictor.recordings.windows.push_window import windows_to_table
+
+TRAINING, TEST = BAGS / "square_abs_train", BAGS / "square_abs_test"
+
+
+@pytest.fixture(scope="module")
+def model() -> PushModel:
+    return train(str(TRAINING), kind="gp", n_train=120, name="small", watch=lambda stage, done: None)
+
+
+def test_importing_the_package_imports_neither_numpy_nor_anything_of_its_own():
+    code = (
+        "import sys, push_predictor\n"
+        "heavy = [m for m in sys.modules if m in ('numpy', 'scipy') or m.startswith('push_predictor.')]\n"
+        "sys.exit(', '.join(heavy) or 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=REPOSITORY)
+
+
+def test_every_public_name_is_there_and_documented_and_others_are_refused():
+    for name in push_predictor.__all__:
+        assert getattr(push_predictor, name).__doc__, name
+        assert name in dir(push_predictor)
+    with pytest.raises(AttributeError, match="'push_predictor' has no attribute 'predcit'"):
+        push_predictor.predcit  # noqa: B018 (reading it is the test)
+
+
+# --- training ---------------------------------------------------------------------------------------------------------
+
+
+def test_training_reports_each_stage_with_its_share_of_the_work():
+    seen: list[tuple[str, float]] = []
+    train([TRAINING], kind="gp", n_train=40, watch=lambda stage, done: seen.append((stage, done)))
+    stages = [stage for stage, _ in seen]
+    assert [any(output in stage for stage in stages) for output in ("dx", "dy", "dtheta")] == [True] * 3
+    shares = [done for _, done in seen]
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_without_a_callback_training_prints_its_progress_to_stderr(capsys: pytest.CaptureFixture[str]):
+    train(TRAINING, kind="analytical", n_train=40)
+    captured = capsys.readouterr()
+    assert "read the data" in captured.err and "100 %" in captured.err and not captured.out
+
+
+def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone():
+    during: set[int] = set()
+
+    def watch(stage: str, done: float) -> None:
+        if stage.startswith("train "):
+            during.update(pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas")
+
+    with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
+        before = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
+        train(TRAINING, kind="gp", n_train=40, watch=watch)
+        after = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
+    assert during == {1} and before == after
+
+
+def test_the_name_is_the_first_files_stem_and_the_provenance_names_the_data(model: PushModel, tmp_path: Path):
+    table, rig = windows_to_table(find_windows(read_recording(TRAINING))).take(np.arange(60)), model.rig
+    write_table(tmp_path / "monday.csv.gz", table)
+    learned = train(tmp_path / "monday.csv.gz", kind="analytical", rig=rig)
+    assert learned.name == "monday" and learned.provenance.sources == ("monday.csv.gz",)
+
+
+def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp_path: Path):
+    table = windows_to_table(find_windows(read_recording(TRAINING))).take(np.arange(40))
+    write_table(tmp_path / "rows.csv", table)
+    with pytest.raises(RigError, match="push_rig"):
+        train(tmp_path / "rows.csv", kind="analytical")
+    save_rig(model.rig, tmp_path / "a.yaml")
+    for rig in (model.rig, tmp_path / "a.yaml", str(tmp_path / "a.yaml")):
+        assert train(tmp_path / "rows.csv", kind="analytical", rig=rig).rig.pusher_radius == model.rig.pusher_radius
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"data": []}, RequestError, "data: .* at least one recording"),
+        ({"data": "absent.mcap"}, PushPredictorError, "absent.mcap"),
+        ({"data": TRAINING, "kind": "forest"}, TrainingError, "'forest' is not accepted, give one of vhgp, gp, analyt"),
+        ({"data": TRAINING, "kind": "gp", "n_train": 0}, TrainingError, "n_train: 0 is not accepted"),
+    ],
+)
+def test_a_wrong_call_of_train_is_refused_by_field(arguments, error, message):
+    with pytest.raises(error, match=message):
+        train(**arguments)
+
+
+# --- models and predictions -------------------------------------------------------------------------------------------
+
+
+def test_a_saved_model_predicts_the_same_and_paths_are_str_or_path(model: PushModel, tmp_path: Path):
+    model.save(str(tmp_path / "m.pushmodel"))
+    pushes = Pushes(0.02, [0.1, 0.4], 0.3)
+    for path in (tmp_path / "m.pushmodel", str(tmp_path / "m.pushmodel")):
+        np.testing.assert_array_equal(load_model(path).predict(pushes).mean, model.predict(pushes).mean)
+
+
+def test_the_repr_of_a_model_states_its_provenance(model: PushModel):
+    text = repr(model)
+    for part in ("'small' (gp)", "rect1 on abs", "120 windows", "square_abs_train", "0.2 s", "covariates: none"):
+        assert part in text, part
+    assert len(text.splitlines()) <= 10
+
+
+def test_the_standard_deviation_is_the_root_of_the_covariances_diagonal(model: PushModel):
+    prediction = model.predict(Pushes(0.02, [0.1, 0.4, 0.7], [0.0, 0.3, -0.3]))
+    assert prediction.std.shape == prediction.mean.shape == (3, 3) and len(prediction) == 3
+    for k in range(3):
+        np.testing.assert_allclose(prediction.std[:, k] ** 2, prediction.covariance[:, k, k], rtol=1e-12)
+
+
+def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain(model: PushModel):
+    few = repr(model.predict(Pushes([0.02, 0.5], 0.1, 0.3)))
+    assert "yes" in few.splitlines()[2] and "NO" in few.splitlines()[3]
+    mean = model.predict(Pushes([0.02, 0.5], 0.1, 0.3)).mean[0]
+    assert f"{1e3 * mean[0]:.3f} ±" in few
+    many = repr(model.predict(Pushes(np.linspace(0.01, 0.05, 500), 0.1, 0.3)))
+    assert len(many.splitlines()) < 20 and "... and 490 more" in many
+
+
+@pytest.mark.parametrize(
+    ("pushes", "message"),
+    [
+        (Pushes(-0.02, 0.1, 0.3), "velocity: -0.02 is not accepted, give a finite number above 0, in m/s"),
+        (Pushes(0.02, [0.1, 1.0], 0.3), r"contact\[1\]: 1.0 is not accepted"),
+        (Pushes(0.02, 0.1, [0.3, 0.0, 1.6]), r"angle\[2\]: 1.6 is not accepted"),
+        (Pushes(0.02, 0.1, 0.3, duration=2.0), "duration: 2.0 is not accepted, give 0.18 to 0.22 s"),
+    ],
+)
+def test_a_push_that_the_model_cannot_predict_is_refused_as_a_service_would(
+    model: PushModel, pushes: Pushes, message: str
+):
+    with pytest.raises(RequestError, match=message):
+        model.predict(pushes)
+
+
+def test_the_index_in_the_error_counts_all_pushes_also_where_durations_differ(model: PushModel):
+    pushes = Pushes(0.02, [0.1, 0.2, 1.5], 0.3, duration=[0.2, 0.19, 0.19])
+    with pytest.raises(RequestError, match=r"contact\[2\]: 1.5"):
+        model.predict(pushes)
+
+
+# --- windows, validation, trace ---------------------------------------------------------------------------------------
+
+
+def test_windows_are_found_from_the_recorded_rig_end_to_end_or_overlapping():
+    recording = read_recording(str(TEST))
+    plain, dense = find_windows(recording), find_windows(recording, stride=0.05)
+    assert {round(w.duration, 9) for w in plain} == {0.2} and len(dense) > 2 * len(plain)
+
+
+@pytest.mark.parametrize("given", [{"duration": 0.0}, {"duration": np.nan}, {"stride": -0.1}])
+def test_a_wrong_duration_or_stride_is_refused(given):
+    with pytest.raises(RequestError, match=next(iter(given))):
+        find_windows(read_recording(TEST), **given)
+
+
+def flat(tree: Any) -> list[float]:
+    """The numbers of nested dicts, in order."""
+    return [number for value in tree.values() for number in flat(value)] if isinstance(tree, dict) else [tree]
+
+
+def test_a_validation_has_the_metrics_of_the_command_line(model: PushModel, tmp_path: Path):
+    model.save(tmp_path / "m.pushmodel")
+    found = validate(model, str(TEST))
+    call = ["-m", "push_predictor.cli", "validate", str(tmp_path / "m.pushmodel"), str(TEST), "--json", "-"]
+    printed = json.loads(
+        subprocess.run([sys.executable, *call], check=True, cwd=REPOSITORY, capture_output=True).stdout
+    )
+    for key in ("nmse", "nlpd", "coverage"):
+        np.testing.assert_allclose(flat(found.metrics[key]), flat(printed[key]), rtol=1e-9)
+    assert (found.metrics["n_test"], found.metrics["n_pushes"]) == (printed["n_test"], printed["n_pushes"])
+    assert len(found.windows) == printed["n_test"] and "603 windows of 120 pushes" in repr(found)
+
+
+def test_an_absent_recording_is_an_error_with_its_name(model: PushModel):
+    with pytest.raises(RecordingError, match="absent"):
+        validate(model, "absent")
+
+
+def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for():
+    seen: list[str] = []
+    model = train(TRAINING, kind="analytical", watch=lambda stage, done: None)
+    found = trace(model, TEST, alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage))
+    assert "motion" in seen and found.alpha == 0.05 and found.model is model
+    tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
+    assert "elapsed_time" in tried and "slider_x" not in tried
+
+
+# --- the next push ----------------------------------------------------------------------------------------------------
+
+
+def test_the_chosen_push_moves_the_slider_towards_the_goal(model: PushModel):
+    goal = Goal([0.03, 0.0, 0.0], 0.01, None)
+    choice = choose_push(model, [0.0, 0.0, 0.0], goal)
+    assert choice is not None
+    assert np.hypot(*(choice.mean[:2] - goal.pose[:2])) < 0.03
+    assert "probability" in repr(choice) and len(repr(choice).splitlines()) == 3
+
+
+def test_at_the_goal_there_is_nothing_to_push(model: PushModel):
+    assert choose_push(model, (0.03, 0.0, 0.0), Goal((0.03, 0.0, 0.0), 0.01, None)) is None
+
+
+def test_a_slider_pose_of_another_shape_is_refused(model: PushModel):
+    with pytest.raises(RequestError, match="slider"):
+        choose_push(model, [0.0, 0.0], Goal((0.03, 0.0, 0.0), 0.01, None))
