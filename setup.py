@@ -24,7 +24,7 @@ setup(
         # pip puts the executables into bin/ only; `ros2 run` looks here
         (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
     ],
-    install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4"],
+    install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4", "threadpoolctl>=3"],
     extras_require={
         "report": ["matplotlib>=3.8", "jinja2>=3.1", "joblib>=1.4", "diptest>=0.9", "rich>=13"],
         "live": ["rich>=13"],
