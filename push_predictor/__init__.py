@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from push_predictor.front_door import Validation, choose_push, find_windows, trace, train, validate
+    from push_predictor.api import Validation, choose_push, find_windows, trace, train, validate
     from push_predictor.models.push_model import PushModel
     from push_predictor.models.pushes import Pushes
     from push_predictor.models.store.model_file import load_model
@@ -29,14 +29,14 @@ _PLACES = {
     "Goal": "planning.goal",
     "PushModel": "models.push_model",
     "Pushes": "models.pushes",
-    "Validation": "front_door",
-    "choose_push": "front_door",
-    "find_windows": "front_door",
+    "Validation": "api",
+    "choose_push": "api",
+    "find_windows": "api",
     "load_model": "models.store.model_file",
     "read_recording": "recordings.read",
-    "trace": "front_door",
-    "train": "front_door",
-    "validate": "front_door",
+    "trace": "api",
+    "train": "api",
+    "validate": "api",
 }
 
 __all__ = [
