@@ -14,7 +14,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.simulation.changes import Changes, Conditions, Moment
-from push_predictor.simulation.noise import Scatter, knots_for, mixed
+from push_predictor.simulation.noise import PushNoise, knot_count, noise_from_draws
 from push_predictor.simulation.sensors import Faults
 from push_predictor.simulation.slider import pressure_patterns, support_points
 from push_predictor.types import Array
@@ -128,7 +128,7 @@ def _strength(driver: Driver, world: World) -> tuple[Strength, str, float | None
 
 
 def _always(world: World) -> Strength:
-    return lambda moment: np.ones(len(moment.way))
+    return lambda moment: np.ones(len(moment.travelled))
 
 
 def _on_an_edge(world: World) -> Strength:
@@ -225,7 +225,7 @@ def _ballast(value: float, strength: Strength, world: World) -> Changes:
 
 def _viscous(value: float, strength: Strength, world: World) -> Changes:
     drag = abs(value) * world.weight * world.friction / 0.02
-    return Changes(viscosity=lambda moment: np.full(len(moment.way), drag))
+    return Changes(viscosity=lambda moment: np.full(len(moment.travelled), drag))
 
 
 def _breakaway(value: float, strength: Strength, world: World) -> Changes:
@@ -233,7 +233,7 @@ def _breakaway(value: float, strength: Strength, world: World) -> Changes:
 
     def friction(moment: Moment) -> Array:
         given = moment.conditions.values
-        pushed = np.maximum(moment.way - given["approach"], 0.0)
+        pushed = np.maximum(moment.travelled - given["approach"], 0.0)
         return np.asarray(abs(value) * np.log1p(given["dwell_time"]) * np.exp(-pushed / 0.004))
 
     return Changes(contact_friction=friction)
@@ -262,29 +262,30 @@ def _cable(value: float, strength: Strength, world: World) -> Changes:
 
 def _twisted_cable(value: float, strength: Strength, world: World) -> Changes:
     torque = value * world.weight * world.friction * float(np.sqrt(world.outline.area)) / 2.0
-    return Changes(pull=lambda moment: np.tile([0.0, 0.0, torque], (len(moment.way), 1)))
+    return Changes(pull=lambda moment: np.tile([0.0, 0.0, torque], (len(moment.travelled), 1)))
 
 
 def _uneven_load(value: float, strength: Strength, world: World) -> Changes:
-    points, n, knots = support_points(world.outline), len(world.conditions.row), knots_for(LONGEST_WAY)
+    points, n, knots = support_points(world.outline), len(world.conditions.row), knot_count(LONGEST_WAY)
     draws = pressure_patterns(points, n * (knots + 1), world.rng).reshape(n, knots + 1, -1)
-    extra = _Extra(mixed(draws))
+    extra = _Extra(noise_from_draws(draws))
     return Changes(load=lambda moment: value * strength(moment)[:, None] * extra.at(moment))
 
 
 def _patchy_rod(value: float, strength: Strength, world: World) -> Changes:
-    extra = _Extra(mixed(world.rng.standard_normal((len(world.conditions.row), knots_for(LONGEST_WAY) + 1, 1))))
+    draws = world.rng.standard_normal((len(world.conditions.row), knot_count(LONGEST_WAY) + 1, 1))
+    extra = _Extra(noise_from_draws(draws))
     return Changes(contact_friction=lambda moment: value * strength(moment) * extra.at(moment)[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Extra:
-    """Scatter of a whole plan, looked up for the pushes that run together."""
+    """Noise of a whole plan, looked up for the pushes that run together."""
 
-    scatter: Scatter
+    noise: PushNoise
 
     def at(self, moment: Moment) -> Array:
-        return self.scatter.take(moment.conditions.row).at(moment.way)
+        return self.noise.take(moment.conditions.row).at(moment.travelled)
 
 
 def _fault(name: str, value: float, strength: Strength, world: World) -> Faults:

@@ -1,1 +1,4 @@
-"""A rig in software: a dynamic pusher-slider on distributed support points, and the recordings it leaves."""
+"""A simulated rig: a dynamic pusher-slider on distributed support points, its sensors and its recordings.
+
+Import `rig_simulator` for recordings, `interactive_rig` for single pushes; the other modules are their parts.
+"""

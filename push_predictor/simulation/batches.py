@@ -1,6 +1,4 @@
-"""Run the pushes of a spec, many in lockstep: every push starts from a slider at rest, so they do not depend on each
-other.
-"""
+"""Run the pushes of a spec in lockstep: each starts from a slider at rest, so the pushes are independent."""
 
 from __future__ import annotations
 
@@ -17,13 +15,13 @@ from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, physic
 from push_predictor.simulation.timeline import LOWER_TIME, RESET_TIME
 from push_predictor.types import Array, IntArray
 
-LOCKSTEP = 256  # pushes; their arrays stay in the cache
+LOCKSTEP = 256  # pushes whose arrays fit into the cache
 SETTLE = 0.03  # s at rest after each push
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Pushes that ran together: their rows (n,) in the plan, their motion, the tips' paths, their ends (n,) in s."""
+    """n pushes simulated together: rows (n,) of the plan, motion, paths of the tips, end (n,) of each in s."""
 
     rows: IntArray
     motion: Motion
@@ -45,12 +43,12 @@ def run_pushes(spec: SimulationSpec) -> Iterator[Batch]:
 
 
 def end_times(path: PusherPath, friction: float) -> Array:
-    """When pushes (n,) are over, s: the tip is back and a slider that flew off has come to rest."""
+    """End times (n,) of pushes, s: the tip has retracted and a slider that slid off has stopped."""
     return np.asarray(path.total_time + SETTLE + path.speed / (0.7 * friction * GRAVITY))
 
 
 def conditions_of(spec: SimulationSpec, start: Array, path: PusherPath, end: Array) -> Conditions:
-    """Under which conditions the pushes of a spec begin: starts (n, 3), tips' paths, ends (n,) s of each."""
+    """The conditions at the start of each push, from the start poses (n, 3), the paths and the end times (n,) s."""
     plan, n = spec.pushes, len(spec.pushes)
     pause = np.zeros(n) if spec.pauses is None else spec.pauses
     between = pause + RESET_TIME + 2.0 * LOWER_TIME

@@ -1,4 +1,4 @@
-"""What may act on pushes beside the plain rig: laws that take the moment of a push and give what it changes."""
+"""Effects that act on pushes in addition to the plain rig, as functions of the state during a push."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from push_predictor.types import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """What holds while each of n pushes begins.
+    """The conditions at the start of n pushes.
 
-    row (n,): its row in the plan. values: by name (n,) each; push_index, elapsed_time s, slid_distance m commanded so
-    far, dwell_time s since the last contact (0 for the first), approach m before the commanded touch, velocity m/s,
-    contact, angle rad, slider_x, slider_y m, slider_heading, push_heading rad, and the recorded topics by their names.
+    row (n,): row of the plan. values: by name (n,) each. They are push_index, elapsed_time s, slid_distance m commanded
+    so far, dwell_time s since the last contact (0 for the first), approach m before the commanded touch, velocity m/s,
+    contact, angle rad, slider_x, slider_y m, slider_heading, push_heading rad, and the recorded topics by name.
     """
 
     row: IntArray
@@ -31,15 +31,15 @@ class Conditions:
 class Moment:
     """n pushes at an instant.
 
-    conditions: under which they began. pose, velocity (n, 3) of the sliders in the world; contact (n,) fraction of the
-    perimeter nearest to the tip; way (n,) m that the tips have gone since their start.
+    conditions: those at their start. pose, velocity (n, 3) of the sliders in the world; contact (n,): fraction of the
+    perimeter nearest to the tip; travelled (n,) m: path length of the tips since their start.
     """
 
     conditions: Conditions
     pose: Array
     velocity: Array
     contact: Array
-    way: Array
+    travelled: Array
 
 
 Law = Callable[[Moment], Array]
@@ -47,13 +47,14 @@ Law = Callable[[Moment], Array]
 
 @dataclass(frozen=True)
 class Changes:
-    """What differs from the plain rig; None: nothing.
+    """Differences from the plain rig; None means no difference.
 
-    contact_friction (n,): added to the rod's coefficient. load (n, k): added to the logarithms of the loads on the
-    support points, whose sum stays the weight. grip (n,): factor on the table's friction. grain (n, 2): anisotropy
-    (a, b) of the table's friction in world axes; the friction of a sliding point lies on the ellipse f' W f = grip^2,
-    W = [[1 + a, b], [b, 1 - a]], and resists with the largest dissipation. viscosity (n,): drag in N s/m, shared like
-    the weight. pull (n, 3): force in N and torque in N m on the slider. added_mass: kg on the slider's centre.
+    contact_friction (n,): added to the coefficient at the rod. load (n, k): added to the logarithms of the loads on
+    the support points; their sum remains the weight. grip (n,): factor on the table's friction. grain (n, 2):
+    anisotropy (a, b) of the table's friction in world axes. The friction of a sliding point lies on the ellipse
+    f' W f = grip^2 with W = [[1 + a, b], [b, 1 - a]] and maximises dissipation. viscosity (n,): drag in N s/m,
+    distributed like the weight. pull (n, 3): force in N and torque in N m on the slider. added_mass: kg at the
+    slider's centre.
     """
 
     contact_friction: Law | None = None
@@ -70,7 +71,7 @@ PLAIN = Changes()
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A scalar that is recorded beside the pushes: value (m,) at time (m,) s, linear between; noise of a sample."""
+    """A recorded scalar: value (m,) at time (m,) s, linear in between; noise: standard deviation per sample."""
 
     time: Array
     value: Array

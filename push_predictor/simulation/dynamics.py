@@ -1,9 +1,9 @@
 """Newton-Euler dynamics of many pushed sliders in lockstep.
 
 Planar rigid bodies on support points with Coulomb friction, each pushed by a position-controlled rod. Backward
-Euler in the velocities, so that both stiff parts (friction near rest, contact) are stable at any step:
-friction enters as a drag grip / speed, iterated to its fixed point; the contact is a spring and damper along the
-normal and Coulomb friction across it, solved in closed form for stick, slide or no contact.
+Euler in the velocities keeps both stiff parts (friction near rest, contact) stable at any step. Friction enters as a
+drag grip / speed, iterated to its fixed point. The contact is a spring and damper along the normal with Coulomb
+friction across it, solved in closed form for stick, slide or no contact.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from push_predictor.simulation.physics import Acting, Physics
 from push_predictor.simulation.pushes import PusherPath
 from push_predictor.types import Array
 
-WAY_STEP = 4e-5  # m that a tip goes in a step
+TRAVEL_STEP = 4e-5  # m travelled by a tip in a step
 LONGEST_STEP = 0.004  # s
 DRAG_ITERATIONS = 2
 REST_SPEED = 1e-4  # m/s; Coulomb friction is smoothed below it
-STIFFNESS = 1e5  # N/m, of rod and slider along the normal
-DAMPING = 400.0  # N s/m; overdamped for a kilogram, the touch does not bounce
+STIFFNESS = 1e5  # N/m of rod and slider along the normal
+DAMPING = 400.0  # N s/m; overdamped for a kilogram, so that the contact does not bounce
 SMALLEST_RESPONSE = 1e-9  # 1/kg; keeps a jammed slide finite
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What happened to n pushes in t steps.
+    """The motion of n pushes in t steps.
 
-    time (n, t) s, slider (n, t, 3) x, y, heading; pusher (n, t, 2); wrench (n, t, 3), what the slider exerts on the
-    pusher: force in world axes, torque about the tip.
+    time (n, t) s; slider (n, t, 3) x, y, heading; pusher (n, t, 2); wrench (n, t, 3) of the slider on the pusher:
+    force in world axes, torque about the tip.
     """
 
     time: Array
@@ -57,7 +57,7 @@ class _Drag:
 
 @dataclass(frozen=True, eq=False)
 class _DirectedDrag:
-    """A as it is where friction depends on direction: matrix (n, 3, 3)."""
+    """A for friction that depends on direction: matrix (n, 3, 3)."""
 
     matrix: Array
 
@@ -71,7 +71,7 @@ class _Contact:
     """Contact geometry of a step.
 
     normal, tangent (n, 3): rows of the Jacobian; gap (n,) m; drive_normal, drive_tangent (n,) m/s: the tip's velocity
-    along the two; outward (n, 2): the outward normal in the world; place (n,): fraction of the perimeter.
+    along them; outward (n, 2): the outward normal in the world; fraction (n,): contact as a fraction of the perimeter.
     """
 
     normal: Array
@@ -80,12 +80,12 @@ class _Contact:
     drive_normal: Array
     drive_tangent: Array
     outward: Array
-    place: Array
+    fraction: Array
 
 
 def steps_of(path: PusherPath) -> Array:
-    """Time steps (n,) in s that resolve the pushes: a fixed way per step, so fast pushes take short ones."""
-    return np.minimum(LONGEST_STEP, WAY_STEP / path.speed)
+    """Time steps (n,) in s of pushes: the tip travels the same distance per step at every speed."""
+    return np.minimum(LONGEST_STEP, TRAVEL_STEP / path.speed)
 
 
 def run(
@@ -97,10 +97,10 @@ def run(
     velocity: Array | None = None,
     time_step: Array | None = None,
 ) -> Motion:
-    """Let sliders go from poses start (n, 3) while the tips drive their path, for at least duration (n,) s.
+    """Simulate sliders from poses start (n, 3), with the tips on their paths, for at least duration (n,) s.
 
-    velocity (n, 3): of the sliders at the start, at rest unless given. time_step (n,) s: steps_of(path) unless given;
-    every push has a step of its own, all take as many.
+    velocity (n, 3): of the sliders at the start, zero by default. time_step (n,) s: steps_of(path) by default; the
+    pushes have different time steps and the same number of them.
     """
     dt = steps_of(path) if time_step is None else time_step
     pose, speed = start.copy(), np.zeros_like(start) if velocity is None else velocity.copy()
@@ -108,8 +108,8 @@ def run(
     rows = [(pose, tip, wrench)]
     for step in range(1, int(np.ceil(np.max(duration / dt))) + 1):
         ahead = path.position(step * dt)
-        way = np.hypot(*(tip - path.start).T)
-        speed, wrench = _advance(physics, pose, speed, tip, way, (ahead - tip) / dt[:, None], dt)
+        travelled = np.hypot(*(tip - path.start).T)
+        speed, wrench = _advance(physics, pose, speed, tip, travelled, (ahead - tip) / dt[:, None], dt)
         pose, tip = pose + dt[:, None] * speed, ahead
         rows.append((pose, tip, wrench))
     time = dt[:, None] * np.arange(len(rows))
@@ -117,13 +117,13 @@ def run(
 
 
 def _advance(
-    physics: Physics, pose: Array, velocity: Array, tip: Array, way: Array, drive: Array, dt: Array
+    physics: Physics, pose: Array, velocity: Array, tip: Array, travelled: Array, drive: Array, dt: Array
 ) -> tuple[Array, Array]:
     """New velocities (n, 3) and the wrench on the tip (n, 3) after a step with the tip at velocity drive (n, 2)."""
     contact = _contact(physics, pose, tip, drive)
     arms = _arms(physics.support, pose[:, 2])
     points = pose[:, :1] + arms[0], pose[:, 1:2] + arms[1]
-    acting = physics.acting(pose, velocity, contact.place, way, points)
+    acting = physics.acting(pose, velocity, contact.fraction, travelled, points)
     momentum = velocity * np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
     if acting.pull is not None:
         momentum = momentum + dt[:, None] * acting.pull
@@ -160,7 +160,7 @@ def _drag(physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity:
 def _directed_drag(
     physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity: Array, dt: Array
 ) -> _DirectedDrag:
-    """The same with a grain and with viscosity: a point at velocity v resists with W^-1 v grip / sqrt(v' W^-1 v)."""
+    """The drag with grain and viscosity: a point at velocity v resists with W^-1 v grip / sqrt(v' W^-1 v)."""
     x, y = arms
     vx = velocity[:, :1] - velocity[:, 2:] * y
     vy = velocity[:, 1:2] + velocity[:, 2:] * x
@@ -196,17 +196,17 @@ def _contact(physics: Physics, pose: Array, tip: Array, drive: Array) -> _Contac
         drive_normal=drive[:, 0] * nx + drive[:, 1] * ny,
         drive_tangent=drive[:, 1] * nx - drive[:, 0] * ny,
         outward=outward,
-        place=nearest.contact,
+        fraction=nearest.contact,
     )
 
 
 def _with_contact(
     drag: _Drag | _DirectedDrag, momentum: Array, contact: _Contact, friction: Array, dt: Array
 ) -> tuple[Array, Array, Array]:
-    """Velocities (n, 3) with the contact's impulses: push (n,) >= 0 along -normal and rub (n,) along the tangent.
+    """Velocities (n, 3) and the contact's impulses: push (n,) >= 0 along -normal and rub (n,) along the tangent.
 
-    Unknowns of a stick: (Gnn + C) push - Gnt rub = r, Gtt rub - Gnt push = s, with G the inverse inertia seen by the
-    contact and C the compliance of the implicit spring-damper; a slide has rub = +-friction push instead.
+    A sticking contact solves (Gnn + C) push - Gnt rub = r, Gtt rub - Gnt push = s, where G is the inverse inertia at
+    the contact and C the compliance of the implicit spring-damper. A sliding contact has rub = +-friction push.
     """
     free, back_n, back_t = drag.solve(momentum), drag.solve(contact.normal), drag.solve(contact.tangent)
     gnn = np.sum(contact.normal * back_n, axis=1) + 1.0 / (dt * (STIFFNESS * dt + DAMPING))
@@ -225,6 +225,6 @@ def _impulses(gnn: Array, gnt: Array, gtt: Array, r: Array, s: Array, friction: 
     push = (r * gtt + gnt * s) / determinant
     rub = (gnn * s + gnt * r) / determinant
     sticks = (push >= 0.0) & (np.abs(rub) <= friction * push)
-    way = np.sign(np.where(push > 0.0, rub, s)) * friction
-    slide = np.maximum(r / np.maximum(gnn - way * gnt, SMALLEST_RESPONSE), 0.0)
-    return np.where(sticks, push, slide), np.where(sticks, rub, way * slide)
+    ratio = np.sign(np.where(push > 0.0, rub, s)) * friction  # of rub to push when the contact slides
+    slide = np.maximum(r / np.maximum(gnn - ratio * gnt, SMALLEST_RESPONSE), 0.0)
+    return np.where(sticks, push, slide), np.where(sticks, rub, ratio * slide)

@@ -1,4 +1,4 @@
-"""Random deviations that change along a push: where slider, rod and table touch is never the same for long."""
+"""Noise along a push: random deviations of load and friction that change as the tip travels."""
 
 from __future__ import annotations
 
@@ -8,41 +8,36 @@ import numpy as np
 
 from push_predictor.types import Array
 
-KNOT = 0.004  # m of the tip's way over which deviations change
-LASTING = 0.2  # share of the variance that stays with a push from begin to end
+KNOT_SPACING = 0.004  # m travelled by the tip between two independent draws
+PERSISTENT_SHARE = 0.2  # of the variance: stays the same for a whole push
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
-    """Deviations of n pushes: lasting (n, k) from begin to end, and knots (n, m, k), one every KNOT metres of way."""
+class PushNoise:
+    """Deviations of n pushes: persistent (n, k) over each push; knots (n, m, k), one every KNOT_SPACING metres."""
 
-    lasting: Array
+    persistent: Array
     knots: Array
 
-    def at(self, way: Array) -> Array:
-        """Deviations (n, k) after way (n,) m; between knots with the variance that the knots have."""
-        place = np.clip(way / KNOT, 0.0, self.knots.shape[1] - 1.001)
-        index = place.astype(np.intp)
-        share = (np.pi / 2.0) * (place - index)[:, None]
-        rows = np.arange(len(way))
-        passing = np.cos(share) * self.knots[rows, index] + np.sin(share) * self.knots[rows, index + 1]
-        return np.asarray(self.lasting + passing)
+    def at(self, travelled: Array) -> Array:
+        """Deviations (n, k) after the tips travelled (n,) m; their variance is the same between knots as at knots."""
+        position = np.clip(travelled / KNOT_SPACING, 0.0, self.knots.shape[1] - 1.001)
+        index = position.astype(np.intp)
+        phase = (np.pi / 2.0) * (position - index)[:, None]
+        rows = np.arange(len(travelled))
+        changing = np.cos(phase) * self.knots[rows, index] + np.sin(phase) * self.knots[rows, index + 1]
+        return np.asarray(self.persistent + changing)
 
-    def take(self, rows: np.ndarray) -> Scatter:
+    def take(self, rows: np.ndarray) -> PushNoise:
         """The given pushes."""
-        return Scatter(self.lasting[rows], self.knots[rows])
+        return PushNoise(self.persistent[rows], self.knots[rows])
 
 
-def no_scatter(n: int, k: int) -> Scatter:
-    """Deviations that are zero."""
-    return Scatter(np.zeros((n, k)), np.zeros((n, 2, k)))
+def knot_count(length: float) -> int:
+    """Number of knots for a path of `length` m."""
+    return int(np.ceil(length / KNOT_SPACING)) + 2
 
 
-def knots_for(length: float) -> int:
-    """How many knots a way of `length` m needs."""
-    return int(np.ceil(length / KNOT)) + 2
-
-
-def mixed(draws: Array) -> Scatter:
-    """Scatter of the variance of independent draws (n, m + 1, k): the first for what lasts, one for each knot."""
-    return Scatter(np.sqrt(LASTING) * draws[:, 0], np.sqrt(1.0 - LASTING) * draws[:, 1:])
+def noise_from_draws(draws: Array) -> PushNoise:
+    """Noise with the variance of independent draws (n, m + 1, k): the first is persistent, one for each knot."""
+    return PushNoise(np.sqrt(PERSISTENT_SHARE) * draws[:, 0], np.sqrt(1.0 - PERSISTENT_SHARE) * draws[:, 1:])

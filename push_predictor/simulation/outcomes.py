@@ -1,4 +1,4 @@
-"""Straight from the true motion to a push table, without sensors: for grids too large to record."""
+"""Push tables from the true motion, without sensors, for grids that are too large to record."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from push_predictor.simulation.dynamics import Motion
 from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array, BoolArray, IntArray
 
-HELD = 0.9  # share of a window during which the tip must touch
+LEAST_CONTACT = 0.9  # share of a window with contact
 
 
 def push_outcomes(spec: SimulationSpec, duration: float = 0.2) -> PushTable:
-    """The windows of a spec's pushes: end to end from the first touch while the tip keeps its speed and its contact.
+    """The windows of a spec's pushes, end to end from the first touch, at constant speed and in contact.
 
-    push_id is the push's row in the plan. Raises RigError for an unknown shape or surface.
+    push_id is the row of the plan. Raises RigError for an unknown shape or surface.
     """
     return concatenate([_windows(batch, spec.slider.outline, duration) for batch in run_pushes(spec)])
 
@@ -28,12 +28,12 @@ def _windows(batch: Batch, outline: Outline, duration: float) -> PushTable:
     touching = np.hypot(motion.wrench[..., 0], motion.wrench[..., 1]) > 0.0
     push, begin = _tiles(batch, touching, duration)
     end = begin + duration
-    held = _running_share(touching, motion, push, begin, end) >= HELD
-    return _table(batch, outline, push[held], begin[held], duration)
+    kept = _contact_share(touching, motion, push, begin, end) >= LEAST_CONTACT
+    return _table(batch, outline, push[kept], begin[kept], duration)
 
 
 def _tiles(batch: Batch, touching: BoolArray, duration: float) -> tuple[IntArray, Array]:
-    """Push (w,) and start time (w,) of windows laid from first touch until the tip brakes."""
+    """Push (w,) and start time (w,) of the windows from first touch until the tip decelerates."""
     path = batch.path
     first = batch.motion.time[np.arange(len(touching)), np.argmax(touching, axis=1)]
     cruise_end = path.push_time - path.speed / path.acceleration
@@ -43,7 +43,8 @@ def _tiles(batch: Batch, touching: BoolArray, duration: float) -> tuple[IntArray
     return push, first[push] + order * duration
 
 
-def _running_share(touching: BoolArray, motion: Motion, push: IntArray, begin: Array, end: Array) -> Array:
+def _contact_share(touching: BoolArray, motion: Motion, push: IntArray, begin: Array, end: Array) -> Array:
+    """Share (w,) of each window during which the tip touches the slider."""
     step = motion.time[push, 1]
     since = np.cumsum(touching, axis=1)
     low, high = (np.round(time / step).astype(np.int64) for time in (begin, end))

@@ -1,6 +1,6 @@
-"""What acts on pushed sliders: masses, the grip of the table on each support point, friction at the rod.
+"""The forces on pushed sliders: weight, friction of the table at each support point, friction at the rod.
 
-All of it is explicit per push, and changes with the place on the table and with the way of the tip.
+All are explicit per push. They change with the position on the table and with the distance travelled by the tip.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.simulation.changes import PLAIN, Changes, Conditions, Moment
-from push_predictor.simulation.noise import Scatter
+from push_predictor.simulation.noise import PushNoise
 from push_predictor.simulation.surface import FrictionField
 from push_predictor.types import Array
 
@@ -20,7 +20,7 @@ GRAVITY = 9.81  # m/s^2
 
 @dataclass(frozen=True, eq=False)
 class Acting:
-    """What acts on n sliders at an instant.
+    """Friction and forces on n sliders at an instant.
 
     grip (n, k) N, friction (n,) at the rod; grain (n, 2), viscosity (n,) N s/m and pull (n, 3) N, N m as in Changes.
     """
@@ -34,12 +34,12 @@ class Acting:
 
 @dataclass(frozen=True, eq=False)
 class Physics:
-    """What moves n sliders on k support points.
+    """The mechanical parameters of n sliders on k support points.
 
     radius: of the rod, m. mass (n,) kg, inertia (n,) kg m^2, support (k, 2) m in the body frame, shares (n, k) of the
-    weight, contact_friction (n,), surface: friction coefficients of the table. pressure (k wide) and rubbing (1 wide):
-    deviations of the logarithms of shares and contact friction along the way. changes: what acts beside all this, under
-    the conditions of the pushes.
+    weight, contact_friction (n,), surface: friction coefficients of the table. load_noise (k wide) and contact_noise
+    (1 wide): deviations of the logarithms of the shares and of the contact friction along the push. changes: effects
+    in addition to these, under the conditions of the pushes.
     """
 
     outline: Outline
@@ -50,27 +50,29 @@ class Physics:
     shares: Array
     contact_friction: Array
     surface: FrictionField
-    pressure: Scatter
-    rubbing: Scatter
+    load_noise: PushNoise
+    contact_noise: PushNoise
     changes: Changes = PLAIN
     conditions: Conditions = field(default_factory=lambda: Conditions(np.zeros(0, dtype=np.int64)))
 
-    def grip(self, x: Array, y: Array, way: Array) -> Array:
-        """Coulomb friction (n, k) in N on support points at world x, y (n, k) m, the tips having gone way (n,) m."""
-        return self._gripped(self.pressure.at(way), x, y)
+    def grip(self, x: Array, y: Array, travelled: Array) -> Array:
+        """Coulomb friction (n, k) in N at support points x, y (n, k) m, after the tips travelled (n,) m."""
+        return self._grip(self.load_noise.at(travelled), x, y)
 
-    def friction_at_rod(self, way: Array) -> Array:
-        """Contact friction coefficients (n,) when the tips have gone way (n,) m."""
-        return np.asarray(self.contact_friction * np.exp(self.rubbing.at(way)[:, 0]))
+    def friction_at_rod(self, travelled: Array) -> Array:
+        """Contact friction coefficients (n,) after the tips travelled (n,) m."""
+        return np.asarray(self.contact_friction * np.exp(self.contact_noise.at(travelled)[:, 0]))
 
-    def acting(self, pose: Array, velocity: Array, contact: Array, way: Array, points: tuple[Array, Array]) -> Acting:
-        """All that acts at an instant; see Moment for the arguments, points: world x, y (n, k) of the support, m."""
+    def acting(
+        self, pose: Array, velocity: Array, contact: Array, travelled: Array, points: tuple[Array, Array]
+    ) -> Acting:
+        """Friction and forces at an instant; arguments as in Moment, points: world x, y (n, k) of the support, m."""
         if self.changes == PLAIN:
-            return Acting(self.grip(*points, way), self.friction_at_rod(way))
-        changes, moment = self.changes, Moment(self.conditions, pose, velocity, contact, way)
-        pressure = self.pressure.at(way)
-        grip = self._gripped(pressure if changes.load is None else pressure + changes.load(moment), *points)
-        friction = self.friction_at_rod(way)
+            return Acting(self.grip(*points, travelled), self.friction_at_rod(travelled))
+        changes, moment = self.changes, Moment(self.conditions, pose, velocity, contact, travelled)
+        load = self.load_noise.at(travelled)
+        grip = self._grip(load if changes.load is None else load + changes.load(moment), *points)
+        friction = self.friction_at_rod(travelled)
         return Acting(
             grip if changes.grip is None else grip * changes.grip(moment)[:, None],
             friction if changes.contact_friction is None else _added(friction, changes.contact_friction(moment)),
@@ -79,8 +81,8 @@ class Physics:
             None if changes.pull is None else changes.pull(moment),
         )
 
-    def _gripped(self, pressure: Array, x: Array, y: Array) -> Array:
-        load = self.shares * np.exp(pressure)
+    def _grip(self, log_load: Array, x: Array, y: Array) -> Array:
+        load = self.shares * np.exp(log_load)
         load *= (self.mass * GRAVITY / np.sum(load, axis=1))[:, None]
         return np.asarray(load * self.surface.at(x, y))
 
@@ -95,8 +97,8 @@ class Physics:
             self.shares[rows],
             self.contact_friction[rows],
             self.surface,
-            self.pressure.take(rows),
-            self.rubbing.take(rows),
+            self.load_noise.take(rows),
+            self.contact_noise.take(rows),
             self.changes,
             self.conditions.take(rows) if len(self.conditions.row) else self.conditions,
         )

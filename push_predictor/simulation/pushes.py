@@ -1,4 +1,4 @@
-"""Which pushes are made: contact, angle, speed and travel of each, and the straight line the tip drives for it."""
+"""Planned pushes: contact, angle, speed and travel of each, and the straight path of the tip."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class PushPlan:
     """The commands of n pushes.
 
     contact (n,) in [0, 1), angle (n,) rad from the inward normal, speed (n,) m/s, travel (n,) m beyond the commanded
-    touch. Raises RequestError for values that make no push.
+    touch. Raises RequestError for a value out of range.
     """
 
     contact: Array
@@ -68,9 +68,9 @@ def grid_pushes(
     speed: float = 0.02,
     travel: float = 0.01,
 ) -> PushPlan:
-    """Plan every contact with every angle, the whole grid `repetitions` times over.
+    """Plan every contact with every angle, and repeat the whole grid `repetitions` times.
 
-    The defaults are those of the repeated pushes of Bauza & Rodriguez 2017: 1 cm at 20 mm/s.
+    The defaults are those of Bauza & Rodriguez 2017: 1 cm at 20 mm/s.
     """
     contact, angle = (grid.ravel() for grid in np.meshgrid(contacts, angles, indexing="ij"))
     n = len(contact) * repetitions
@@ -79,10 +79,10 @@ def grid_pushes(
 
 @dataclass(frozen=True, eq=False)
 class PusherPath:
-    """The tip's straight lines.
+    """Straight paths of n tips.
 
-    From start (n, 2) along direction (n, 2), length (n,) m at speed (n,) m/s with ramps of `acceleration` m/s^2, a
-    hold, and back by RETRACT.
+    From start (n, 2) along direction (n, 2), length (n,) m at speed (n,) m/s with ramps of `acceleration` m/s^2, then
+    HOLD s at rest, then back by RETRACT.
     """
 
     start: Array
@@ -93,7 +93,7 @@ class PusherPath:
 
     @property
     def push_time(self) -> Array:
-        """Time (n,) in s until the tip stands at the end of its line."""
+        """Time (n,) in s until the tip stops at the end of its path."""
         return ramp_time(self.length, self.speed, self.acceleration)
 
     @property
@@ -116,7 +116,7 @@ class PusherPath:
 
 
 def pusher_path(plan: PushPlan, outline: Outline, radius: float, poses: Array, acceleration: float) -> PusherPath:
-    """The lines that carry out a plan on sliders at poses (n, 3): each reaches its speed before the touch."""
+    """The paths of a plan on sliders at poses (n, 3); each tip reaches its speed before it touches."""
     inward = outline.inward_normal(plan.contact)
     direction = rotate(rotate(inward, plan.angle), poses[:, 2])
     touch = to_world(outline.point(plan.contact) - radius * inward, poses)
@@ -132,7 +132,7 @@ def ramp_time(length: Array, speed: Array, acceleration: float) -> Array:
 
 
 def ramp_distance(time: Array, length: Array, speed: Array, acceleration: float) -> Array:
-    """Way covered after `time` of a trapezoidal motion, m; zero before it begins, `length` after its end."""
+    """Distance travelled after `time` of a trapezoidal motion, m; zero before its start, `length` after its end."""
     peak = np.minimum(speed, np.sqrt(acceleration * length))
     ramp = peak / acceleration
     cruise = length / peak - ramp

@@ -1,4 +1,4 @@
-"""Simulate a rig: from a plan of pushes to a recording."""
+"""Simulate recordings: from a plan of pushes to the streams of the sensors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FIRST_STAMP, STAMP_RANGE = 1_500_000_000, 10**8  # s since 1970
 
 
 def simulate(spec: SimulationSpec) -> Recording:
-    """Make the pushes of a spec and record them. Raises RigError for an unknown shape or surface."""
+    """The recording of a spec's pushes. Raises RigError for an unknown shape or surface."""
     motions = {row: _motion(batch, i) for batch in run_pushes(spec) for i, row in enumerate(batch.rows.tolist())}
     truth = run_in_turn([motions[row] for row in range(len(spec.pushes))], spec.pauses)
     epoch = _epoch(spec)
@@ -43,14 +43,14 @@ def simulate(spec: SimulationSpec) -> Recording:
 
 
 def _scalars(spec: SimulationSpec, truth: Truth, epoch: int) -> dict[str, ScalarStream]:
-    """The scalar topics; the temperature comes by itself where the spec does not give one."""
+    """The scalar topics of the spec, and a temperature unless the spec defines that topic."""
     own = {TEMPERATURE_TOPIC: surface_temperature(truth, epoch, spec.rng(13))}
     given = [(name, spec.topics[name], spec.rng(14 + k)) for k, name in enumerate(sorted(spec.topics))]
     return own | {name: record_topic(topic, truth, epoch, rng) for name, topic, rng in given}
 
 
 def _motion(batch: Batch, i: int) -> PushMotion:
-    """Push i of a batch until its own end; a copy, so that the batch can go."""
+    """Push i of a batch until its end, copied so that the batch can be freed."""
     motion = batch.motion
     stop = int(np.searchsorted(motion.time[i], batch.end[i], side="right"))
     streams = (motion.time, motion.slider, motion.pusher, motion.wrench)
@@ -58,7 +58,7 @@ def _motion(batch: Batch, i: int) -> PushMotion:
 
 
 def _epoch(spec: SimulationSpec) -> int:
-    """Stamp of the start (ns), drawn from what defines the recording: no two should share their stamps."""
+    """Start stamp (ns), derived from the spec so that different recordings get different stamps."""
     plan = spec.pushes
     settings = (spec.slider.name, spec.table, spec.seed, spec.surface_seed, spec.sensors, spec.name)
     digest = hashlib.sha256(repr(settings).encode())

@@ -1,4 +1,4 @@
-"""Sliders: outline, mass, moment of inertia, and the points they rest on."""
+"""Sliders: outline, mass, moment of inertia and support points."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.types import Array
 
 MASSES = {"rect1": 0.837, "ellip1": 0.894, "ellip2": 1.110, "ellip3": 1.334, "hex": 0.983}  # kg, the MIT set
-SUPPORT_POINTS = 36  # about so many; the grid over the outline decides
-BUILD_TILT = 0.10  # spread of the log load over the slider as it was made: real sliders do not mirror exactly
+SUPPORT_POINTS = 36  # approximate number; the grid over the outline decides
+BUILD_TILT = 0.10  # standard deviation of the log load from manufacture: real sliders are not exactly symmetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def support_points(outline: Outline) -> Array:
 
 
 def built_shares(points: Array, seed: int) -> Array:
-    """Load shares (k,), summing to one, of the slider as it was made: nearly uniform, slightly lopsided."""
+    """Load shares (k,) of a manufactured slider, with sum one: nearly uniform, slightly asymmetric."""
     load = np.exp(BUILD_TILT * pressure_patterns(points, 1, np.random.default_rng([seed, 2]))[0])
     return np.asarray(load / np.sum(load))
 
@@ -66,12 +66,12 @@ def built_shares(points: Array, seed: int) -> Array:
 def pressure_patterns(points: Array, n: int, rng: np.random.Generator) -> Array:
     """Deviations (n, k) of the logarithm of the load on points (k, 2), of unit variance over points and draws.
 
-    Half of the variance tilts the pressure across the slider, a quarter bends it (rim against middle, saddle), a
-    quarter belongs to each point alone.
+    Half of the variance is a tilt of the pressure, a quarter is curvature (rim against middle, saddle) and a quarter
+    is independent between points.
     """
     scaled = points / np.sqrt(np.mean(points**2))
-    bends = np.stack([np.sum(scaled**2, axis=1) - 2.0, scaled[:, 0] * scaled[:, 1]])
+    curvature = np.stack([np.sum(scaled**2, axis=1) - 2.0, scaled[:, 0] * scaled[:, 1]])
     tilt = rng.standard_normal((n, 2)) @ scaled.T / np.sqrt(2.0)
-    bend = rng.standard_normal((n, 2)) @ bends / np.sqrt(2.0 * np.mean(bends**2))
-    each = rng.standard_normal((n, len(points)))
-    return np.asarray(np.sqrt(0.5) * tilt + 0.5 * bend + 0.5 * each)
+    curved = rng.standard_normal((n, 2)) @ curvature / np.sqrt(2.0 * np.mean(curvature**2))
+    single = rng.standard_normal((n, len(points)))
+    return np.asarray(np.sqrt(0.5) * tilt + 0.5 * curved + 0.5 * single)

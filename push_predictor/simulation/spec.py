@@ -1,4 +1,4 @@
-"""What is simulated: slider, table, pushes, seeds; and the physics that follows from them, push by push."""
+"""The specification of a simulated recording (slider, table, pushes, seeds) and the physics of its pushes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.recordings.rig import Rig
 from push_predictor.simulation.changes import PLAIN, Changes, Topic
-from push_predictor.simulation.noise import Scatter, knots_for, mixed
+from push_predictor.simulation.noise import PushNoise, knot_count, noise_from_draws
 from push_predictor.simulation.physics import Physics
 from push_predictor.simulation.pushes import PushPlan
 from push_predictor.simulation.sensors import FAULTLESS, Faults, Sensors
@@ -26,20 +26,18 @@ from push_predictor.types import Array
 PUSHER_RADIUS = 0.00475  # m
 CONTACT_FRICTION = 0.25  # steel on steel, rod against slider
 ACCELERATION = 2.5  # m/s^2, of the robot
-PLACE_SPREAD, TURN_SPREAD = 0.02, 0.35  # m, rad: how exactly the slider is put back
+PLACE_SPREAD, TURN_SPREAD = 0.02, 0.35  # m, rad: standard deviations of the slider's pose before a push
 
 
 @dataclass(frozen=True, eq=False)
 class SimulationSpec:
-    """A recording to be made.
+    """The specification of a simulated recording.
 
-    shape: name of the MIT set, or a Slider. surface: name, or a Surface. seed draws what differs from push to push
-    and the sensors' noise; surface_seed draws the table, slider_seed the slider as it was made: recordings can share
-    them.
-    contact_friction: mean coefficient. acceleration: the robot's, m/s^2. place_spread (m), turn_spread (rad):
-    standard deviations of where the slider is put before a push.
-    changes: what acts beside the plain rig; faults: of the measurement. topics: scalars recorded beside the pushes, by
-    name; pauses (n,): s that the rig waits before each push, none if None.
+    shape: name of the MIT set, or a Slider. surface: name, or a Surface. seed draws the noise of the pushes and of the
+    sensors; surface_seed draws the table and slider_seed the slider, so that recordings can share them.
+    contact_friction: mean coefficient. acceleration: of the robot, m/s^2. place_spread (m), turn_spread (rad):
+    standard deviations of the slider's pose before a push. changes: effects in addition to the plain rig; faults:
+    measurement errors. topics: recorded scalars by name. pauses (n,): waiting time before each push, s; None: none.
     """
 
     shape: str | Slider
@@ -61,12 +59,12 @@ class SimulationSpec:
 
     @property
     def slider(self) -> Slider:
-        """The slider itself. Raises RigError for a name that is not known."""
+        """The slider. Raises RigError for an unknown name."""
         return slider_named(self.shape) if isinstance(self.shape, str) else self.shape
 
     @property
     def table(self) -> Surface:
-        """The surface itself. Raises RigError for a name that is not known."""
+        """The surface. Raises RigError for an unknown name."""
         return surface_named(self.surface) if isinstance(self.surface, str) else self.surface
 
     def rng(self, purpose: int) -> np.random.Generator:
@@ -75,7 +73,7 @@ class SimulationSpec:
 
 
 def simulated_rig(spec: SimulationSpec) -> Rig:
-    """The push_rig record of a spec: nominal values, not what single pushes drew."""
+    """The rig of a spec, with nominal values: noise of single pushes is not included."""
     slider = spec.slider
     points = support_points(slider.outline)
     shares = built_shares(points, spec.slider_seed)
@@ -92,7 +90,7 @@ def simulated_rig(spec: SimulationSpec) -> Rig:
 
 
 def physics_of(spec: SimulationSpec, length: float) -> Physics:
-    """What each push of a spec meets over ways up to length (m): the table drawn once, the contacts push by push."""
+    """The physics of each push of a spec, for paths up to length (m): one table, contact noise drawn per push."""
     slider, n = spec.slider, len(spec.pushes)
     points = support_points(slider.outline)
     return Physics(
@@ -104,24 +102,24 @@ def physics_of(spec: SimulationSpec, length: float) -> Physics:
         shares=np.tile(built_shares(points, spec.slider_seed), (n, 1)),
         contact_friction=np.full(n, spec.contact_friction),
         surface=friction_field(spec.table, spec.surface_seed),
-        pressure=_pressure(spec, points, knots_for(length)),
-        rubbing=_rubbing(spec, knots_for(length)),
+        load_noise=_load_noise(spec, points, knot_count(length)),
+        contact_noise=_contact_noise(spec, knot_count(length)),
         changes=spec.changes,
     )
 
 
-def _pressure(spec: SimulationSpec, points: Array, knots: int) -> Scatter:
+def _load_noise(spec: SimulationSpec, points: Array, knots: int) -> PushNoise:
     n, variation = len(spec.pushes), spec.table.pressure_variation
     patterns = variation * pressure_patterns(points, n * (knots + 1), spec.rng(3)).reshape(n, knots + 1, -1)
-    return mixed(patterns)
+    return noise_from_draws(patterns)
 
 
-def _rubbing(spec: SimulationSpec, knots: int) -> Scatter:
+def _contact_noise(spec: SimulationSpec, knots: int) -> PushNoise:
     draws = spec.table.contact_variation * spec.rng(2).standard_normal((len(spec.pushes), knots + 1, 1))
-    return mixed(draws)
+    return noise_from_draws(draws)
 
 
 def start_poses(spec: SimulationSpec) -> Array:
-    """Where the slider is put before each push: (n, 3) x, y in m, heading in rad."""
+    """Poses of the slider before each push: (n, 3) x, y in m, heading in rad."""
     spread = np.array([spec.place_spread, spec.place_spread, spec.turn_spread])
     return np.asarray(spread * spec.rng(1).standard_normal((len(spec.pushes), 3)))

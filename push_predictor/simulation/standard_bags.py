@@ -1,4 +1,4 @@
-"""The recordings in bags/: what each one is, and the command that makes them (scripts/make_bags.sh)."""
+"""The recordings in bags/: their specifications and the command that writes them (scripts/make_bags.sh)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.sensors import Sensors
 from push_predictor.simulation.spec import SimulationSpec
 
-SPEEDS = (0.01, 0.02, 0.02, 0.02, 0.05)  # m/s; most pushes at one speed, so that maps over contact and angle fill up
+SPEEDS = (0.01, 0.02, 0.02, 0.02, 0.05)  # m/s; most pushes at one speed, so that maps over contact and angle are dense
 TRAVEL = 0.02  # m
-WRENCH_RATE = 50.0  # Hz; half of the poses', to keep the recordings small
+WRENCH_RATE = 50.0  # Hz; half the rate of the poses, to keep the recordings small
 
 
 def standard_bags() -> dict[str, SimulationSpec]:
-    """The specs by name. square_abs_* share slider and table; every recording has pushes of its own."""
+    """The specs by name. square_abs_* share slider and table; the pushes of every recording differ."""
     specs = (
         _spec("square_abs_train", "rect1", "abs", _random(220, 1), 1),
         _spec("square_abs_test", "rect1", "abs", _random(120, 2), 2),
@@ -33,14 +33,14 @@ def standard_bags() -> dict[str, SimulationSpec]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Write all recordings, or those named, into a folder."""
+    """Write all recordings, or the named ones, into a folder."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="which recordings; all unless given")
-    parser.add_argument("--out", type=Path, default=Path("bags"), help="folder that receives them")
+    parser.add_argument("names", nargs="*", help="recordings to write (default: all)")
+    parser.add_argument("--out", type=Path, default=Path("bags"), help="folder to write them to")
     options = parser.parse_args(arguments)
     specs = standard_bags()
     if unknown := [name for name in options.names if name not in specs]:
-        parser.error(f"no recording named {', '.join(unknown)}; there are {', '.join(specs)}")
+        parser.error(f"no recording named {', '.join(unknown)}; give some of {', '.join(specs)}")
     for name in options.names or specs:
         write_recording(options.out / name, simulate(specs[name]))
         print(f"{options.out / name}: {len(specs[name].pushes)} pushes", file=sys.stderr)
@@ -57,7 +57,7 @@ def _random(n: int, seed: int) -> PushPlan:
 
 
 def _repeats() -> PushPlan:
-    """Four contacts along the first side by five angles, four times: 1 cm at 20 mm/s."""
+    """Four contacts on the first side by five angles, each four times: 1 cm at 20 mm/s."""
     return grid_pushes(np.linspace(0.03, 0.18, 4), np.linspace(-1.0, 1.0, 5), 4)
 
 

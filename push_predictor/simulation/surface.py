@@ -1,6 +1,6 @@
-"""Surfaces: Coulomb friction that varies over the table, fixed for one seed.
+"""Surfaces: Coulomb friction that varies over the table, fixed by a seed.
 
-The coefficients are representative of the four materials of the MIT push data set, not measurements of them.
+The coefficients are representative of the four materials of the MIT push data set. They are not measured.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from push_predictor.errors import RigError
 from push_predictor.types import Array
 
-HALF_EXTENT = 0.3  # m; the table is a square about the origin
+HALF_EXTENT = 0.3  # m; the table is a square centred on the origin
 CELL = 0.002  # m
 
 
@@ -21,9 +21,9 @@ CELL = 0.002  # m
 class Surface:
     """Friction of a material.
 
-    friction: mean coefficient. variation: standard deviation of its logarithm over the table. correlation: length
-    in m over which it varies. pressure_variation: standard deviation of the logarithm of a support point's load
-    (how badly slider and table fit). contact_variation: the same for the contact friction.
+    friction: mean coefficient. variation: standard deviation of its logarithm over the table. correlation: correlation
+    length, m. pressure_variation: standard deviation of the logarithm of a support point's load, from the misfit of
+    slider and table. contact_variation: the same for the contact friction.
     """
 
     name: str
@@ -59,7 +59,7 @@ class FrictionField:
     values: Array
 
     def at(self, x: Array, y: Array) -> Array:
-        """Coefficients at world points x, y (any equal shape, m): bilinear; the rim's beyond the table."""
+        """Coefficients at world points x, y (same shape, m), bilinear; beyond the table those of its rim."""
         size = self.values.shape[0]
         column = np.clip((x + HALF_EXTENT) / CELL, 0.0, size - 1.001)
         row = np.clip((y + HALF_EXTENT) / CELL, 0.0, size - 1.001)
@@ -71,14 +71,8 @@ class FrictionField:
         return np.asarray(low * (1.0 - v) + high * v)
 
 
-def uniform_field(friction: float) -> FrictionField:
-    """The same friction everywhere."""
-    size = round(2.0 * HALF_EXTENT / CELL) + 1
-    return FrictionField(np.full((size, size), friction))
-
-
 def friction_field(surface: Surface, seed: int) -> FrictionField:
-    """A draw of the surface: log-normal with the surface's mean, variation and correlation length."""
+    """A random table: log-normal with the surface's mean, variation and correlation length."""
     size = round(2.0 * HALF_EXTENT / CELL) + 1
     white = np.random.default_rng([seed, 1]).standard_normal((size, size))
     smooth = gaussian_filter(white, surface.correlation / CELL / np.sqrt(2.0), mode="wrap")

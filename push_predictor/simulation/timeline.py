@@ -1,6 +1,6 @@
-"""From single pushes to one continuous run of the rig.
+"""One continuous motion of the rig from single pushes.
 
-The tip travels lifted, the slider is put back, the tip comes down, pushes, and lifts again.
+Between pushes the lifted tip moves to the next start and the slider is put back; then the tip lowers, pushes and lifts.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from push_predictor.types import Array
 
-RESET_TIME = 0.20  # s, the tip lifted; the slider is moved within the middle third
-LOWER_TIME = 0.06  # s, down and up
+RESET_TIME = 0.20  # s with the tip lifted; the slider moves in the middle third
+LOWER_TIME = 0.06  # s to lower, and to lift
 LIFTED, DOWN = 0.05, 0.01  # m, height of the tip
-CLEAR = 1e-6  # s between the last knot of a phase and the first of the next
+PHASE_GAP = 1e-6  # s between the last knot of a phase and the first of the next
 
 
 @dataclass(frozen=True, eq=False)
 class PushMotion:
-    """One push as it went: time (t,) s from its start; slider (t, 3), pusher (t, 2), wrench (t, 3)."""
+    """The motion of one push: time (t,) s from its start; slider (t, 3), pusher (t, 2), wrench (t, 3)."""
 
     time: Array
     slider: Array
@@ -30,7 +30,7 @@ class PushMotion:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The rig's true state at knots time (t,) s, linear between them.
+    """The true state of the rig at times (t,) s, linear in between.
 
     slider (t, 3) with unwrapped heading, pusher (t, 3) with height, wrench (t, 3).
     """
@@ -47,7 +47,7 @@ class Truth:
 
 
 def run_in_turn(pushes: Sequence[PushMotion], pauses: Array | None = None) -> Truth:
-    """String pushes together with the phases between them; pauses (n,): s that the resets take longer."""
+    """Concatenate pushes and the phases between them; pauses (n,): additional time of the resets, s."""
     parts: list[tuple[Array, Array, Array, Array]] = []
     clock, before = 0.0, pushes[0]
     for i, push in enumerate(pushes):
@@ -57,19 +57,19 @@ def run_in_turn(pushes: Sequence[PushMotion], pauses: Array | None = None) -> Tr
             _contact_phase(push),
             _vertical(push, -1, DOWN, LIFTED),
         ):
-            parts.append((phase[0] + clock + CLEAR, *phase[1:]))
-            clock += float(phase[0][-1]) + CLEAR
+            parts.append((phase[0] + clock + PHASE_GAP, *phase[1:]))
+            clock += float(phase[0][-1]) + PHASE_GAP
         before = push
     return Truth(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _reset(before: PushMotion, push: PushMotion, lasts: float) -> tuple[Array, Array, Array, Array]:
+def _reset(before: PushMotion, push: PushMotion, duration: float) -> tuple[Array, Array, Array, Array]:
     share = np.linspace(0.0, 1.0, 31)
     tip = before.pusher[-1] + _eased(share)[:, None] * (push.pusher[0] - before.pusher[-1])
     turn = np.concatenate([[0.0, 0.0], [_shorter_turn(push.slider[0, 2] - before.slider[-1, 2])]])
-    way = np.concatenate([push.slider[0, :2] - before.slider[-1, :2], [0.0]]) + turn
-    slider = push.slider[0] - way + _eased(np.clip(3.0 * share - 1.0, 0.0, 1.0))[:, None] * way
-    return share * lasts, slider, _with_height(tip, np.full(len(share), LIFTED)), np.zeros((len(share), 3))
+    shift = np.concatenate([push.slider[0, :2] - before.slider[-1, :2], [0.0]]) + turn
+    slider = push.slider[0] - shift + _eased(np.clip(3.0 * share - 1.0, 0.0, 1.0))[:, None] * shift
+    return share * duration, slider, _with_height(tip, np.full(len(share), LIFTED)), np.zeros((len(share), 3))
 
 
 def _vertical(push: PushMotion, end: int, low: float, high: float) -> tuple[Array, Array, Array, Array]:

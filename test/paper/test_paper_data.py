@@ -76,11 +76,9 @@ def test_a_push_that_was_hardly_seen_has_no_mean() -> None:
 def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
     grid = made_up_grid()
     assert grid.mean.shape == (len(grid.angles), len(grid.fractions), 3)
-    contact_and_angle = grid.commanded_inputs.reshape(*grid.mean.shape)
     for cell in grid.cells:
         row, column = list(grid.angles).index(cell.angle), list(grid.fractions).index(cell.fraction)
         np.testing.assert_array_equal(grid.mean[row, column], cell.mean)
-        assert contact_and_angle[row, column, 2] == cell.angle
 
 
 def test_the_section_tells_which_speeds_lack_windows(tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def test_a_soft_tip_is_not_called_a_late_clock() -> None:
 
 def test_what_lies_in_the_models_own_inputs_is_told_and_left_to_a_refit() -> None:
     """A slippery rod: every window is other than it was, and the same model trained anew has it."""
-    found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.way), -0.2)))
+    found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2)))
     told = trace_json(found)
     assert (told["verdict"], told["kind"], told["covariates"][0]) == ("effect", "mean", "model_inputs")
     assert not told["motion_model_changed"] and found.extended is None

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from even_physics import no_noise, uniform_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run
-from push_predictor.simulation.noise import no_scatter
 from push_predictor.simulation.physics import GRAVITY, Physics
 from push_predictor.simulation.pushes import PusherPath, PushPlan, pusher_path, random_pushes
 from push_predictor.simulation.slider import Slider, polar_moment, slider_named, support_points
-from push_predictor.simulation.surface import uniform_field
 from push_predictor.types import Array
 
 RADIUS = 0.00475
@@ -34,8 +33,8 @@ def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, frictio
         shares=np.full((n, len(points)), 1.0 / len(points)),
         contact_friction=np.full(n, contact_friction),
         surface=uniform_field(friction),
-        pressure=no_scatter(n, len(points)),
-        rubbing=no_scatter(n, 1),
+        load_noise=no_noise(n, len(points)),
+        contact_noise=no_noise(n, 1),
     )
 
 
@@ -120,7 +119,7 @@ SLOW = PushPlan(
 
 @pytest.mark.parametrize(("contact_friction", "sticks"), [(20.0, True), (0.0, False)])
 @pytest.mark.parametrize("shape", ["rect1", "ellip2", "hex"])
-def test_a_slow_push_is_the_one_of_least_dissipation(shape: str, contact_friction: float, sticks: bool) -> None:
+def test_slow_push_minimises_dissipation(shape: str, contact_friction: float, sticks: bool) -> None:
     physics = even_physics(slider_named(shape), len(SLOW), contact_friction)
     expected = least_dissipation_path(physics, SLOW, 0.01, sticks)
     found = at_distance(push(physics, SLOW), SLOW, physics, 0.01)
@@ -129,7 +128,7 @@ def test_a_slow_push_is_the_one_of_least_dissipation(shape: str, contact_frictio
 
 
 @pytest.mark.parametrize("shape", ["rect1", "ellip2"])
-def test_inertia_shows_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
+def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
     plan = random_pushes(40, [0.005], 0.015, np.random.default_rng(1))
     physics = even_physics(slider_named(shape), 40, friction=0.15)
     slowest, slow, fast = (travelled(push(physics, turned(plan, speed))) for speed in (0.005, 0.01, 0.15))
@@ -140,7 +139,7 @@ def test_inertia_shows_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
 
 @given(st.floats(0.05, 0.4), st.floats(-np.pi, np.pi), st.sampled_from(["rect1", "ellip3", "hex"]))
 @settings(max_examples=8, deadline=None)
-def test_a_slider_let_go_stops_where_friction_has_used_up_its_energy(speed: float, way: float, shape: str) -> None:
+def test_free_slider_stops_when_friction_has_dissipated_its_energy(speed: float, way: float, shape: str) -> None:
     velocity = np.array([[speed * np.cos(way), speed * np.sin(way), 0.0]])
     end = travelled(let_go(even_physics(slider_named(shape), 1), velocity))[0]
     assert np.hypot(*end[:2]) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
@@ -148,7 +147,7 @@ def test_a_slider_let_go_stops_where_friction_has_used_up_its_energy(speed: floa
     assert abs(end[2]) < 1e-6
 
 
-def test_friction_only_takes_energy_and_brings_to_rest() -> None:
+def test_friction_dissipates_energy_until_rest() -> None:
     slider = slider_named("ellip2")
     velocity = np.random.default_rng(3).normal(size=(20, 3)) * [0.2, 0.2, 4.0]
     motion = let_go(even_physics(slider, 20), velocity, duration=0.5)
@@ -158,7 +157,7 @@ def test_friction_only_takes_energy_and_brings_to_rest() -> None:
     assert np.all(energy[:, -1] < 1e-12 * energy[:, 0])
 
 
-def test_a_symmetric_rig_pushes_mirror_images_alike() -> None:
+def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
     plan = random_pushes(40, [0.02, 0.2], 0.02, np.random.default_rng(4), angle_limit=1.0)
     mirrored = PushPlan(
         (0.25 - plan.contact) % 1.0, -plan.angle, plan.speed, plan.travel
@@ -168,7 +167,7 @@ def test_a_symmetric_rig_pushes_mirror_images_alike() -> None:
     assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
 
 
-def test_an_even_table_is_the_same_in_every_place_and_direction() -> None:
+def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     plan = random_pushes(20, [0.02, 0.2], 0.02, np.random.default_rng(5))
     poses = np.random.default_rng(6).normal(size=(20, 3)) * [0.03, 0.03, 1.0]
     physics = even_physics(slider_named("hex"), 20)
@@ -177,7 +176,7 @@ def test_an_even_table_is_the_same_in_every_place_and_direction() -> None:
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
 
 
-def test_the_outcome_converges_as_steps_shrink() -> None:
+def test_outcome_converges_with_smaller_time_steps() -> None:
     plan = random_pushes(30, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7))
     physics = even_physics(slider_named("ellip2"), 30)
     path = pusher_path(plan, physics.outline, RADIUS, np.zeros((30, 3)), ACCELERATION)
@@ -187,7 +186,7 @@ def test_the_outcome_converges_as_steps_shrink() -> None:
     assert np.all(usual < coarse)
 
 
-def test_more_surface_friction_changes_the_force_of_a_slow_push_and_not_its_motion() -> None:
+def test_surface_friction_changes_the_force_but_not_the_motion_of_a_slow_push() -> None:
     plan = PushPlan(np.array([0.1, 0.2]), np.array([0.1, 0.4]), np.full(2, 0.005), np.full(2, 0.01))
     light, heavy = (push(even_physics(slider_named("rect1"), 2, friction=f), plan) for f in (0.15, 0.3))
     assert np.all(relative(travelled(heavy) - travelled(light), travelled(light)) < 0.005)
@@ -195,7 +194,7 @@ def test_more_surface_friction_changes_the_force_of_a_slow_push_and_not_its_moti
     assert force[1] / force[0] == pytest.approx(2.0, rel=0.01)
 
 
-def test_pushed_through_its_centre_the_force_is_friction_times_weight() -> None:
+def test_force_through_the_centre_equals_friction_times_weight() -> None:
     plan = PushPlan(np.array([0.125]), np.array([0.0]), np.array([0.01]), np.array([0.01]))
     slider = slider_named("rect1")
     motion = push(even_physics(slider, 1), plan)
@@ -203,7 +202,7 @@ def test_pushed_through_its_centre_the_force_is_friction_times_weight() -> None:
     assert np.max(np.abs(motion.wrench[0, :, 1:])) < 1e-6
 
 
-def test_the_contact_pushes_within_its_friction_cone_and_never_pulls() -> None:
+def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
     plan = random_pushes(60, [0.02, 0.1, 0.3], 0.02, np.random.default_rng(8))
     physics = even_physics(slider_named("ellip3"), 60, contact_friction=0.25)
     motion = push(physics, plan)
@@ -216,7 +215,7 @@ def test_the_contact_pushes_within_its_friction_cone_and_never_pulls() -> None:
     assert np.all(rubbing <= 0.25 * pressing + 1e-9)
 
 
-def test_slider_and_rod_hardly_overlap_and_part_when_the_rod_goes_back() -> None:
+def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
     plan = random_pushes(60, [0.02, 0.1, 0.3], 0.02, np.random.default_rng(9))
     physics = even_physics(slider_named("rect1"), 60)
     motion = push(physics, plan)
@@ -231,7 +230,7 @@ def test_slider_and_rod_hardly_overlap_and_part_when_the_rod_goes_back() -> None
 
 
 @pytest.mark.parametrize("shape", ["rect1", "ellip1", "ellip2", "ellip3", "hex"])
-def test_the_moment_of_inertia_is_that_of_an_even_plate(shape: str) -> None:
+def test_moment_of_inertia_equals_that_of_a_uniform_plate(shape: str) -> None:
     outline = slider_named(shape).outline
     reach = float(np.max(np.abs(outline.vertices)))
     axis = (np.arange(300) + 0.5) / 150.0 * reach - reach

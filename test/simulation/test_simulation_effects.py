@@ -45,7 +45,7 @@ def mean_outcome(spec: SimulationSpec) -> Array:
 
 
 def constant(value: float) -> Changes:
-    return Changes(contact_friction=lambda moment: np.full(len(moment.way), value))
+    return Changes(contact_friction=lambda moment: np.full(len(moment.travelled), value))
 
 
 def streams(recording: Recording) -> list[Array]:
@@ -64,32 +64,32 @@ def streams(recording: Recording) -> list[Array]:
     ]
 
 
-def test_laws_that_change_nothing_change_no_bit() -> None:
+def test_changes_of_zero_leave_the_recording_identical() -> None:
     plan = some_pushes()
     none = Changes(
-        contact_friction=lambda moment: np.zeros(len(moment.way)),
-        load=lambda moment: np.zeros((len(moment.way), 1)),
-        grip=lambda moment: np.ones(len(moment.way)),
-        pull=lambda moment: np.zeros((len(moment.way), 3)),
+        contact_friction=lambda moment: np.zeros(len(moment.travelled)),
+        load=lambda moment: np.zeros((len(moment.travelled), 1)),
+        grip=lambda moment: np.ones(len(moment.travelled)),
+        pull=lambda moment: np.zeros((len(moment.travelled), 3)),
     )
     plain = SimulationSpec("rect1", "abs", plan, seed=3)
     for one, other in zip(streams(simulate(plain)), streams(simulate(replace(plain, changes=none))), strict=True):
         assert np.array_equal(one, other)
 
 
-def test_a_spec_that_went_through_another_process_makes_the_same_recording() -> None:
+def test_pickled_spec_gives_the_same_recording() -> None:
     plain = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
     for one, other in zip(streams(simulate(plain)), streams(simulate(pickle.loads(pickle.dumps(plain)))), strict=True):
         assert np.array_equal(one, other)
 
 
-def test_a_law_of_no_direction_gives_the_same_motion_by_the_directed_way() -> None:
+def test_directed_drag_without_anisotropy_equals_isotropic_drag() -> None:
     spec = spec_of(some_pushes())
-    level = Changes(grain=lambda moment: np.zeros((len(moment.way), 2)))
+    level = Changes(grain=lambda moment: np.zeros((len(moment.travelled), 2)))
     assert push_outcomes(replace(spec, changes=level)).outcomes == pytest.approx(push_outcomes(spec).outcomes, abs=1e-9)
 
 
-def test_more_contact_friction_lets_fewer_pushes_slip() -> None:
+def test_more_contact_friction_reduces_slip() -> None:
     spec = spec_of(middle_pushes(np.array([0.9, -0.9])))
     along_edge = [_slip(replace(spec, changes=constant(change))) for change in (-0.15, 0.0, 0.2)]
     assert along_edge[0] > along_edge[1] > along_edge[2]
@@ -102,16 +102,16 @@ def _slip(spec: SimulationSpec) -> float:
     return float(np.mean([abs(contact[-1] - contact[0]) for contact in by_push]))
 
 
-def test_contact_friction_never_falls_below_none() -> None:
+def test_contact_friction_is_never_negative() -> None:
     spec = spec_of(some_pushes(4))
     assert mean_outcome(replace(spec, changes=constant(-9.0))) == pytest.approx(
         mean_outcome(replace(spec, changes=constant(-0.25))), abs=1e-12
     )
 
 
-def test_a_slippery_table_changes_the_force_and_not_the_motion() -> None:
+def test_lower_table_friction_changes_the_force_but_not_the_motion() -> None:
     spec = spec_of(some_pushes())
-    half = replace(spec, changes=Changes(grip=lambda moment: np.full(len(moment.way), 0.5)))
+    half = replace(spec, changes=Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)))
     plain, slippery = push_outcomes(spec).outcomes, push_outcomes(half).outcomes
     assert np.max(np.abs(slippery - plain)) < 0.03 * np.max(np.abs(plain))
     assert _largest_force(half) == pytest.approx(0.5 * _largest_force(spec), rel=0.05)
@@ -124,7 +124,7 @@ def _largest_force(spec: SimulationSpec) -> float:
     return float(np.median(force[force > 0.0]))
 
 
-def test_ballast_on_the_centre_changes_the_force_and_not_the_motion() -> None:
+def test_mass_added_at_the_centre_changes_the_force_but_not_the_motion() -> None:
     spec = spec_of(some_pushes())
     loaded = replace(spec, changes=Changes(added_mass=0.4))
     plain, heavy = push_outcomes(spec).outcomes, push_outcomes(loaded).outcomes
@@ -132,7 +132,7 @@ def test_ballast_on_the_centre_changes_the_force_and_not_the_motion() -> None:
     assert _largest_force(loaded) == pytest.approx((1.0 + 0.4 / spec.slider.mass) * _largest_force(spec), rel=0.05)
 
 
-def test_a_slider_that_presses_at_its_rim_turns_less() -> None:
+def test_slider_with_load_on_its_rim_turns_less() -> None:
     spec = spec_of(PushPlan(np.full(2, 0.19), np.zeros(2), np.full(2, 0.02), np.full(2, 0.012)))
     points = support_points(spec.slider.outline)
     rim = np.sum(points**2, axis=1) / np.mean(np.sum(points**2, axis=1)) - 1.0
@@ -143,7 +143,7 @@ def test_a_slider_that_presses_at_its_rim_turns_less() -> None:
     assert turns[0] > turns[1] > turns[2]
 
 
-def test_a_load_off_the_centre_turns_the_slider_towards_the_other_side() -> None:
+def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     spec = spec_of(middle_pushes(np.zeros(1)))
     x = support_points(spec.slider.outline)[:, 0]
     heading = spec.slider.outline.inward_normal(np.array([0.125]))[0]
@@ -153,12 +153,12 @@ def test_a_load_off_the_centre_turns_the_slider_towards_the_other_side() -> None
     assert mean_outcome(loaded)[2] > 0.005  # the heavy left side stays behind: it turns to the left
 
 
-def test_grain_of_the_table_has_period_pi_in_the_heading_and_changes_sign_at_right_angles() -> None:
+def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
     plan = middle_pushes(np.zeros(1))
 
     def turned(heading: float) -> Array:
         """What the grain does to a push of a slider with this heading."""
-        grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.way), 1)))
+        grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.travelled), 1)))
         spec = replace(spec_of(plan), turn_spread=1.0)
         return _at_heading(replace(spec, changes=grain), heading) - _at_heading(spec, heading)
 
@@ -174,15 +174,15 @@ def _at_heading(spec: SimulationSpec, heading: float) -> Array:
     return mean_outcome(replace(spec, turn_spread=heading / drawn))
 
 
-def test_grain_of_the_underside_turns_with_the_slider() -> None:
+def test_grain_of_the_slider_turns_with_it() -> None:
     def grain(moment: Moment) -> Array:
-        return rotate(np.tile([0.0, 0.4], (len(moment.way), 1)), 2.0 * moment.pose[:, 2])
+        return rotate(np.tile([0.0, 0.4], (len(moment.travelled), 1)), 2.0 * moment.pose[:, 2])
 
     spec = replace(spec_of(middle_pushes(np.zeros(1))), changes=Changes(grain=grain))
     assert _at_heading(spec, 0.9) == pytest.approx(_at_heading(spec, -0.5), rel=0.02, abs=1e-7)
 
 
-def test_a_tilted_table_draws_the_slider_downhill() -> None:
+def test_tilted_table_pulls_the_slider_downhill() -> None:
     spec = spec_of(middle_pushes(np.zeros(1)))
     ahead = spec.slider.outline.inward_normal(np.array([0.125]))[0]
     left = np.array([-ahead[1], ahead[0], 0.0])
@@ -193,15 +193,15 @@ def test_a_tilted_table_draws_the_slider_downhill() -> None:
     assert outcomes[0] < outcomes[1] < outcomes[2]
 
 
-def test_a_resting_slider_holds_on_a_gentle_slope() -> None:
+def test_resting_slider_stays_on_a_gentle_slope() -> None:
     spec = spec_of(middle_pushes(np.zeros(1)), changes=Changes(pull=lambda moment: np.array([[0.3, 0.3, 0.0]])))
     (batch,) = run_pushes(spec)
     untouched = batch.motion.time[0] < 0.1
     assert np.max(np.abs(batch.motion.slider[0, untouched, :2])) < 1e-4
 
 
-def test_viscous_drag_costs_force_in_proportion_to_speed() -> None:
-    drag = Changes(viscosity=lambda moment: np.full(len(moment.way), 20.0))
+def test_viscous_drag_is_proportional_to_speed() -> None:
+    drag = Changes(viscosity=lambda moment: np.full(len(moment.travelled), 20.0))
     added = []
     for speed in (0.02, 0.04):
         spec = spec_of(middle_pushes(np.zeros(1), speed))
@@ -210,7 +210,7 @@ def test_viscous_drag_costs_force_in_proportion_to_speed() -> None:
     assert added[1] == pytest.approx(2.0 * added[0], rel=0.15)
 
 
-def test_conditions_are_those_that_the_window_finder_sees() -> None:
+def test_conditions_equal_the_covariates_of_the_window_finder() -> None:
     plan = random_pushes(25, [0.02, 0.03], 0.012, np.random.default_rng(8), angle_limit=0.5)
     pauses = np.random.default_rng(1).exponential(1.0, 25)
     spec = replace(SimulationSpec("rect1", "abs", plan, seed=2), sensors=QUIET, pauses=pauses)
@@ -219,7 +219,7 @@ def test_conditions_are_those_that_the_window_finder_sees() -> None:
 
     def note(moment: Moment) -> Array:
         seen[0] = moment.conditions
-        return np.zeros(len(moment.way))
+        return np.zeros(len(moment.travelled))
 
     table = _found(simulate(replace(spec, changes=Changes(contact_friction=note))))
     first = table.take(np.unique(table.push_id, return_index=True)[1])
@@ -238,7 +238,7 @@ def _found(recording: Recording) -> PushTable:
     return windows_to_table(find_windows(recording, recording.rig))
 
 
-def test_a_topic_is_recorded_beside_the_pushes_and_leaves_them_alone() -> None:
+def test_recorded_topic_does_not_change_the_pushes() -> None:
     spec = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
     topic = Topic(np.array([0.0, 60.0]), np.array([5.0, 65.0]))
     with_topic = simulate(replace(spec, topics={"room/light": topic}))
@@ -249,7 +249,7 @@ def test_a_topic_is_recorded_beside_the_pushes_and_leaves_them_alone() -> None:
         assert np.array_equal(one, other)
 
 
-def test_pauses_come_before_the_pushes() -> None:
+def test_pauses_delay_the_pushes() -> None:
     spec = SimulationSpec("rect1", "abs", some_pushes(3), seed=3, sensors=QUIET)
     plain, paused = (
         simulate(replace(spec, pauses=pauses)).pusher.stamp for pauses in (None, np.array([0.0, 4.0, 1.0]))
@@ -257,7 +257,7 @@ def test_pauses_come_before_the_pushes() -> None:
     assert (paused[-1] - paused[0]) / 1e9 == pytest.approx((plain[-1] - plain[0]) / 1e9 + 5.0, abs=0.05)
 
 
-def test_a_late_clock_delays_the_tracker_alone() -> None:
+def test_clock_offset_delays_only_the_tracker() -> None:
     plain, late = _both(Faults(clock_offset=0.02))
     moved = np.interp(late.slider.stamp - 20_000_000, plain.slider.stamp, plain.slider.x)
     inside = slice(10, -10)
@@ -265,14 +265,14 @@ def test_a_late_clock_delays_the_tracker_alone() -> None:
     assert np.array_equal(late.pusher.x, plain.pusher.x)
 
 
-def test_a_moved_tracker_frame_turns_and_shifts_the_slider_alone() -> None:
+def test_tracker_frame_error_moves_only_the_slider() -> None:
     plain, moved = _both(Faults(frame_rotation=0.1, frame_shift=(0.01, -0.02)))
     expected = rotate(np.column_stack([plain.slider.x, plain.slider.y]), np.array(0.1)) + [0.01, -0.02]
     assert np.column_stack([moved.slider.x, moved.slider.y]) == pytest.approx(expected, abs=1e-5)
     assert np.array_equal(moved.pusher.x, plain.pusher.x)
 
 
-def test_a_shifted_tool_point_and_a_biased_wrench_show_in_their_own_streams() -> None:
+def test_tool_offset_and_wrench_bias_affect_only_their_streams() -> None:
     plain, faulty = _both(Faults(tool_offset=(0.002, 0.001), wrench_bias=(0.3, 0.0, 0.01)))
     assert faulty.pusher.x - plain.pusher.x == pytest.approx(0.002, abs=1e-5)
     assert faulty.pusher.y - plain.pusher.y == pytest.approx(0.001, abs=1e-5)
@@ -281,7 +281,7 @@ def test_a_shifted_tool_point_and_a_biased_wrench_show_in_their_own_streams() ->
     assert np.array_equal(faulty.slider.x, plain.slider.x)
 
 
-def test_a_rod_bends_with_the_force_and_only_then() -> None:
+def test_compliant_rod_bends_only_under_force() -> None:
     plain, bent = _both(Faults(compliance=5e-4))
     assert plain.wrench is not None
     away = np.hypot(bent.pusher.x - plain.pusher.x, bent.pusher.y - plain.pusher.y)

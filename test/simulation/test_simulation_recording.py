@@ -52,27 +52,27 @@ def test_stamps_increase_and_the_clocks_differ(simulated: Recording) -> None:
     assert len(np.intersect1d(streams[0], streams[1])) < 0.2 * len(streams[0])
 
 
-def test_the_same_spec_makes_the_same_recording(simulated: Recording) -> None:
+def test_same_spec_gives_the_same_recording(simulated: Recording) -> None:
     again = simulate(spec_of())
     assert np.array_equal(again.slider.stamp, simulated.slider.stamp)
     assert np.array_equal(again.slider.heading, simulated.slider.heading)
 
 
-def test_other_seeds_and_other_pushes_never_share_stamps(simulated: Recording) -> None:
+def test_recordings_of_different_specs_share_no_stamps(simulated: Recording) -> None:
     rest = spec_of(2, 3)
     others = (simulate(rest), simulate(spec_of(3, 3)), simulate(spec_of(2, 4)))
     spans = sorted((r.slider.stamp[0], r.slider.stamp[-1]) for r in (simulated, *others))
     assert all(before[1] < after[0] for before, after in pairwise(spans))
 
 
-def test_the_tracker_is_as_noisy_as_it_says() -> None:
+def test_tracker_noise_has_the_specified_standard_deviation() -> None:
     quiet = Sensors(dropout_interval=0.0)
     stream = simulate(spec_of(pushes=6, sensors=quiet)).slider
     resting = np.abs(np.diff(stream.x, 2)) < 3e-4  # second differences: sd is sqrt(6) times that of a sample
     assert np.std(np.diff(stream.x, 2)[resting]) / np.sqrt(6.0) == pytest.approx(quiet.tracker_noise, rel=0.3)
 
 
-def test_dropouts_come_as_often_as_asked_and_not_otherwise() -> None:
+def test_dropouts_occur_at_the_specified_rate() -> None:
     gaps = [
         np.sum(np.diff(simulate(spec_of(sensors=Sensors(dropout_interval=interval))).slider.stamp) > 25_000_000)
         for interval in (0.0, 2.0)
@@ -81,7 +81,7 @@ def test_dropouts_come_as_often_as_asked_and_not_otherwise() -> None:
     assert gaps[1] >= 3
 
 
-def test_the_slider_moves_only_when_pushed_or_while_the_tip_is_lifted(simulated: Recording) -> None:
+def test_slider_moves_only_when_pushed_or_reset(simulated: Recording) -> None:
     slider = simulated.slider
     pushed = np.hypot(simulated.wrench.fx, simulated.wrench.fy) > 0.4
     touched = np.interp(slider.stamp, simulated.wrench.stamp, pushed) > 0.0
@@ -92,7 +92,7 @@ def test_the_slider_moves_only_when_pushed_or_while_the_tip_is_lifted(simulated:
     assert np.all(coasting[1:][moved])
 
 
-def test_nothing_is_felt_while_the_tip_is_lifted(simulated: Recording) -> None:
+def test_force_is_zero_while_the_tip_is_lifted(simulated: Recording) -> None:
     wrench = simulated.wrench
     assert wrench is not None
     lifted = lifted_at(simulated, wrench.stamp)
@@ -100,7 +100,7 @@ def test_nothing_is_felt_while_the_tip_is_lifted(simulated: Recording) -> None:
     assert np.max(np.abs(wrench.fx[lifted])) < 0.2 < np.percentile(np.hypot(wrench.fx, wrench.fy), 90)
 
 
-def test_the_rig_record_says_what_was_simulated(simulated: Recording) -> None:
+def test_rig_record_equals_the_simulated_rig(simulated: Recording) -> None:
     rig = simulated.rig
     assert rig is not None
     assert (rig.shape, rig.surface, rig.object_mass) == ("rect1", "abs", 0.837)
@@ -108,7 +108,7 @@ def test_the_rig_record_says_what_was_simulated(simulated: Recording) -> None:
     assert np.sum(rig.support_points[:, 2]) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_a_written_recording_reads_back(simulated: Recording, tmp_path: Path) -> None:
+def test_written_recording_reads_back(simulated: Recording, tmp_path: Path) -> None:
     write_recording(tmp_path / "bag", simulated)
     back = read_recording(tmp_path / "bag")
     assert np.array_equal(back.slider.stamp, simulated.slider.stamp)
@@ -118,7 +118,7 @@ def test_a_written_recording_reads_back(simulated: Recording, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("shape", "surface"), [("rect1", "abs"), ("ellip2", "plywood")])
-def test_windows_found_in_the_streams_are_those_of_the_true_motion(shape: str, surface: str) -> None:
+def test_windows_of_the_streams_agree_with_the_true_motion(shape: str, surface: str) -> None:
     plan = random_pushes(30, [0.02, 0.05], 0.025, np.random.default_rng(11), angle_limit=0.9)
     spec = SimulationSpec(shape, surface, plan, seed=5, sensors=Sensors(dropout_interval=0.0))
     recording = simulate(spec)
@@ -130,7 +130,7 @@ def test_windows_found_in_the_streams_are_those_of_the_true_motion(shape: str, s
     assert np.mean(found.inputs[:, 0]) == pytest.approx(np.mean(true.inputs[:, 0]), rel=0.05)
 
 
-def test_pushes_go_as_planned() -> None:
+def test_recorded_pushes_follow_the_plan() -> None:
     plan = PushPlan(np.array([0.1, 0.6]), np.array([0.4, -0.7]), np.array([0.02, 0.05]), np.full(2, 0.02))
     table = push_outcomes(SimulationSpec("ellip2", "delrin", plan, seed=1))
     first = table.take(np.unique(table.push_id, return_index=True)[1])
@@ -139,7 +139,7 @@ def test_pushes_go_as_planned() -> None:
     assert first.inputs[:, 2] == pytest.approx(plan.angle, abs=0.01)
 
 
-def test_recordings_are_made_more_than_twenty_times_faster_than_they_last() -> None:
+def test_simulation_is_more_than_twenty_times_faster_than_real_time() -> None:
     spec = spec_of(pushes=40)
     begin = time.process_time()
     recording = simulate(spec)
@@ -147,7 +147,7 @@ def test_recordings_are_made_more_than_twenty_times_faster_than_they_last() -> N
     assert seconds(recording.slider)[-1] > 20.0 * taken
 
 
-def test_a_wrong_plan_or_rig_is_refused_by_name() -> None:
+def test_invalid_plan_or_rig_is_rejected_by_name() -> None:
     with pytest.raises(RequestError, match=r"angle: 1\.6"):
         grid_pushes([0.1], [1.6], 2)
     with pytest.raises(RequestError, match=r"speed: -0\.02"):
@@ -161,7 +161,7 @@ def test_a_wrong_plan_or_rig_is_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("name", ["circle_pu", "hexagon_delrin"])
-def test_the_kept_bags_are_what_their_command_makes(name: str) -> None:
+def test_committed_bags_equal_the_output_of_their_command(name: str) -> None:
     kept, made = read_recording(BAGS / name), simulate(standard_bags()[name])
     assert np.array_equal(kept.slider.stamp, made.slider.stamp)
     assert np.array_equal(kept.pusher.stamp, made.pusher.stamp)
@@ -169,7 +169,7 @@ def test_the_kept_bags_are_what_their_command_makes(name: str) -> None:
     assert np.max(np.abs(kept.slider.x - made.slider.x)) < 1e-4
 
 
-def test_the_kept_bags_are_all_there_and_small() -> None:
+def test_all_committed_bags_exist_and_are_small() -> None:
     names = set(standard_bags())
     assert {path.parent.name for path in BAGS.glob("*/metadata.yaml")} >= names
     assert sum(path.stat().st_size for name in names for path in (BAGS / name).iterdir()) < 8e6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout
+from push_predictor.recordings.bag.cdr import Layout
 
 _RULE = "=" * 80
 HEADER_DEFINITION = f"""{_RULE}
@@ -66,8 +66,6 @@ FLOAT64 = MessageType(
     "RIHS01_705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a",
 )
 
-POSE_LAYOUTS = {POSE.name: POSE_STAMPED}
-WRENCH_LAYOUTS = {WRENCH.name: WRENCH_STAMPED}
 SCALAR_LAYOUTS = {
     FLOAT64.name: Layout(header=False, count=1),
     "std_msgs/msg/Float32": Layout(header=False, count=1, size=4),

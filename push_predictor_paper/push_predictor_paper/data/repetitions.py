@@ -105,13 +105,6 @@ class RepeatedGrid:
         """Mean measured inputs (len(seen), 3) of these: where a model is asked."""
         return np.array([cell.inputs.mean(axis=0) for cell in self.seen])
 
-    @property
-    def commanded_inputs(self) -> Array:
-        """Commanded inputs (A * C, 3), angle by angle: where a model's map is drawn."""
-        angle, fraction = (grid.ravel() for grid in np.meshgrid(self.angles, self.fractions, indexing="ij"))
-        contact = contact_on_first_side(self.rig.outline, fraction)
-        return np.column_stack([np.full(angle.size, GRID_SPEED), contact, angle])
-
     def _map(self, values: list[Array]) -> Array:
         shape = (len(self.fractions), len(self.angles), 3)
         return np.asarray(np.transpose(np.reshape(values, shape), (1, 0, 2)))
