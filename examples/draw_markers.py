@@ -163,7 +163,7 @@ def _paint(figure: Figure, box: tuple[float, float, float, float], array: Marker
 def _centre(array: MarkerArray) -> np.ndarray:
     """Middle of the slider's outline before the push."""
     (start,) = (marker for marker in array.markers if marker.ns == "start_outline")
-    return np.mean([[point.x, point.y] for point in start.points[:-1]], axis=0)
+    return np.asarray(np.mean([[point.x, point.y] for point in start.points[:-1]], axis=0))
 
 
 def _hear_all(heard: Listener, spin: Callable[[float], None]) -> None:

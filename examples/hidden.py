@@ -70,7 +70,8 @@ def _drawn(spec: SimulationSpec, rng: np.random.Generator) -> tuple[Changes, Map
 def _later(changes: Changes) -> Changes:
     """The same from push PLAIN on, nothing before."""
     laws = {f.name: getattr(changes, f.name) for f in fields(changes) if f.name != "added_mass"}
-    return replace(changes, **{name: _gated(law) for name, law in laws.items() if law is not None})
+    gated: dict[str, Any] = {name: _gated(law) for name, law in laws.items() if law is not None}
+    return replace(changes, **gated)
 
 
 def _gated(law: Law) -> Law:

@@ -169,7 +169,7 @@ def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate
 def _print_scores(story: Story) -> None:
     print(f"   the {story.n_later} pushes after the trace, which it never saw, by both models:")
     for label, comparison in story.later.items():
-        score = metrics_json(comparison)
+        score: dict[str, Any] = metrics_json(comparison)
         spans = score["interval"]
         nmse, nlpd = (f"({spans[key]['low']:.2f} to {spans[key]['high']:.2f})" for key in ("nmse", "nlpd"))
         print(f"   {label:20s} NMSE {score['nmse']['total']:6.3f} {nmse}   NLPD {score['nlpd']['total']:7.2f} {nlpd}")

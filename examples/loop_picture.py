@@ -63,7 +63,9 @@ def draw_story(path: Path, story: Story, verdict: Mapping[str, Any], truth: Mapp
     """The residual of every push with the alarm and the trace, and the error of the rest by both models."""
 
     def paint(figure: Figure) -> None:
-        layout = figure.subplot_mosaic([["story", "story"], ["nmse", "nlpd"]], height_ratios=[2.2, 1.0])
+        layout: dict[str, Axes] = figure.subplot_mosaic(
+            [["story", "story"], ["nmse", "nlpd"]], height_ratios=[2.2, 1.0]
+        )
         _paint_story(layout["story"], story, int(truth["from push"]))
         layout["story"].set_title(_title(verdict, truth), loc="left")
         for key, name in (("nmse", "NMSE"), ("nlpd", "NLPD (nats, SI units)")):
@@ -137,7 +139,7 @@ def _running(score: Array, cuts: tuple[int, ...]) -> tuple[Array, Array]:
 
 def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
     for row, (label, comparison) in enumerate(story.later.items()):
-        score = metrics_json(comparison)
+        score: dict[str, Any] = metrics_json(comparison)
         value, span = score[key]["total"], score["interval"][key]
         colour = BLUE if label == DEPLOYED else ORANGE
         axes.errorbar(

@@ -122,7 +122,8 @@ def _group(seed: int, number: int) -> str:
 
 
 def _is_made(options: argparse.Namespace, number: int) -> bool:
-    return (options.truth / f"{number:03d}.json").exists() and (options.out / f"{number:03d}" / MODEL).exists()
+    truth, made = options.truth / f"{number:03d}.json", options.out / f"{number:03d}" / MODEL
+    return bool(truth.exists() and made.exists())
 
 
 def _make_kept(number: int, size: Size, options: argparse.Namespace) -> None:

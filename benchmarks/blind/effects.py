@@ -288,8 +288,12 @@ class _Extra:
         return self.noise.take(moment.conditions.row).at(moment.travelled)
 
 
-def _fault(name: str, value: float, strength: Strength, world: World) -> Faults:
-    return Faults(**{name: value})
+def _late_clock(value: float, strength: Strength, world: World) -> Faults:
+    return Faults(clock_offset=value)
+
+
+def _turned_frame(value: float, strength: Strength, world: World) -> Faults:
+    return Faults(frame_rotation=value)
 
 
 def _fault_along(name: str, value: float, strength: Strength, world: World) -> Faults:
@@ -345,9 +349,9 @@ WRENCH_ONLY = (
          constant=("velocity", "model_inputs")),
 )  # fmt: skip
 MEASUREMENT = (
-    Kind("clock_offset", ("clock_offset",), "measurement", "s", (0.005, 0.015, 0.04), partial(_fault, "clock_offset")),
+    Kind("clock_offset", ("clock_offset",), "measurement", "s", (0.005, 0.015, 0.04), _late_clock),
     Kind("frame_rotation", ("frame_rotation",), "measurement", "rad", (0.01, 0.03, 0.08),
-         partial(_fault, "frame_rotation")),
+         _turned_frame),
     Kind("frame_shift", ("frame_shift",), "measurement", "m", (3e-4, 1e-3, 2.5e-3),
          partial(_fault_along, "frame_shift")),
     Kind("tool_offset", ("tool_offset", "frame_shift"), "measurement", "m", (3e-4, 1e-3, 2.5e-3),

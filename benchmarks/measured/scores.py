@@ -56,7 +56,7 @@ def figures(push_scores: PushScores) -> str:
     totals = push_scores.totals()
     nmse, nlpd = by_push(push_scores, total_nmse), by_push(push_scores, total_nlpd)
     exact = "" if _gaussian(push_scores) else f"{total(push_scores, 'exact_nlpd'):.2f}"
-    cells = (f"{nmse.value:.3f} ({_listed(totals.nmse[0], '.3f')})", _between(nmse, ".2f"))
+    cells: tuple[str, ...] = (f"{nmse.value:.3f} ({_listed(totals.nmse[0], '.3f')})", _between(nmse, ".2f"))
     cells += (f"{nlpd.value:.2f}", _between(nlpd, ".2f"), exact, _listed(totals.coverage[0, :, WITHIN], ".2f"))
     return " | ".join(cells)
 

@@ -56,4 +56,5 @@ def drifting_effect(mechanism: str | None, *size: float) -> Effect:
 
 def extended_model(base: PushModel, *effects: Effect) -> PushModel:
     """The base with these effects."""
+    assert not isinstance(base.predictor, ExtendedPredictor)
     return replace(base, predictor=ExtendedPredictor(base.predictor, square_physics(), effects, np.ones(3)))

@@ -7,11 +7,19 @@ log_noise_variance, (q, k) each, the library's version, and seconds, the CPU tim
 library and numpy besides the peer; nothing of this project.
 """
 
+from __future__ import annotations
+
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+Array = npt.NDArray[np.float64]
+Predict = Callable[[Array], tuple[Array, Array, Array, Array]]  # means and variances of signal and log noise
+Fit = Callable[[Array, Array, int, int], Predict]  # of inputs, outputs, number of inducing inputs, steps
 NAMES = ("mean", "variance", "log_noise_mean", "log_noise_variance")
 
 
@@ -25,11 +33,11 @@ def main() -> None:
     predictors = [fit(x, column, int(inducing), int(steps)) for column in outputs.T]
     seconds = time.process_time() - start
     columns = [predict(new) for predict in predictors]
-    found = {name: np.column_stack([column[k] for column in columns]) for k, name in enumerate(NAMES)}
-    np.savez(predictions, seconds=seconds, version=version, **found)
+    found: dict[str, Any] = {name: np.column_stack([column[k] for column in columns]) for k, name in enumerate(NAMES)}
+    np.savez(predictions, **found, seconds=seconds, version=version)
 
 
-def gpflow_fit():
+def gpflow_fit() -> tuple[Fit, str]:
     """Heteroskedastic SVGP as in GPflow's own notebook: natural gradients for q(f, g), Adam for kernels and inducing
     inputs, which begin at random rows. Its g is the log of the noise's standard deviation.
     """
@@ -39,7 +47,7 @@ def gpflow_fit():
     tf.config.threading.set_intra_op_parallelism_threads(1)
     tf.config.threading.set_inter_op_parallelism_threads(1)
 
-    def fit(x, y, inducing, steps):
+    def fit(x: Array, y: Array, inducing: int, steps: int) -> Predict:
         kernels = [gpflow.kernels.SquaredExponential(lengthscales=np.ones(x.shape[1])) for _ in range(2)]
         chosen = x[np.random.default_rng(0).permutation(len(x))[:inducing]]
         points = [gpflow.inducing_variables.InducingPoints(chosen.copy()) for _ in range(2)]
@@ -54,18 +62,18 @@ def gpflow_fit():
         loss = model.training_loss_closure((x, y[:, None]))
         natural, adam = gpflow.optimizers.NaturalGradient(gamma=0.1), tf.keras.optimizers.Adam(0.01)
 
-        @tf.function
-        def step():
+        def step() -> None:
             natural.minimize(loss, [(model.q_mu, model.q_sqrt)])
             with tf.GradientTape() as tape:
                 value = loss()
             variables = model.trainable_variables
             adam.apply_gradients(zip(tape.gradient(value, variables), variables, strict=True))
 
+        compiled = tf.function(step)
         for _ in range(steps):
-            step()
+            compiled()
 
-        def predict(new):
+        def predict(new: Array) -> tuple[Array, Array, Array, Array]:
             mean, variance = (values.numpy() for values in model.predict_f(new))
             return mean[:, 0], variance[:, 0], 2.0 * mean[:, 1], 4.0 * variance[:, 1]
 
@@ -74,17 +82,17 @@ def gpflow_fit():
     return fit, gpflow.__version__
 
 
-def hetgpy_fit():
+def hetgpy_fit() -> tuple[Fit, str]:
     """A port of R's hetGP, built for repeated inputs; its noise is one number an input."""
     from importlib.metadata import version
 
     from hetgpy import hetGP
 
-    def fit(x, y, inducing, steps):
+    def fit(x: Array, y: Array, inducing: int, steps: int) -> Predict:
         model = hetGP()
         model.mleHetGP(x, y, covtype="Gaussian")
 
-        def predict(new):
+        def predict(new: Array) -> tuple[Array, Array, Array, Array]:
             found = model.predict(new)
             return found["mean"], found["sd2"], np.log(found["nugs"]), np.zeros(len(new))
 

@@ -14,6 +14,7 @@ import argparse
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def main() -> None:
     print("rows          n  kernels          sklearn    GP   VHGP    GP   VHGP    peak      rebuild  1 push  1000")
     for n in arguments.sizes:
         for title, inputs, outputs in rows(n, arguments.data):
-            reference, _ = cpu_seconds(lambda x=inputs, y=outputs: [fit_reference(x, column) for column in y.T])
+            reference, _ = cpu_seconds(partial(fit_references, inputs, outputs))
             for name, choice in CHOICES.items():
                 print(
                     f"{title:10s} {len(inputs):5d}  {name:16s} {costs(inputs, outputs, choice, reference)}", flush=True
@@ -103,6 +104,11 @@ def fit_reference(inputs: Array, outputs: Array) -> GaussianProcessRegressor:
     return GaussianProcessRegressor(ConstantKernel() * RBF(np.ones(inputs.shape[1])) + WhiteKernel(0.1)).fit(
         inputs, outputs
     )
+
+
+def fit_references(inputs: Array, outputs: Array) -> list[GaussianProcessRegressor]:
+    """scikit-learn's GP for each output (columns)."""
+    return [fit_reference(inputs, column) for column in outputs.T]
 
 
 def cpu_seconds(work: Callable[[], Any]) -> tuple[float, Any]:

@@ -98,7 +98,7 @@ def _report(tabulated: TabulatedModel, title: str, cases: Sequence[Steps], truth
         samples = [distribution(tabulated, steps) for steps in cases]
         energies = [EnergyDistance(s, t, ARM) for s, t in zip(samples, truth, strict=True)]
         drawn = MILLIMETRES * np.mean([[e.value(w) for w in weights] for e in energies], axis=0)
-        value = MILLIMETRES * np.mean([e.value() for e in energies])
+        value = MILLIMETRES * float(np.mean([e.value() for e in energies]))
         first = drawn if first is None else first
         divergence = np.mean([gaussian_divergence(s, t) for s, t in zip(samples, truth, strict=True)])
         covered = np.mean([inside(s, t) for s, t in zip(samples, truth, strict=True)], axis=(0, 1))

@@ -34,9 +34,9 @@ def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
     inward = outline.inward_normal(np.array([CONTACT]))[0]
     ahead = np.arctan2(inward[1], inward[0])
     truth = repeats(CONTACT, ANGLE, SPEED, TIMES, COUNT, 500).poses
-    steps = [[SPEED, CONTACT, ANGLE, float(time)] for time in TIMES]
+    steps = [np.array([[SPEED, CONTACT, ANGLE, float(time)]]) for time in TIMES]
     # One seed: the samples of a shorter push are those of the longer one at that time.
-    predicted = [rollout(tabulated, np.zeros(3), np.zeros((3, 3)), [step], COUNT).samples for step in steps]
+    predicted = [rollout(tabulated, np.zeros(3), np.zeros((3, 3)), step, COUNT).samples for step in steps]
     for time, samples, seen in zip(TIMES, predicted, truth, strict=True):
         p = p_values(np.concatenate([dip(samples[None, :, 2]), dip(seen[None, :, 2])]), COUNT, DIP_DRAWS)
         print(f"{1e3 * SPEED * time:.0f} mm: one mode of the heading, p = {p[0]:.2g} of samples, {p[1]:.2g} of repeats")

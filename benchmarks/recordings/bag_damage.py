@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import lz4.frame
 import zstandard
@@ -71,7 +72,7 @@ class Copy:
     near: tuple[int, int]
 
 
-_OPTIONS: dict[str, dict[str, object]] = {
+_OPTIONS: dict[str, dict[str, Any]] = {
     "zstd": {"compression": CompressionType.ZSTD},
     "lz4": {"compression": CompressionType.LZ4},
     "no compression": {"compression": CompressionType.NONE},
@@ -317,7 +318,7 @@ def _large(form: Form) -> list[Unit]:
 # The whole bags
 
 
-def _form(name: str, options: dict[str, object]) -> Form:
+def _form(name: str, options: dict[str, Any]) -> Form:
     packed = name.split()[0].removesuffix("s") if name.endswith("compressed") else ""
     mcap = _written({"chunk_size": CHUNK_SIZE, **options}, packed == "message")
     disk = zstandard.compress(mcap) if packed == "file" else mcap
@@ -329,11 +330,11 @@ def _form(name: str, options: dict[str, object]) -> Form:
     return Form(name, disk, mcap, checked, summed, packed, units, messages, largest)
 
 
-def _written(options: dict[str, object], pack: bool) -> bytes:
+def _written(options: dict[str, Any], pack: bool) -> bytes:
     from io import BytesIO
 
     random, stream = Random(1), BytesIO()
-    writer = Writer(stream, **options)  # type: ignore[arg-type]  # options are told by name
+    writer = Writer(stream, **options)
     writer.start(profile="ros2")
     pose = writer.register_schema(POSE, "ros2msg", b"# a pose")
     text = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")

@@ -35,6 +35,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from typing import Any
 
 from benchmarks.recordings.bag_damage import KINDS, Copy, Form, damaged, forms, write_form
 from push_predictor.errors import PushPredictorError
@@ -154,7 +155,7 @@ def _read(path: Path, copy: Copy) -> Reading:
         used, given, strange, notes, refused, held = _messages(path, copy)
         growth = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - grown)
         try:
-            described = describe_recording(path)
+            described: dict[str, Any] = describe_recording(path)
             notes += tuple(map(str, described["notes"]))
         except (PushPredictorError, OSError):
             pass
