@@ -22,7 +22,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.nodes.validator.window_table import put_aside
+from push_predictor.online.window_table import put_aside
 from push_predictor.recordings import atomic_append as whole_lines
 from push_predictor.recordings.atomic_append import append_lines
 from push_predictor.recordings.load import load_data, load_rig_for
@@ -115,7 +115,7 @@ def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_mis
                     assert wait_until(lambda: len(planner.answers) > before + 10)
                     planner.stop()
                     logged = process.wait_for_text(WRITTEN, 120.0)
-    assert "requests were sent again" in logged and "none was given up" in logged
+    assert "Requests sent again:" in logged and "given up: 0" in logged
     assert_same_as_offline(tmp_path, model)
     said = capfd.readouterr().err
     assert "predict_push_batch: no answer within 0.5 s, asking again" in said
@@ -198,11 +198,11 @@ def test_a_killed_validator_leaves_what_it_measured_the_next_one_keeps_it_and_ou
             with replaying(domain, rate=2.0) as replay:
                 assert wait_until(lambda: len(heard) >= before + 20, 60.0)
                 kill(replay)
-            said = status.wait_for_message("no sample for over 5 s", 60.0)
-            assert "~/finish has it written" in said and status.values["state"] == "validating"
+            said = status.wait_for_message("No data for 5 s.", 60.0)
+            assert "Call `~/finish` to write the results." in said and status.values["state"] == "validating"
             assert finish(node).success
             (kept,) = tmp_path.glob("cut_off_*")
-            assert f"are in {kept}; it has no validation.json" in process.text()
+            assert f"are saved in {kept}. It has no validation.json" in process.text()
     assert {path.name for path in kept.iterdir()} == {"pushes.csv", "pushes.rig.yaml", "residuals.csv"}
     assert len(read_table(kept / "residuals.csv")) == len(left)
     assert not (tmp_path / "residuals.csv").exists()  # now there is the bag

@@ -34,18 +34,18 @@ from push_predictor.models.request import FARTHEST, PushRequest, check_request, 
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import push_validator
 from push_predictor.nodes.parameters import Param, declare
 from push_predictor.nodes.replay import options as replay_options
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.server.answers import answer_batch, answer_push
+from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes
 
 NAN, INF = math.nan, math.inf
 TABLES = {
     "predict_server": server_parameters.PARAMETERS,
-    "push_validator": push_validator.PARAMETERS,
+    "push_validator": validator_parameters.PARAMETERS,
     "push_replay": replay_options.PARAMETERS,
 }
 

@@ -21,9 +21,8 @@ from validator_bench import HEXAGON, Status
 from msg_adapters.stamps import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.validator import stream_sync as stream_pace
-from push_predictor.nodes.validator.sensor_subscriber import Samples
-from push_predictor.nodes.validator.stream_sync import LAGS, StreamPace
+from push_predictor.online import stream_sync
+from push_predictor.online.stream_sync import LAGS, Samples, StreamSync
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
@@ -160,7 +159,7 @@ def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) 
         assert int(values["slider dropouts"]) >= 1 + 7  # and between the pushes, which lie 10 s apart
         assert "1 ahead (samples whose stamp is ahead" in status.message
         sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor is gone, the others go on
-        status.wait_for_message("the wrench is silent")
+        status.wait_for_message("No sample from the wrench for 2 s")
         assert process.stop() == 0, process.text()
     table = read_table(out / "pushes.csv")
     assert len(expected_rows) > 30 and len(table) == len(expected_rows)
@@ -181,7 +180,7 @@ def portion(slider: int, pusher: int) -> Samples:
 
 @pytest.mark.parametrize(("lag", "told"), [(0, {}), (200, {}), (700, {"pusher": 0.7}), (-3000, {"pusher": -3.0})])
 def test_clocks_that_stay_apart_are_told_while_they_come(lag: int, told: dict[str, float]) -> None:
-    pace = StreamPace()
+    pace = StreamSync()
     for k in range(LAGS - 1):
         pace.note(portion(10 * k, 10 * k + lag))
     assert pace.apart() == {} and not pace.problems(), "too early to tell"
@@ -191,7 +190,7 @@ def test_clocks_that_stay_apart_are_told_while_they_come(lag: int, told: dict[st
 
 
 def test_a_stream_that_lags_now_and_then_is_not_apart() -> None:
-    pace = StreamPace()
+    pace = StreamSync()
     for k in range(2 * LAGS):
         pace.note(portion(10 * k, 10 * k - (2000 if k % 10 else 0)))
     assert pace.apart() == {}
@@ -199,12 +198,12 @@ def test_a_stream_that_lags_now_and_then_is_not_apart() -> None:
 
 def test_a_sensor_that_stops_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(stream_pace, "monotonic", lambda: now[0])
-    pace = StreamPace()
+    monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
+    pace = StreamSync()
     pace.note(portion(0, 0))
     now[0] += 3.0
     assert pace.silent() == [], "all have stopped: a pause"
     none = rows(clean(0.0).pusher, np.arange(0))
     pace.note(replace(portion(10, 10), pusher=none))
     assert pace.silent() == ["pusher"]
-    assert "the pusher is silent" in pace.problems()[0]
+    assert "No sample from the pusher" in pace.problems()[0]

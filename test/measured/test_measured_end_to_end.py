@@ -166,7 +166,7 @@ def validated_online(recording: Path, names: list[str], domain: int, out: Path) 
         node_process("push_validator", domain=domain, params=watching) as validator,
         node_process("push_replay", domain=domain, params=playing) as replay,
     ):
-        assert wait_until(lambda: "validation written" in validator.text(), 120.0), validator.text() + replay.text()
+        assert wait_until(lambda: "Validation written" in validator.text(), 120.0), validator.text() + replay.text()
         replay.wait_for_text("lost 0")  # it says so after its last message
 
 

@@ -17,14 +17,15 @@ from typing import Any
 import pytest
 from ros_harness import REPOSITORY
 
-from push_predictor.nodes import predict_server, push_validator
+from push_predictor.nodes import predict_server
 from push_predictor.nodes.replay import options as replay_options
+from push_predictor.nodes.validator import parameters as validator_parameters
 
 FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
 PARAMETERS = {
     "predict_server": predict_server.PARAMETERS,
     "push_replay": replay_options.PARAMETERS,
-    "push_validator": push_validator.PARAMETERS,
+    "push_validator": validator_parameters.PARAMETERS,
 }
 
 

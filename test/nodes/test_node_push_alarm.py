@@ -20,7 +20,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
-from push_predictor.online.alarm_process import PushAlarm as ProcessOfAlarm
+from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import rig_beside
@@ -166,7 +166,7 @@ def analytical(pushes: int) -> PushModel:
 
 
 def test_a_model_of_too_few_pushes_gets_no_alarm_and_the_reason_is_told():
-    alarm = ProcessOfAlarm(0.01, lambda state, end: pytest.fail("it must not fire"))
+    alarm = AlarmProcess(0.01, lambda state, end: pytest.fail("it must not fire"))
     alarm.prepare(analytical(pushes=5))
     assert alarm.busy and wait_until(lambda: (alarm.work(), not alarm.busy)[1], 60.0)
     alarm.begin()
@@ -175,7 +175,7 @@ def test_a_model_of_too_few_pushes_gets_no_alarm_and_the_reason_is_told():
 
 
 def test_a_process_that_is_killed_ends_the_alarm_not_the_node():
-    alarm = ProcessOfAlarm(0.01, lambda state, end: pytest.fail("it must not fire"))
+    alarm = AlarmProcess(0.01, lambda state, end: pytest.fail("it must not fire"))
     alarm.prepare(analytical(pushes=20))
     assert alarm._process is not None
     alarm._process.kill()

@@ -27,6 +27,7 @@ from synthetic import rows, wrench_rows
 from validator_bench import (
     CIRCLE,
     HEXAGON,
+    NO_SERVER,
     WRITTEN,
     Status,
     assert_same_as_offline,
@@ -41,9 +42,9 @@ from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
-from push_predictor.nodes import push_validator
-from push_predictor.nodes.validator.sensor_subscriber import Samples
+from push_predictor.nodes.validator import publishers
 from push_predictor.nodes.validator.validation_run import ValidationRun
+from push_predictor.online.stream_sync import Samples
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.read import read_recording
@@ -251,7 +252,7 @@ def test_a_server_that_starts_after_the_replay_has_ended_costs_no_window(domain:
         status = Status(node)
         with replaying(domain) as replay:
             replay.wait_for_text("finished: published", 60.0)
-        status.wait_for_message("nobody offers predict_push")
+        status.wait_for_message(NO_SERVER)
         status.wait_for("state", "waiting for the last answers")
         with node_process("predict_server", domain=domain, params={"models": [str(models["gp"])]}):
             process.wait_for_text(WRITTEN, 120.0)
@@ -290,7 +291,7 @@ def test_a_model_that_the_server_does_not_know_yet_is_waited_for(domain: int, mo
         with replaying(domain) as replay:
             replay.wait_for_text("finished: published", 60.0)
         said = status.wait_for_message("hexagon")
-        assert "not known to predict_server, which has analytical" in said
+        assert "predict_server has no model 'hexagon'. Its models: analytical." in said
         answer = finish(node)
         assert not answer.success and "hexagon" in answer.message
         assert not (tmp_path / "validation.json").exists()
@@ -333,7 +334,7 @@ def test_refused_windows_and_answers_that_are_no_gaussian_are_left_out_and_liste
             log, result = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("windows", "validation"))
             reasons = [entry["reason"] for entry in log["refused"]]
             status.wait_for("refused", str(len(reasons)))
-            assert f"{len(reasons)} predictions refused" in status.message
+            assert f"{len(reasons)} predictions were refused" in status.message
             assert process.stop() == 0, process.text()
     total = int(count_of_windows(models["gp"]))
     assert result["n_test"] == len(log["windows"]) == total - len(reasons) and log["unanswered"] == 0
@@ -350,7 +351,7 @@ def test_windows_that_nobody_answers_are_missed_not_guessed(domain: int, models,
         status.wait_for_news()
         assert (status.values["gp windows"], status.values["open requests"]) == ("0", "0")
         total = count_of_windows(models["gp"])
-        assert f"{total} windows were never answered" in process.text()
+        assert f"never answered for {total} windows" in process.text()
     assert json.loads((tmp_path / "windows.json").read_text())["unanswered"] == int(total)
     assert json.loads((tmp_path / "validation.json").read_text())["n_test"] == 0
 
@@ -521,20 +522,20 @@ def test_useless_messages_are_counted_by_kind_and_do_no_harm(domain: int, models
         assert values["slider rejected frame_id"] == "2"
         assert values["slider rejected no orientation"] == "1"
         assert values["pusher rejected not finite"] == "1"
-        assert "/slider/pose: 4 of 5 samples rejected" in status.message
+        assert "/slider/pose: 4 of 5 samples were rejected" in status.message
         assert finish(node).success
         assert process.stop() == 0, process.text()
 
 
-def test_no_markers_are_made_while_nobody_watches(monkeypatch: pytest.MonkeyPatch):
+def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyPatch):
     """Seen from inside: what is published to nobody cannot be heard."""
     made: list[Any] = []
-    monkeypatch.setattr(push_validator, "window_markers", lambda *of_what: made.append(of_what))
-    for watchers in (0, 1):
-        publisher = SimpleNamespace(get_subscription_count=lambda count=watchers: count, publish=lambda message: None)
-        node = SimpleNamespace(_residuals=publisher, _markers=publisher, _rig="rig", _values={"frame_id": "world"})
-        push_validator.PushValidator._show(node, 0, "window", "prediction", "residual")
-        assert len(made) == watchers
+    monkeypatch.setattr(publishers, "window_markers", lambda *of_what: made.append(of_what))
+    for subscribers in (0, 1):
+        topic = SimpleNamespace(get_subscription_count=lambda count=subscribers: count, publish=lambda message: None)
+        node = SimpleNamespace(create_publisher=lambda *of_what, topic=topic: topic, get_logger=lambda: None)
+        publishers.ResultPublishers(node, "world").markers("rig", "window", "prediction")
+        assert len(made) == subscribers
 
 
 # --- starting --------------------------------------------------------------------------------------------------------

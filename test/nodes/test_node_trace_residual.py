@@ -156,7 +156,7 @@ def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
     params, status = {"model": model, "output": drifting}, Status(server.node)
     with harness.node_process("push_validator", domain=server.domain, params=params):
         # A validator that sees predict_push has found the server's other services and clients, made earlier, as well.
-        assert harness.wait_until(lambda: bool(status.all) and "nobody offers" not in status.message), status.message
+        assert harness.wait_until(lambda: bool(status.all) and "No node offers" not in status.message), status.message
         ended, result = server.trace(tmp_path / "elsewhere").end()
         assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
         assert names(tmp_path / "elsewhere") == sorted([EXTENDED, REPORT, VERDICT])

@@ -13,9 +13,9 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.serialization import serialize_message
 from replay_bags import POSE, START, WRENCH, stamped, write_bag
 
-from msg_adapters import streams
-from msg_adapters.streams import MessageBuffer
-from push_predictor.nodes.validator import sensor_subscriber as sensor_inlet
+from push_predictor.nodes.validator import sensor_subscriber
+from push_predictor.online import message_buffer
+from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.recordings import samples
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.samples import PUSHER, SLIDER, pusher_stream, slider_stream, wrench_stream
@@ -39,20 +39,20 @@ def wrench(*numbers: float) -> bytes:
     return serialize_message(message)
 
 
-def filled(inbox: MessageBuffer, *messages: bytes) -> MessageBuffer:
+def filled(buffer: MessageBuffer, *messages: bytes) -> MessageBuffer:
     for message in messages:
-        inbox.put(message)
-    return inbox
+        buffer.put(message)
+    return buffer
 
 
 def test_good_messages_become_a_stream_in_order():
-    inbox = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
-    stream = slider_stream(*inbox.take())
+    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
+    stream = slider_stream(*buffer.take())
     assert stream.stamp.tolist() == [7_000_000_005, 7_000_000_009]
     assert (stream.x[0], stream.y[0], stream.z[0]) == (0.1, -0.2, 0.03)
     assert stream.heading == pytest.approx([0.6, 0.6])
-    assert inbox.received == 2 and not inbox.rejected
-    assert len(slider_stream(*inbox.take())) == 0
+    assert buffer.received == 2 and not buffer.rejected
+    assert len(slider_stream(*buffer.take())) == 0
 
 
 @pytest.mark.parametrize(
@@ -69,15 +69,15 @@ def test_good_messages_become_a_stream_in_order():
     ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
 )
 def test_a_useless_slider_pose_is_counted_by_kind_and_the_others_are_taken(message: bytes, kind: str):
-    inbox = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
-    assert len(inbox.take()[0]) == 2
-    assert dict(inbox.rejected) == {kind: 1}
+    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
+    assert len(buffer.take()[0]) == 2
+    assert dict(buffer.rejected) == {kind: 1}
 
 
 def test_a_message_with_two_faults_is_counted_once():
-    inbox = filled(MessageBuffer(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
-    inbox.take()
-    assert inbox.rejected.total() == 1
+    buffer = filled(MessageBuffer(SLIDER, "world"), pose(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, frame="map"))
+    buffer.take()
+    assert buffer.rejected.total() == 1
 
 
 def test_an_empty_frame_id_accepts_any_frame():
@@ -91,23 +91,23 @@ def test_the_tip_is_a_point_its_orientation_does_not_matter():
 
 
 def test_of_a_wrench_the_planar_part_must_be_finite():
-    inbox = filled(
+    buffer = filled(
         MessageBuffer(samples.WRENCH, "world"),
         wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
         wrench(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    stream = wrench_stream(*inbox.take())
+    stream = wrench_stream(*buffer.take())
     assert (stream.fx.tolist(), stream.fy.tolist(), stream.torque.tolist()) == ([1.0], [2.0], [3.0])
-    assert dict(inbox.rejected) == {"not finite": 1}
+    assert dict(buffer.rejected) == {"not finite": 1}
 
 
-def test_a_full_inbox_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(streams, "LIMIT", 100)
-    inbox = MessageBuffer(SLIDER, "world")
+def test_a_full_buffer_drops_the_oldest_and_counts_them(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(message_buffer, "LIMIT", 100)
+    buffer = MessageBuffer(SLIDER, "world")
     for k in range(305):
-        inbox.put(pose(*GOOD, nanosec=k))
-    assert len(inbox) <= 100 and len(inbox) + inbox.dropped == 305
-    stamp, _ = inbox.take()
+        buffer.put(pose(*GOOD, nanosec=k))
+    assert len(buffer) <= 100 and len(buffer) + buffer.dropped == 305
+    stamp, _ = buffer.take()
     assert stamp[-1] == 7_000_000_304 and np.all(np.diff(stamp) == 1)
 
 
@@ -135,18 +135,18 @@ def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Pa
 
 def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_second(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
-    monkeypatch.setattr(sensor_inlet, "monotonic", lambda: now[0])
+    monkeypatch.setattr(sensor_subscriber, "monotonic", lambda: now[0])
     slider: list[bytes] = []
     wrench: list[bytes] = []
-    inlet: Any = SimpleNamespace(_inboxes={"slider": slider, "wrench": wrench}, _empty=0.0)
-    inlet._scalars = SimpleNamespace(waiting=lambda: True)
-    complete = sensor_inlet.SensorSubscriber.complete
-    assert not complete(inlet), "nothing has come"
+    subscriber: Any = SimpleNamespace(_buffers={"slider": slider, "wrench": wrench}, _empty=0.0)
+    subscriber._scalars = SimpleNamespace(waiting=lambda: True)
+    complete = sensor_subscriber.SensorSubscriber.complete
+    assert not complete(subscriber), "nothing has come"
     slider.append(b"pose")
     now[0] += 0.9
-    assert not complete(inlet)
+    assert not complete(subscriber)
     now[0] += 0.2
-    assert complete(inlet), "there is no wrench"
+    assert complete(subscriber), "there is no wrench"
     wrench.append(b"force")
-    inlet._empty = now[0]
-    assert complete(inlet), "all are there"
+    subscriber._empty = now[0]
+    assert complete(subscriber), "all are there"

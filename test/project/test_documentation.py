@@ -12,10 +12,10 @@ import yaml
 from ros_harness import REPOSITORY
 
 from push_predictor.cli import COMMANDS, build_parser
-from push_predictor.nodes import push_validator
 from push_predictor.nodes.parameters import Param
 from push_predictor.nodes.replay import options as replay_options
 from push_predictor.nodes.server import parameters as server_parameters
+from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.nodes.validator.scalar_subscriber import CLOCK
 from push_predictor.nodes.validator.sensor_subscriber import TOPICS
 from push_predictor.online.live_validation import MAIN_RESULT
@@ -23,7 +23,7 @@ from push_predictor.online.live_validation import MAIN_RESULT
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
     "push_replay": ("push_replay", tuple(replay_options.PARAMETERS)),
-    "push_validator": ("push_validator", tuple(push_validator.PARAMETERS)),
+    "push_validator": ("push_validator", tuple(validator_parameters.PARAMETERS)),
 }
 REFERENCE = REPOSITORY / "docs" / "reference"
 DOCUMENTS = [REPOSITORY / "README.md", REPOSITORY / "bags" / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
@@ -68,7 +68,7 @@ def test_every_parameter_has_a_description_and_accepts_its_default(node: str):
 def test_the_table_of_the_validators_parameters_is_that_of_the_code():
     rows = table(REFERENCE / "push_validator.md", "Parameters")
     written = {name.strip("`"): (yaml.safe_load(value.strip("`")), text) for name, value, text in rows}
-    assert written == {row.name: (row.default, row.description) for row in push_validator.PARAMETERS}
+    assert written == {row.name: (row.default, row.description) for row in validator_parameters.PARAMETERS}
 
 
 # --- topics and services ---------------------------------------------------------------------------------------------
@@ -78,9 +78,7 @@ def test_the_table_of_the_validators_topics_names_what_it_uses():
     nodes = REPOSITORY / "push_predictor" / "nodes"
     modules = [nodes / "push_validator.py", *sorted((nodes / "validator").rglob("*.py"))]
     code = "".join(path.read_text() for path in modules)
-    calls = (
-        r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\"|DeferredTrigger\(self, \"([^\"]+)\""
-    )
+    calls = r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\"|DeferredTrigger\(\w+, \"([^\"]+)\""
     used = (
         {first or second for first, second in re.findall(calls, code)} | {topic for _, _, topic, _ in TOPICS} | {CLOCK}
     )

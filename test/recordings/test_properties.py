@@ -18,12 +18,12 @@ from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
 from msg_adapters.poses import PlanarPose, PlanarWrench, pose_to_message, wrench_to_message
-from msg_adapters.streams import MessageBuffer
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import Prediction, PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
+from push_predictor.online.message_buffer import MessageBuffer
 from push_predictor.planning.slider_pose import WorldPush, slider_after
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.samples import (
@@ -76,10 +76,10 @@ def poses(stream: PoseStream) -> list[PoseStamped]:
 
 
 def received(kind: SampleRules, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
-    inbox = MessageBuffer(kind, "world")
+    buffer = MessageBuffer(kind, "world")
     for message in messages:
-        inbox.put(serialize_message(message))
-    return inbox.take()
+        buffer.put(serialize_message(message))
+    return buffer.take()
 
 
 @settings(max_examples=15, deadline=None)

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
-from msg_adapters import scalars
-from msg_adapters.scalars import ScalarInbox, SentTimes
-from push_predictor.nodes.validator import stream_sync as stream_pace
-from push_predictor.nodes.validator.sensor_subscriber import Samples
-from push_predictor.nodes.validator.stream_sync import StreamPace
+from push_predictor.online import scalar_buffer, stream_sync
+from push_predictor.online.scalar_buffer import ScalarBuffer, SentTimes
+from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
@@ -167,31 +165,31 @@ def float64(value: float) -> bytes:
 
 
 def test_messages_wait_until_their_time_can_be_told() -> None:
-    inbox = ScalarInbox("std_msgs/msg/Float64")
+    buffer = ScalarBuffer("std_msgs/msg/Float64")
     for k in range(4):
-        inbox.put(float64(k), 10 * k)
-    taken = inbox.take(20, lambda sent: 1000 + sent if sent else None, None)
+        buffer.put(float64(k), 10 * k)
+    taken = buffer.take(20, lambda sent: 1000 + sent if sent else None, None)
     assert (taken.stamp.tolist(), taken.value.tolist()) == ([1010], [1.0])
-    assert dict(inbox.rejected) == {"without time": 1} and len(inbox) == 2
-    assert inbox.take(10**9, lambda sent: sent, None).value.tolist() == [2.0, 3.0]
-    assert len(inbox.take(10**9, lambda sent: sent, None)) == 0
+    assert dict(buffer.rejected) == {"without time": 1} and len(buffer) == 2
+    assert buffer.take(10**9, lambda sent: sent, None).value.tolist() == [2.0, 3.0]
+    assert len(buffer.take(10**9, lambda sent: sent, None)) == 0
 
 
 def test_useless_messages_are_counted_by_kind() -> None:
-    inbox = ScalarInbox("std_msgs/msg/Float32")
+    buffer = ScalarBuffer("std_msgs/msg/Float32")
     for data in (b"\0\1\0\0" + struct.pack("<f", 0.5), b"\0\1", b"\0\1\0\0" + struct.pack("<f", np.inf)):
-        inbox.put(data, 5)
-    assert inbox.take(9, lambda sent: sent, None).value.tolist() == [0.5]
-    assert dict(inbox.rejected) == {"unreadable": 1, "not finite": 1}
+        buffer.put(data, 5)
+    assert buffer.take(9, lambda sent: sent, None).value.tolist() == [0.5]
+    assert dict(buffer.rejected) == {"unreadable": 1, "not finite": 1}
 
 
-def test_a_full_inbox_drops_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scalars, "LIMIT", 100)
-    inbox = ScalarInbox("std_msgs/msg/Float64")
+def test_a_full_buffer_drops_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scalar_buffer, "LIMIT", 100)
+    buffer = ScalarBuffer("std_msgs/msg/Float64")
     for k in range(305):
-        inbox.put(float64(k), k)
-    taken = inbox.take(1000, lambda sent: sent, None)
-    assert len(taken) <= 100 and len(taken) + inbox.rejected["dropped"] == 305 and taken.value[-1] == 304.0
+        buffer.put(float64(k), k)
+    taken = buffer.take(1000, lambda sent: sent, None)
+    assert len(taken) <= 100 and len(taken) + buffer.rejected["dropped"] == 305 and taken.value[-1] == 304.0
 
 
 def samples(recording: Recording, end: float, **named: float) -> Samples:
@@ -205,9 +203,9 @@ def samples(recording: Recording, end: float, **named: float) -> Samples:
 
 def test_a_scalar_that_is_behind_is_waited_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(stream_pace, "monotonic", lambda: now[0])
+    monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
     recording = translating_push(Push(0.5, 8.0))
-    pace = StreamPace(["/warmth", "/absent"])
+    pace = StreamSync(["/warmth", "/absent"])
     pace.note(samples(recording, 1.0, warmth=0.9))
     assert not pace.in_step(), "/absent may only be late"
     now[0] += 5.1

@@ -20,7 +20,8 @@ from push_predictor.models.store.model_file import load_model
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"  # 10 pushes, 21 s
 CIRCLE = REPOSITORY / "bags" / "circle_pu"
-WRITTEN = "validation written"
+WRITTEN = "Validation written"
+NO_SERVER = "No node offers predict_push"
 
 
 @contextmanager
@@ -47,7 +48,7 @@ class Status:
 
     def wait_for_server(self) -> None:
         """Until the node knows a server: one found late in a replay would answer about all of it in one burst."""
-        found = wait_until(lambda: bool(self.all) and "nobody offers" not in self.message)
+        found = wait_until(lambda: bool(self.all) and NO_SERVER not in self.message)
         assert found, f"no server found: {self.all[-1:]}"
 
     def wait_for_news(self) -> None:

@@ -1,4 +1,4 @@
-"""ROS parts of `push_validator`: subscribers, prediction client, markers, diagnostics.
+"""ROS parts of `push_validator`: subscribers, prediction client, publishers, ~/finish, diagnostics.
 
 Imported by `nodes.push_validator` only.
 """

@@ -1,4 +1,4 @@
-"""Which models a validator judges: files, or names that predict_server knows."""
+"""The models of a validator: files, or names that predict_server knows."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor_interfaces.srv import ListModels
 
-PAUSE = 1.0  # s after an answer that does not settle all
-PATIENCE = 5.0  # s after which a question without an answer is asked again
+PAUSE = 1.0  # s after an answer that does not settle everything
+PATIENCE = 5.0  # s after which an unanswered request is sent again
 
 
 class ModelSource:
-    """Loads the models wanted: files at once, names by asking the server, again and again, where their files are.
+    """Loads models: files at once, names once the server reports where their files are.
 
     wanted: paths or names, the main model first; an empty text is the server's default model. Raises ModelFileError for
-    a file that is no model, RequestError for two files that hold models of one name.
+    a file that is no model, RequestError for two files whose models have the same name.
     """
 
     def __init__(self, node: Node, wanted: Sequence[str]) -> None:
@@ -40,16 +40,23 @@ class ModelSource:
             raise RequestError("compare", repeated, "model files that hold models of different names")
 
     def models(self) -> dict[str, PushModel] | None:
-        """All wanted models by the name to ask for, or None while the server has not told about some of them."""
+        """All wanted models by the name to request, or None while some are unknown."""
         if len(self._found) < len(self._wanted):
             return None
         return dict(self._found[text] for text in self._wanted)
 
+    @property
+    def hindrance(self) -> str:
+        """In words, why not all models are known, empty if they are."""
+        if self.models() is not None:
+            return ""
+        return "; ".join(self.problems) or "Waiting for list_models of predict_server."
+
     def work(self) -> None:
-        """Ask the server what it has, now and then, until all is settled. Call it often, from the executor's thread."""
+        """Request the server's list until it settles everything. Call it often, in the executor's thread."""
         now = monotonic()
         if self._asked is not None and self._asked.done():
-            self._learn(self._asked.result())
+            self._take(self._asked.result())
             self._asked, self._next = None, now + PAUSE if self.problems else inf
         if now < self._next or not self._client.service_is_ready():
             return
@@ -57,33 +64,33 @@ class ModelSource:
             self._client.remove_pending_request(self._asked)
         self._asked, self._next = self._client.call_async(ListModels.Request()), now + PATIENCE
 
-    def _learn(self, response: ListModels.Response) -> None:
+    def _take(self, response: ListModels.Response) -> None:
         files = {name: _file_of(text) for name, text in zip(response.names, response.descriptions, strict=False)}
         self.problems = [
             problem for text in self._wanted if (problem := self._settle(text, files, response.default_model))
         ]
 
     def _settle(self, text: str, files: Mapping[str, str], default: str) -> str:
-        """Answers what is wrong with a wanted model, in words, empty if nothing."""
+        """In words, what is wrong with a wanted model, empty if nothing."""
         if text in self._files:
             return self._difference(self._found[text][0], self._files[text], files)
         name = text or default
         if text in self._found:
             return ""
         if not files.get(name):
-            known = f"which has {', '.join(files)}" if files else "which has none"
-            return f"model {name!r} is not known to predict_server, {known}"
+            known = ", ".join(files) or "none"
+            return f"predict_server has no model {name!r}. Its models: {known}. Call load_model, or set model."
         try:
             self._found[text] = (name, load_model(Path(files[name])))
         except ModelFileError as error:
-            return f"model {name!r} of predict_server: {error}"
+            return f"Model {name!r} of predict_server cannot be loaded: {error}"
         return ""
 
     def _difference(self, name: str, path: Path, files: Mapping[str, str]) -> str:
         if name not in files:
-            return f"model {name!r} of {path} is not loaded by predict_server"
+            return f"predict_server has not loaded model {name!r} of {path}. Call load_model."
         if files[name] and Path(files[name]) != path:
-            return f"model {name!r}: predict_server took it from {files[name]}, not from {path}"
+            return f"predict_server loaded model {name!r} from {files[name]}, not from {path}."
         return ""
 
 

@@ -1,4 +1,4 @@
-"""Asking predict_push as any planner would: a few requests in flight, each with a deadline, none forgotten."""
+"""The client of predict_push: a few requests in flight, each with a deadline, none forgotten."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rclpy.task import Future
 from push_predictor_interfaces.srv import PredictPush
 
 IN_FLIGHT = 8  # a service queue of the default depth holds ten
-DEPTH = 1000  # the middleware hands a client the answers to all clients: in a short queue they crowd out its own
-PAUSE = 1.0  # s before a server that cannot answer for a model is asked about it again
+DEPTH = 1000  # a client receives the answers to all clients, which would crowd its own out of a short queue
+PAUSE = 1.0  # s after which a request is repeated that the server could not answer for its model
 SELDOM = 10.0  # s between two lines in the log about a server too busy to answer in time
-NOT_NOW = ("model:", "default_model:", "the node is ")  # refusals that speak of the server, not of the push
+NOT_NOW = ("model:", "default_model:", "the node is ")  # refusals because of the server's state, not of the push
 Answer: TypeAlias = Callable[[PredictPush.Response], None]
 
 
@@ -36,18 +36,18 @@ class _Asked:
 
 @dataclass
 class _Silence:
-    """Of the server: since when (monotonic), and how often requests were sent again."""
+    """Since when the server has not answered (monotonic), and how often requests were sent again."""
 
     since: float
     sent_again: int = 0
 
 
 class PredictionClient:
-    """A queue of requests to predict_push, one a model.
+    """Queues of requests to predict_push, one for each model.
 
-    A request that meets its deadline unanswered is sent again; the first answer counts. One that is refused because of
-    the server's state (a model not loaded yet, a node not active) waits and is sent again. A server that falls silent
-    is told in the log, and so is what had to be sent again once it answers.
+    A request without an answer at its deadline is sent again; the first answer counts. One that is refused because of
+    the server's state (a model not loaded yet, a node not active) waits and is sent again. The log reports when the
+    server stops answering, and when it answers again.
     """
 
     def __init__(self, node: Node, timeout: float) -> None:
@@ -68,13 +68,13 @@ class PredictionClient:
 
     @property
     def server_is_there(self) -> bool:
-        """Whether somebody offers the service."""
+        """Whether a node offers the service."""
         return bool(self._client.service_is_ready())
 
     @property
     def problems(self) -> list[str]:
-        """Why the server does not answer for some models, in its words; that it does not answer at all."""
-        silent = [f"no answer within {self._timeout:g} s, asking again"] if self._silence else []
+        """In words, that the server does not answer, and why it refuses some models."""
+        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silence else []
         return [f"predict_push: {reason}" for reason in [*silent, *(reason for _, reason in self._blocked.values())]]
 
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
@@ -82,7 +82,7 @@ class PredictionClient:
         self._waiting.setdefault(request.model, deque()).append(_Asked(request, on_answer))
 
     def work(self) -> None:
-        """Send what may be sent, again what was not answered in time. Call it often, from the executor's thread."""
+        """Take answers, send waiting and overdue requests. Call it often, in the executor's thread."""
         self._take_answers()
         if not self.open or not self.server_is_there:
             return
@@ -105,16 +105,16 @@ class PredictionClient:
         self._silence = None
 
     def _take_answers(self) -> None:
-        """All that have arrived: an executor that is busy with samples hands over one a turn, and that late."""
+        """Take all arrived answers: an executor that is busy with samples would deliver one a turn, and late."""
         if self._taking:
             return
         self._taking = True
         try:
             while self._one_waits():
                 header, response = self._client.handle.take_response(PredictPush.Response)
-                if header is None:  # it was for another client
+                if header is None:  # for another client
                     continue
-                with suppress(KeyError):  # it was sent again, and answered before
+                with suppress(KeyError):  # sent again, and answered before
                     self._client.get_pending_request(header.request_id.sequence_number).set_result(response)
         finally:
             self._taking = False
@@ -129,7 +129,7 @@ class PredictionClient:
         self.timeouts += 1
         if self._silence is None:
             self._silence = _Silence(now - self._timeout)
-            text = f"predict_push: no answer within {self._timeout:g} s, asking until there is one"
+            text = f"predict_push: no answer within {self._timeout:g} s, requests are sent again"
             self._log.warning(text, throttle_duration_sec=SELDOM)
         self._silence.sent_again += 1
 
@@ -137,13 +137,13 @@ class PredictionClient:
         if (silence := self._silence) is not None:
             self._silence = None
             self._log.warning(
-                f"predict_push answers again after {monotonic() - silence.since:.1f} s: requests were sent again "
-                f"{silence.sent_again} times, {self.open} wait, none was given up",
+                f"predict_push answers again after {monotonic() - silence.since:.1f} s. Requests sent again: "
+                f"{silence.sent_again}; waiting: {self.open}; given up: 0.",
                 throttle_duration_sec=SELDOM,
             )
 
     def _next_queue(self, now: float) -> deque[_Asked] | None:
-        """Of the models that may be asked about, the one with the most to ask."""
+        """The longest queue of the models whose requests may be sent now."""
         free = [q for model, q in self._waiting.items() if q and self._blocked.get(model, (0.0, ""))[0] <= now]
         return max(free, key=len, default=None)
 

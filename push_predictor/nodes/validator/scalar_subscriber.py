@@ -1,8 +1,8 @@
-"""Scalar topics beside the sensors: subscribed when they appear, with the type and QoS of their publishers.
+"""The subscriptions to scalar topics: made when the topics appear, with the type and QoS of their publishers.
 
-A message without a header takes the time of /clock where somebody publishes that, else the time at which it was sent.
-push_replay tells each such message's log time on /clock just before it, so it gets the stamp that reading the recording
-gives it.
+A message without a header gets the time of /clock if that is published, else the time at which it was sent.
+push_replay publishes each such message's log time on /clock just before it, so the message gets the same stamp as when
+the recording is read.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_topic_name import validate_topic_name
 
-from msg_adapters.scalars import ScalarInbox, SentTimes
 from push_predictor.errors import RequestError
 from push_predictor.nodes.polling import PolledGroup, take_all
 from push_predictor.nodes.qos import DEPTH
 from push_predictor.nodes.replay.topics import message_class
+from push_predictor.online.scalar_buffer import ScalarBuffer, SentTimes
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.streams import ScalarStream
 
 LOOK = 0.05  # s between two looks at who publishes what
-UNTOLD = 1_000_000_000  # ns after its sending by which a message's /clock is known, if there is one
-STALE = 5_000_000_000  # ns after the last message of a /clock that is gone, from when on its time is over
+UNDATED = 1_000_000_000  # ns after its sending by which a message's /clock is known, if there is one
+STALE = 5_000_000_000  # ns after the last message of a /clock that has no publisher any more, when its time expires
 CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 
 
 class _Reader:
-    """A subscription that follows its publishers: it is made anew where their type or QoS changes."""
+    """A subscription that follows its publishers: it is made again when their type or QoS changes."""
 
     def __init__(self, node: Node, topic: str) -> None:
         self._node, self._topic, self._group = node, topic, PolledGroup()
@@ -62,26 +62,26 @@ class _Reader:
         self._suits = suits
 
     def taken(self) -> Iterator[tuple[bytes, int]]:
-        """What has arrived, each message with the time (ns) at which it was sent."""
+        """The arrived messages, each with the time (ns) at which it was sent."""
         if self._subscription is not None:
             yield from ((data, sent) for data, _, sent in take_all(self._subscription))
 
 
 @dataclass(eq=False)
 class _Topic:
-    """A topic as it was asked for. name: as in the covariate; problem: why there are no samples, empty if there are."""
+    """A requested topic. name: as in the covariate; problem: why there are no samples, empty if there are."""
 
     asked: str
     name: str
     reader: _Reader
     problem: str = ""
-    inbox: ScalarInbox | None = None
+    buffer: ScalarBuffer | None = None
 
 
 class ScalarSubscriber:
     """Subscribes to scalar topics. names: relative or absolute; topic:/NAME is the covariate, as the name was given.
 
-    `look` and `take` are called in the executor's thread, `drain` in any. Raises RequestError for a name that is none.
+    Call `look` and `take` in the executor's thread, `drain` in any. Raises RequestError for an invalid name.
     """
 
     def __init__(self, node: Node, names: Sequence[str]) -> None:
@@ -96,11 +96,11 @@ class ScalarSubscriber:
 
     @property
     def names(self) -> list[str]:
-        """What was asked for, as it stands in the covariates."""
+        """The requested topics, as the covariates name them."""
         return [topic.name for topic in self._topics]
 
     def look(self) -> None:
-        """Subscribe to what has appeared. Call it often."""
+        """Subscribe to topics that have appeared. Call it often."""
         if not self._topics or monotonic() - self._looked < LOOK:
             return
         self._looked = monotonic()
@@ -113,70 +113,71 @@ class ScalarSubscriber:
                 self._ticks.follow(CLOCK_TYPE, publishers)
 
     def drain(self) -> None:
-        """Bring in what has arrived by now."""
+        """Move arrived messages from the middleware into the buffers."""
         with self._draining:
             for topic in self._topics:
                 for data, sent in topic.reader.taken():
-                    assert topic.inbox is not None
-                    topic.inbox.put(data, sent)
+                    assert topic.buffer is not None
+                    topic.buffer.put(data, sent)
             for data, sent in self._ticks.taken():
                 self._clock.put(data, sent)
 
     def waiting(self) -> bool:
-        """Has every topic that is there sent something that was not taken yet?"""
-        return all(len(topic.inbox) > 0 for topic in self._topics if topic.inbox is not None)
+        """Whether messages of every published topic wait."""
+        return all(len(topic.buffer) > 0 for topic in self._topics if topic.buffer is not None)
 
     def take(self, near: int | None, last: bool = False) -> dict[str, ScalarStream]:
-        """The samples since the last call of every topic that is or was there. near: a recent stamp (ns) of the poses.
+        """The samples since the last call of every topic that is or was published.
 
-        A message that waits for /clock to tell its time comes in a later call, or, if this is the last one, now.
+        near: a recent stamp (ns) of the poses, None if there is none. A message that still waits for its time on /clock
+        is returned by a later call, or, if this is the last, now.
         """
         until, time_of = self._dating()
         until = sys.maxsize if last else until
         with self._draining:
-            there = [(topic.name, topic.inbox) for topic in self._topics if topic.inbox is not None]
-            return {name: inbox.take(until, time_of, near) for name, inbox in there}
+            there = [(topic.name, topic.buffer) for topic in self._topics if topic.buffer is not None]
+            return {name: buffer.take(until, time_of, near) for name, buffer in there}
 
     def figures(self) -> dict[str, int]:
-        """Counts by topic; rejected also by kind, for the kinds that occurred."""
+        """Counts of messages by topic; rejected ones also by kind, for the kinds that occurred."""
         found: dict[str, int] = {}
         for topic in self._topics:
-            if topic.inbox is not None:
-                found |= {f"topic:{topic.name} samples": topic.inbox.received}
-                found |= {f"topic:{topic.name} rejected {kind}": count for kind, count in topic.inbox.rejected.items()}
+            if topic.buffer is not None:
+                found |= {f"topic:{topic.name} samples": topic.buffer.received}
+                found |= {f"topic:{topic.name} rejected {kind}": count for kind, count in topic.buffer.rejected.items()}
         return found
 
     def problems(self) -> list[str]:
-        """Which topics bring nothing, and what of the others was not used, in words."""
+        """In words, which topics have no samples, and which samples of the others were rejected."""
         found = [topic.problem for topic in self._topics if topic.problem]
         for topic in self._topics:
-            if topic.inbox is not None and topic.inbox.rejected:
-                kinds = ", ".join(f"{kind} {count}" for kind, count in topic.inbox.rejected.items())
-                found.append(f"{topic.name}: {topic.inbox.rejected.total()} samples not used ({kinds})")
+            if topic.buffer is not None and topic.buffer.rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in topic.buffer.rejected.items())
+                found.append(f"{topic.name}: {topic.buffer.rejected.total()} samples were rejected ({kinds}).")
         return found
 
     def _find(self, topic: _Topic) -> None:
-        """Subscribe to a topic that is published, or say why not; one that was there and is gone stays as it is."""
+        """Subscribe to a published topic, or note why not; one that has lost its publishers stays as it is."""
         publishers = self._node.get_publishers_info_by_topic(topic.asked)
         kinds = sorted({publisher.topic_type for publisher in publishers})
         usable = [kind for kind in kinds if kind in SCALAR_LAYOUTS]
         if len(usable) == 1:
-            if topic.inbox is None or topic.inbox.kind != usable[0]:
-                topic.inbox, topic.problem = ScalarInbox(usable[0]), ""
+            if topic.buffer is None or topic.buffer.kind != usable[0]:
+                topic.buffer, topic.problem = ScalarBuffer(usable[0]), ""
             topic.reader.follow(usable[0], [p for p in publishers if p.topic_type == usable[0]])
         elif kinds:
             accepted = ", ".join(SCALAR_LAYOUTS)
-            topic.problem = f"scalar topic {topic.name}: of type {', '.join(kinds)}, one of {accepted} is accepted"
-        elif topic.inbox is None:
-            topic.problem = f"scalar topic {topic.name}: nobody publishes it"
+            topic.problem = f"Scalar topic {topic.name} has type {', '.join(kinds)}. Accepted: {accepted}."
+        elif topic.buffer is None:
+            topic.problem = f"Scalar topic {topic.name} has no publisher."
 
     def _dating(self) -> tuple[int, Callable[[int], int | None]]:
-        """Up to which sending time (ns) messages can be dated by now, and how."""
+        """The sending time (ns) up to which messages can be dated now, and the function that dates them."""
         newest, at = self._clock.newest, self._clock.at
         if self._clock_is_there:
             return newest or 0, at
         over = 0 if newest is None else newest + STALE
-        return time_ns() - UNTOLD, lambda sent: sent if sent > over else at(sent)
+        return time_ns() - UNDATED, lambda sent: sent if sent > over else at(sent)
 
 
 def _check(names: Sequence[str]) -> None:
@@ -190,12 +191,12 @@ def _check(names: Sequence[str]) -> None:
 
 
 def _name(asked: str) -> str:
-    """As a recording has it, whatever the node's namespace: with a slash before it."""
+    """The name in a recording, whatever the node's namespace: with a slash before it."""
     return f"/{asked.strip('/')}"
 
 
 def _suited(publishers: Sequence[QoSProfile]) -> QoSProfile:
-    """What all publishers offer, as recorders ask for it: what was sent before is had, where they keep it."""
+    """The QoS that all publishers offer: earlier messages are received if all publishers keep them."""
     kept = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
     return QoSProfile(

@@ -1,57 +1,142 @@
-"""How a push_validator does, as one diagnostic status (docs/reference/push_validator.md, "Diagnostics")."""
+"""The health of a push_validator: a diagnostic status, and a line in the log for each new problem."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from time import monotonic
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
 
-from msg_adapters.diagnostics import Level, diagnostic_status
+from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
 from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.evaluation.alarm.scores import SIZE
 from push_predictor.evaluation.offline import rig_difference
+from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.prediction_client import PredictionClient
+from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
-from push_predictor.online.alarm_process import PushAlarm
+from push_predictor.online.alarm_process import AlarmProcess
+from push_predictor.online.session import SILENCE, Session, State
 from push_predictor.recordings.windows.stream_faults import fault_words
+
+SILENT = f"No data for {SILENCE:g} s. Call `~/finish` to write the results."
+NO_SERVER = "No node offers predict_push. Start predict_server."
+
+
+class StatusPublisher:
+    """Publishes the status of a validator on /diagnostics, and logs problems when they change."""
+
+    def __init__(
+        self,
+        node: Node,
+        session: Session,
+        models: ModelSource,
+        rigs: RigSource,
+        sensors: SensorSubscriber,
+        client: PredictionClient,
+        writer: ResultWriter,
+    ) -> None:
+        self._node, self._session, self._writer = node, session, writer
+        self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._logged: list[str] = []
+
+    def publish(self, run: ValidationRun | None, hindrance: str) -> None:
+        """Publish the status of this moment. run: the present one or the last. hindrance: why none can begin."""
+        problems = self._problems(run, hindrance)
+        if problems != self._logged:
+            self._logged = problems
+            for problem in problems:
+                self._node.get_logger().warning(problem)
+        name, failure = self._node.get_fully_qualified_name(), self._session.failure
+        status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure)
+        self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
+
+    def _problems(self, run: ValidationRun | None, hindrance: str) -> list[str]:
+        unsaved = run.journal.failure if run and run.journal else ""
+        silent = SILENT if self._session.silent(monotonic()) else ""
+        found = [*self._models.problems, hindrance, self._rigs.problem, unsaved, silent]
+        return [*filter(None, dict.fromkeys(found))]
+
+    def _activity(self) -> str:
+        if self._session.state is State.DRAINING:
+            return "waiting for the last answers"
+        if self._writer.report.busy:
+            return "writing the report"
+        return "validating" if self._session.active else "waiting for samples"
 
 
 def validator_status(
     name: str,
     state: str,
     run: ValidationRun | None,
-    inlet: SensorSubscriber,
+    sensors: SensorSubscriber,
     client: PredictionClient,
     problems: Sequence[str],
     failure: str,
 ) -> DiagnosticStatus:
-    """problems: of models and rig, in words. failure: why a result could not be written, empty if it could."""
-    warnings = [*problems, *inlet.problems(), *client.problems, *(_run_problems(run) if run else [])]
+    """The status of a validator: ERROR for a failure, WARN for a problem.
+
+    run: the present one or the last. problems: with models and rig, in words. failure: why a result could not be
+    written, empty if it could.
+    """
+    warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
     if not client.server_is_there:
-        warnings.append("nobody offers predict_push")
+        warnings.append(NO_SERVER)
     level = Level.ERROR if failure else Level.WARN if warnings else Level.OK
-    values: dict[str, object] = {"state": state, **inlet.figures(), "open requests": client.open}
+    values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
         values |= _stream_figures(run) | _scores(run)
-        values |= _alarm(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
-    return diagnostic_status(name, level, "; ".join(filter(None, [failure, *warnings])) or state, values)
+        values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
+    return diagnostic_status(name, level, _paragraph([failure, *warnings]) or state, values)
+
+
+def alarm_text(state: AlarmState) -> str:
+    """In words, why an alarm has fired, on what evidence and at which push."""
+    assert state.fired_evidence is not None
+    return (
+        f"The model no longer fits: {_cause(state.fired_by or '')} (evidence {_odds(state.fired_evidence)}; "
+        f"false-alarm rate at most {100.0 * state.false_alarm_rate:g} %). "
+        f"The alarm fired at push {state.fired_at}, number {state.fired_after} of this run."
+    )
+
+
+def _cause(score: str) -> str:
+    if score == SIZE:
+        return "errors are too large"
+    mechanism, _, parameter = score.partition(": ")
+    if parameter:
+        return f"errors look like a change of {mechanism.replace('_', ' ')} ({parameter.replace('_', ' ')})"
+    return f"errors have shifted in {score}"
+
+
+def _odds(log10_evidence: float) -> str:
+    return f"{10.0**log10_evidence:.0f} : 1" if log10_evidence < 6.0 else f"10^{log10_evidence:.1f} : 1"
+
+
+def _paragraph(texts: Sequence[str]) -> str:
+    """The texts that are not empty as sentences, one after the other."""
+    return " ".join(text if text.endswith((".", "?")) else f"{text}." for text in texts if text)
 
 
 def _stream_figures(run: ValidationRun) -> dict[str, object]:
     """Faults by kind, "streams KIND" of all streams and "slider KIND" of one."""
     found: dict[str, object] = {k if " " in k else f"streams {k}": count for k, count in run.counts.items()}
-    found["contact from"] = "geometry and force" if run.pace.with_wrench else "geometry alone: no wrench has come"
-    apart = run.pace.apart()
+    found["contact from"] = "geometry and force" if run.sync.with_wrench else "geometry alone: no wrench received"
+    apart = run.sync.apart()
     found["streams clocks_apart"] = len(apart)
     return found | {f"{name} ahead of slider": lag for name, lag in apart.items()}
 
 
 def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
-    found += [*run.pace.problems(), *fault_words(run.counts)]
+    found += [*run.sync.problems(), *fault_words(run.counts)]
     if run.refused:
-        found.append(f"{run.refused} predictions refused, the last one: {run.last_refusal}")
+        found.append(f"{run.refused} predictions were refused, the last by {run.last_refusal}")
     if run.table_failure:
         found.append(run.table_failure)
     if run.alarm is not None:
@@ -59,26 +144,18 @@ def _run_problems(run: ValidationRun) -> list[str]:
     return found
 
 
-def _alarm_problems(alarm: PushAlarm) -> list[str]:
+def _alarm_problems(alarm: AlarmProcess) -> list[str]:
     found = []
     if alarm.state is not None and alarm.state.fired:
-        found.append(fired_text(alarm.state))
+        found.append(alarm_text(alarm.state))
     if alarm.skipped:
-        found.append(f"{len(alarm.skipped)} pushes are unknown to the alarm, the last one: {alarm.skipped[-1]}")
+        found.append(f"The alarm skipped {len(alarm.skipped)} pushes, the last: {alarm.skipped[-1]}")
     return found
 
 
-def fired_text(state: AlarmState) -> str:
-    """In words, when the alarm fired and why."""
-    return (
-        f"the model no longer fits what is seen: alarm at push {state.fired_at}, the {state.fired_after}th, evidence "
-        f"10^{state.fired_evidence:.2f} of {state.fired_by}, false at most once in {1.0 / state.false_alarm_rate:g}"
-    )
-
-
-def _alarm(alarm: PushAlarm | None) -> dict[str, object]:
+def _alarm_figures(alarm: AlarmProcess | None) -> dict[str, object]:
     if alarm is None or alarm.state is None:
-        return {"alarm": alarm.off or "no push was judged"} if alarm else {}
+        return {"alarm": alarm.off or "no push scored yet"} if alarm else {}
     state = alarm.state
     values: dict[str, object] = {"alarm": "fired" if state.fired else "quiet", "alarm pushes": state.pushes}
     values |= {"alarm log10 evidence": state.log10_evidence, "alarm strongest": state.strongest}

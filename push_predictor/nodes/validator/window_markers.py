@@ -17,9 +17,9 @@ LIMIT = 2.795483482915108  # the root of the 95 % quantile of chi-squared with t
 
 
 def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
-    """Pusher, push, outlines, the 95 % ellipse and what was observed, in frame_id (prediction: n = 1).
+    """Pusher, push, outlines, 95 % ellipse, observed pose and label in frame_id; prediction: of n = 1.
 
-    Each has a namespace of its own and id 0, so a window replaces the one before.
+    Each marker has a namespace of its own and id 0, so a window replaces the one before.
     """
     heading = np.array([window.push_heading])
     predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
@@ -37,10 +37,10 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
 
 
 def tip_of(rig: Rig, window: PushWindow) -> Array:
-    """The pusher's centre (2,), m, at the window's start: that of a disc that touches the outline at the contact."""
+    """The pusher's centre (2,), m, at the window's start: of a disc that touches the outline at the contact."""
     contact = np.array([window.contact])
-    predictor = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
-    return to_world(predictor, window.slider_start)[0]
+    centre = rig.outline.point(contact) - rig.pusher_radius * rig.outline.inward_normal(contact)
+    return np.asarray(to_world(centre, window.slider_start)[0])
 
 
 def error_in_sd(window: PushWindow, prediction: Prediction) -> float:

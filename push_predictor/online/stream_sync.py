@@ -1,27 +1,42 @@
-"""Are the streams of a score together? A fast replay leaves one behind whose samples the middleware still holds."""
+"""Are the streams of a validation in step? In a fast replay one lags behind while the middleware holds its samples."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from time import monotonic
 
-from push_predictor.nodes.validator.sensor_subscriber import Samples
+from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
 from push_predictor.recordings.windows.finder import HOLD
 from push_predictor.recordings.windows.scalars import APART
 from push_predictor.recordings.windows.stream_faults import APART as CLOCKS_APART
 from push_predictor.recordings.windows.stream_faults import apart_words
 
-SILENCE = 5.0  # s of waiting for a stream that lags behind
+PATIENCE = 5.0  # s of waiting for a stream that lags behind
 SENSOR_LAG, SCALAR_LAG = 0.5e9 * HOLD, 0.5 * APART  # ns; the finder goes on without a stream that lags by twice as much
 SILENT = 2.0  # s without a sample after which a stream is called silent
 LAGS = 50  # portions of a stream over which its stamps are compared with the slider's
 
 
-class StreamPace:
-    """Keeps for each stream how far it has come, and since when it is behind the foremost sensor.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A portion of each stream; scalars: of each scalar topic that is or was published, by its name in a recording."""
 
-    scalars: topics that are waited for though they have not sent anything.
+    slider: PoseStream
+    pusher: PoseStream
+    wrench: WrenchStream
+    scalars: Mapping[str, ScalarStream] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """How many samples of the sensors."""
+        return len(self.slider) + len(self.pusher) + len(self.wrench)
+
+
+class StreamSync:
+    """Records for each stream its newest stamp, and since when it lags behind the foremost sensor.
+
+    scalars: topics to wait for although they have not sent anything.
     """
 
     def __init__(self, scalars: Sequence[str] = ()) -> None:
@@ -34,39 +49,42 @@ class StreamPace:
     def note(self, samples: Samples) -> None:
         """Take note of a portion of the streams."""
         stamps = {"slider": samples.slider.stamp, "pusher": samples.pusher.stamp, "wrench": samples.wrench.stamp}
-        came = {name: int(stamp[-1]) for name, stamp in stamps.items() if len(stamp)}
-        self._sensors |= came
-        self._heard |= dict.fromkeys(came, monotonic())
-        for name in came.keys() - {"slider"}:
+        newest = {name: int(stamp[-1]) for name, stamp in stamps.items() if len(stamp)}
+        self._sensors |= newest
+        self._heard |= dict.fromkeys(newest, monotonic())
+        for name in newest.keys() - {"slider"}:
             if "slider" in self._sensors:
-                lag = 1e-9 * (came[name] - self._sensors["slider"])
+                lag = 1e-9 * (newest[name] - self._sensors["slider"])
                 self._lags.setdefault(name, deque(maxlen=LAGS)).append(lag)
         self._scalars |= {name: int(stream.stamp[-1]) for name, stream in samples.scalars.items() if len(stream)}
 
     def in_step(self) -> bool:
-        """Is no stream behind, but such as have been for SILENCE? To be asked often, for it takes the time."""
+        """Whether no stream lags, except those that have lagged for PATIENCE. Ask often: the waiting is timed here."""
         foremost, now = max(self._sensors.values(), default=0), monotonic()
-        lags = {name: foremost - stamp < SENSOR_LAG for name, stamp in self._sensors.items()}
-        lags |= {name: stamp is not None and foremost - stamp < SCALAR_LAG for name, stamp in self._scalars.items()}
-        self._together |= {name: now for name, near in lags.items() if near}
-        return all(near or now - self._together.setdefault(name, now) > SILENCE for name, near in lags.items())
+        near = {name: foremost - stamp < SENSOR_LAG for name, stamp in self._sensors.items()}
+        near |= {name: stamp is not None and foremost - stamp < SCALAR_LAG for name, stamp in self._scalars.items()}
+        self._together |= {name: now for name, is_near in near.items() if is_near}
+        return all(ok or now - self._together.setdefault(name, now) > PATIENCE for name, ok in near.items())
 
     def apart(self) -> dict[str, float]:
-        """By how much (s) the stamps of a stream stay ahead of (or behind) the slider's, of those that do."""
+        """By how much (s) the stamps of a stream stay ahead of (or behind) the slider's, for those that do."""
         nearest = {name: min(lags, key=abs) for name, lags in self._lags.items() if len(lags) == LAGS}
         return {name: lag for name, lag in nearest.items() if abs(lag) > CLOCKS_APART}
 
     def silent(self) -> list[str]:
-        """The sensors that have stopped while others go on."""
+        """The sensors that have stopped while others continue."""
         newest = max(self._heard.values(), default=0.0)
         return [name for name, heard in self._heard.items() if newest - heard > SILENT]
 
     @property
     def with_wrench(self) -> bool:
-        """Has a wrench come?"""
+        """Whether a wrench was received."""
         return "wrench" in self._heard
 
     def problems(self) -> list[str]:
         """What keeps windows from being found, in words."""
         found = [apart_words(name, lag) for name, lag in self.apart().items()]
-        return found + [f"the {name} is silent while others go on: no window is found" for name in self.silent()]
+        return found + [
+            f"No sample from the {name} for {SILENT:g} s, others continue: no window can be found."
+            for name in self.silent()
+        ]

@@ -1,6 +1,6 @@
-"""The table of windows that a validator keeps on disk while pushes happen: what a trace of the residual starts from.
+"""The table of windows that a validator keeps on disk: what a residual trace starts from.
 
-Every window is on disk as soon as it is found, with its covariates, whatever becomes of the validator.
+Every window is appended with its covariates as soon as it is found, so an interrupted validation loses nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.nodes.validator.residual_recorder import JOURNAL, ResidualJournal
+from push_predictor.online.residual_journal import JOURNAL, ResidualJournal
 from push_predictor.recordings.atomic_append import append_lines
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.table import PushTable
@@ -24,20 +24,20 @@ NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
 class WindowTable:
-    """FOLDER/pushes.csv and the rig beside it, anew with the first window that is added."""
+    """FOLDER/pushes.csv and its rig file, started again with the first window that is added."""
 
     def __init__(self, folder: Path, rig: Rig) -> None:
         self.path, self._rig = folder / TABLE, rig
         self._names: tuple[str, ...] | None = None
-        self.cut_off: Path | None = None  # where an earlier score was put that did not come to its end
+        self.cut_off: Path | None = None  # folder that an earlier, interrupted validation was moved to
 
     def add(
         self, windows: Sequence[PushWindow], before: Sequence[PushWindow], first: Mapping[str, float] = NOTHING
     ) -> None:
         """Append windows; `before` are all those that are in the file.
 
-        first: of scalar topics the first value: what reading a recording gives windows before it. Raises OSError that
-        names the path.
+        first: first value of each scalar topic, which windows before it get, as when a recording is read. Raises
+        OSError that names the path.
         """
         if not windows:
             return
@@ -63,8 +63,9 @@ class WindowTable:
 
 
 def put_aside(folder: Path) -> Path | None:
-    """Keep the windows and residuals of a score that was cut off from being written over: they go to
-    FOLDER/cut_off_DATE (of the last residual, UTC). None where there is no such. Raises OSError.
+    """Move the windows and residuals of an interrupted validation to FOLDER/cut_off_DATE, so that they are kept.
+
+    DATE is that of the last residual, UTC. Returns None if there is no such validation. Raises OSError.
     """
     journal = folder / JOURNAL
     if not journal.exists():
@@ -72,18 +73,14 @@ def put_aside(folder: Path) -> Path | None:
     date = datetime.fromtimestamp(journal.stat().st_mtime, timezone.utc)
     place = folder / f"cut_off_{date:%Y%m%dT%H%M%S%f}"
     place.mkdir(exist_ok=True)
-    for path in (
-        folder / TABLE,
-        rig_path(folder / TABLE),
-        journal,
-    ):  # the journal, which tells, last
+    for path in (folder / TABLE, rig_path(folder / TABLE), journal):  # the journal last: it marks the interruption
         if path.exists():
             path.replace(place / path.name)
     return place
 
 
 def _table(windows: Sequence[PushWindow], names: Sequence[str], first: Mapping[str, float]) -> PushTable:
-    """The windows as rows with just these covariates; where a window lacks one, the first value, NaN without any."""
+    """The windows as rows with exactly these covariates; a missing one gets its first value, or NaN."""
     return PushTable(
         np.array([[w.velocity, w.contact, w.angle] for w in windows]).reshape(-1, 3),
         np.array([w.duration for w in windows]),

@@ -1,4 +1,4 @@
-"""Serialized messages of scalar topics gathered into the library's streams, and the time of those that bear none."""
+"""Serialized messages of scalar topics, collected into streams; messages without a header are dated by /clock."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from collections.abc import Callable
 
 import numpy as np
 
-from msg_adapters.streams import LIMIT
+from push_predictor.online.message_buffer import LIMIT
 from push_predictor.recordings.samples import check_samples, scalar_rules
 from push_predictor.recordings.streams import ScalarStream
 from push_predictor.types import BoolArray
 
 CLOCKS = 4000  # messages of /clock that are kept
-FAR = 3_600_000_000_000  # ns; farther from the poses' stamps than this is another clock's time
+FAR = 3_600_000_000_000  # ns; a stamp farther than this from the poses' stamps is of another clock
 NEVER = np.iinfo(np.int64).min
 
 
 class SentTimes:
-    """What /clock told, by the time (ns) at which it was sent."""
+    """The times published on /clock, by the time (ns) at which they were sent."""
 
     def __init__(self) -> None:
         self._sent: list[int] = []
-        self._told: list[int] = []
+        self._clock: list[int] = []
 
     def put(self, data: bytes, sent: int) -> None:
         """Take a message of /clock."""
         seconds, rest = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
         self._sent.append(max(sent, self.newest or 0))
-        self._told.append(seconds * 1_000_000_000 + rest)
+        self._clock.append(seconds * 1_000_000_000 + rest)
         if len(self._sent) > CLOCKS:
-            del self._sent[: CLOCKS // 2], self._told[: CLOCKS // 2]
+            del self._sent[: CLOCKS // 2], self._clock[: CLOCKS // 2]
 
     @property
     def newest(self) -> int | None:
@@ -41,15 +41,15 @@ class SentTimes:
         return self._sent[-1] if self._sent else None
 
     def at(self, sent: int) -> int | None:
-        """The time (ns) that was told last before something was sent; None if that is not known."""
+        """The time (ns) published last before something was sent; None if it is not known."""
         place = bisect_right(self._sent, sent)
-        return self._told[place - 1] if place else None
+        return self._clock[place - 1] if place else None
 
 
-class ScalarInbox:
-    """Serialized messages of one scalar topic until somebody takes them; what cannot be used is counted by kind.
+class ScalarBuffer:
+    """Serialized messages of one scalar topic until they are taken; unusable ones are counted by kind.
 
-    kind: one of the types that a recording's scalars have. Beyond LIMIT the oldest messages are dropped, and counted.
+    kind: one of the types that a recording's scalars have. Beyond LIMIT the oldest messages are dropped and counted.
     """
 
     def __init__(self, kind: str) -> None:
@@ -65,7 +65,7 @@ class ScalarInbox:
 
     @property
     def timed(self) -> bool:
-        """Whether messages bear their time."""
+        """Whether messages contain their time."""
         return self._rules.layout.header
 
     def put(self, data: bytes, sent: int) -> None:
@@ -80,7 +80,7 @@ class ScalarInbox:
     def take(self, until: int, time_of: Callable[[int], int | None], near: int | None) -> ScalarStream:
         """The usable samples since the last call; of messages without a time those that were sent before `until` (ns).
 
-        time_of: their time, from when they were sent, None if that cannot be told. near: a recent stamp (ns) of the
+        time_of: returns their time from when they were sent, None if it is not known. near: a recent stamp (ns) of the
         poses, None if there is none.
         """
         with self._lock:
@@ -88,8 +88,8 @@ class ScalarInbox:
             taken, self._waiting = self._waiting[:count], self._waiting[count:]
         checked = check_samples([data for data, _ in taken], self._rules)
         self.rejected.update(checked.rejected)
-        told = [NEVER if (time := time_of(sent)) is None else time for _, sent in taken] if not self.timed else ()
-        stamp = checked.stamp if self.timed else np.array(told, dtype=np.int64)
+        dated = [NEVER if (time := time_of(sent)) is None else time for _, sent in taken] if not self.timed else ()
+        stamp = checked.stamp if self.timed else np.array(dated, dtype=np.int64)
         usable = self._kept("without time", checked.usable, stamp != NEVER)
         if near is not None:
             usable = self._kept("another clock", usable, (stamp > near - FAR) & (stamp < near + FAR))

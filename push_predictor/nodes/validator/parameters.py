@@ -1,0 +1,20 @@
+"""The parameters of push_validator; the table in docs/validation.md repeats them."""
+
+from __future__ import annotations
+
+from push_predictor.evaluation.alarm.evidence import DEFAULT_RATE
+from push_predictor.nodes.parameters import Param
+
+PARAMETERS = (
+    Param("model", "", "Model to validate: a model file, or a name known to predict_server. Empty: its default model."),
+    Param("compare", [""], "Further models to validate on the same windows: files or names."),
+    Param("rig", "", "Rig file (YAML, a push_rig record). Empty: the record on topic rig."),
+    Param("output", "", "Folder for validation.json, windows.json, residuals and report. Empty: nothing is written."),
+    Param("report", True, "Also write the HTML report when a recording has finished or ~/finish is called."),
+    Param("frame_id", "world", "Frame that sensor messages must name; others are rejected. Empty: any frame."),
+    Param("scalar_topics", [""], "Further topics with one number each. Every window gets their values at its start."),
+    Param("request_timeout", 2.0, "Seconds after which an unanswered request is sent again.", low=0.05, high=60.0),
+    Param("last_answers", 30.0, "Seconds that the end of a recording waits for missing answers.", low=0.0, high=3600.0),
+    Param("false_alarm_rate", DEFAULT_RATE, "Largest probability that push_alarm is ever published without a change."),
+    Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
+)

@@ -1,0 +1,42 @@
+"""What a validator publishes about each window: residual, markers and, once a run, the alarm."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.alarms import alarm_to_message
+from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.models.push_model import Prediction
+from push_predictor.nodes.qos import LATCHED
+from push_predictor.nodes.validator.status import alarm_text
+from push_predictor.nodes.validator.window_markers import window_markers
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor_interfaces.msg import PushAlarm, PushResidual
+
+WORLD = "world"
+
+
+class ResultPublishers:
+    """Publishers of push_residual, push_alarm and push_markers. frame_id: of the markers, empty for world."""
+
+    def __init__(self, node: Node, frame_id: str) -> None:
+        self._log, self._frame_id = node.get_logger(), frame_id or WORLD
+        self._residuals = node.create_publisher(PushResidual, "push_residual", 1000)
+        self._alarms = node.create_publisher(PushAlarm, "push_alarm", LATCHED)
+        self._markers = node.create_publisher(MarkerArray, "push_markers", 100)  # for a burst after a stall
+
+    def residual(self, residual: PushResidual) -> None:
+        """Publish a window, predicted and observed."""
+        self._residuals.publish(residual)
+
+    def markers(self, rig: Rig, window: PushWindow, prediction: Prediction) -> None:
+        """Publish a window's markers; none are made while nobody subscribes."""
+        if self._markers.get_subscription_count():
+            self._markers.publish(window_markers(rig, window, prediction, self._frame_id))
+
+    def alarm(self, state: AlarmState, end: int) -> None:
+        """Log and publish an alarm that has fired; end: of the push at which it fired, ns."""
+        self._log.warning(alarm_text(state))
+        self._alarms.publish(alarm_to_message(state, end, self._frame_id))
