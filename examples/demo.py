@@ -1,9 +1,9 @@
-"""The main job end to end: learn, serve, replay, validate online, report, close the loop. `make demo` runs this.
+"""The whole workflow: train, predict, replay, validate online, report, close the residual loop. `make demo` runs this.
 
-Models are trained on one recording. Another one is then replayed ten times faster than it was recorded, by a node of
-its own, as the topics that a motion tracker and a force sensor would publish. A second node predicts, a third finds the
-pushes in the topics, asks for predictions and compares them with what happened. At last something changes in a replay:
-the alarm fires, the cause is traced, the extended model is loaded (examples/loop.py).
+Three models are trained on one recording. One node then replays another recording, at ten times its speed, on the
+topics of a motion tracker and a force sensor. A second node predicts. A third finds the pushes in the topics, requests
+predictions and compares them with the outcomes. Last, the rig changes during a replay: the alarm fires, the cause is
+traced, and the extended model is loaded (examples/loop.py).
 """
 
 from __future__ import annotations
@@ -35,43 +35,44 @@ TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square
 OUT = ROOT / "out" / "demo"
 KINDS = ("vhgp", "gp", "analytical")  # the first is the main model
 RATE = 10.0
-AGREEMENT = 1e-9  # m, rad: online and offline predictions may differ by rounding only
-SEED = 3  # draws the hidden effect of the last part; `python -m examples.demo 7` draws another
-PATIENCE = 120.0  # s for the replay and the last answers
+AGREEMENT = 1e-9  # m, rad: room for rounding only
+SEED = 3  # of the hidden change; `python -m examples.demo 7` draws another one
+PATIENCE = 120.0  # s, for the replay and the last predictions
 
 
 def main(arguments: Sequence[str] = ()) -> int:
-    """Run the demo; the exit status is 0 if online and offline validation agree and all nodes worked.
+    """Run the demo; the exit status is 0 if all nodes worked and online and offline predictions agree.
 
-    arguments: none, or the seed that draws the hidden effect.
+    arguments: none, or the seed of the hidden change.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     OUT.mkdir(parents=True, exist_ok=True)
     begun = time.monotonic()
-    print("1. learn from", TRAINING.relative_to(ROOT))
+    print(f"1. Train {len(KINDS)} models on {TRAINING.relative_to(ROOT)}.")
     paths = [_trained(kind) for kind in KINDS]
     domain = os.environ["ROS_DOMAIN_ID"]
-    print(f"2. serve, replay {HELD_OUT.relative_to(ROOT)} at rate {RATE:g}, validate (ROS_DOMAIN_ID {domain})")
+    print(f"2. Replay {HELD_OUT.relative_to(ROOT)} at {RATE:g} times its speed and validate the models online.")
+    print(f"   The nodes run in ROS domain {domain}.")
     _replay_and_validate(paths)
-    print("3. online against offline, window by window")
+    print("3. Compare the online predictions with offline predictions of the same windows.")
     models = [load_model(path) for path in paths]
     largest = max(_largest_difference(model, k) for k, model in enumerate(models))
     agree = largest <= AGREEMENT
-    print(f"   largest difference of a prediction: {largest:.1e} (m, rad); {'agree' if agree else 'DISAGREE'}\n")
+    print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} (m, rad).\n")
     page = _report(models, f"predictions differ by at most {largest:.1e} (m, rad)")
-    print(f"   the report with pictures: {page}\n", flush=True)
+    print(f"   Report with pictures: {page}\n", flush=True)
     seed = int(arguments[0]) if arguments else SEED
     picture = close_the_loop(paths[0], models[0].name, OUT, seed)
-    print(f"\ndone in {time.monotonic() - begun:.0f} s; the report and the picture of the loop:\n{page}\n{picture}")
+    print(f"\nDone in {time.monotonic() - begun:.0f} s. Report and picture of the residual loop:\n{page}\n{picture}")
     return 0 if agree else 1
 
 
 def _trained(kind: str) -> Path:
-    """The model file, trained now unless an earlier run left it and the recording is older."""
+    """The model file; an earlier run's file is used unless the recording is newer."""
     path = OUT / f"{kind}.pushmodel"
     if path.exists() and path.stat().st_mtime > max(part.stat().st_mtime for part in TRAINING.iterdir()):
-        print(f"   {kind}: found {path.relative_to(ROOT)}")
+        print(f"   {kind}: using {path.relative_to(ROOT)} of an earlier run")
         return path
     command = ["train", str(TRAINING), "--model", kind, "--out", str(path)]
     subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
@@ -79,7 +80,7 @@ def _trained(kind: str) -> Path:
 
 
 def _replay_and_validate(models: Sequence[Path]) -> None:
-    """Three nodes, each a process; ends when the validator has written its result."""
+    """Run the three nodes until the validator has written its result."""
     result = OUT / "online" / "validation.json"
     result.unlink(missing_ok=True)
     main_model, *others = map(str, models)
@@ -94,14 +95,13 @@ def _replay_and_validate(models: Sequence[Path]) -> None:
         deadline = time.monotonic() + PATIENCE
         while not result.exists():
             if time.monotonic() > deadline:
-                raise SystemExit(f"{result} was not written within {PATIENCE:.0f} s; see {OUT}/*.log")
+                raise SystemExit(f"the validator wrote no {result} within {PATIENCE:.0f} s: see {OUT}/*.log")
             table.show()
             time.sleep(0.1)
 
 
 def _largest_difference(model: PushModel, number: int) -> float:
-    """Between the predictions that came through the services and those made from the file; infinite if the windows
-    are not the same."""
+    """Largest difference between online and offline predictions of a model; infinite if the windows differ."""
     suffix = "" if number == 0 else f"_{model.name}"
     online = json.loads((OUT / "online" / f"windows{suffix}.json").read_text())["windows"]
     windows, offline = validate_recording(model, HELD_OUT)
@@ -121,11 +121,12 @@ def _report(models: Sequence[PushModel], agreement: str) -> Path:
 
 
 def _print_summary(comparisons: Sequence[Comparison]) -> None:
-    """What the paper's tables hold: the three models, one line each."""
+    """Print the scores of the three models, one line each."""
     scores: list[dict[str, Any]] = [metrics_json(comparison) for comparison in comparisons]
     first = scores[0]
-    print(f"{first['n_test']} windows of {first['n_pushes']} pushes of a recording that no model was trained on;")
-    print("NLPD in nats (SI units), 95 % intervals from resampling whole pushes")
+    print(f"   Scores on {first['n_test']} windows of {first['n_pushes']} pushes that no model was trained on.")
+    print("   NMSE: 0 is perfect, 3 is the mean outcome. NLPD: lower is better (nats, SI units).")
+    print("   In brackets: 95 % intervals from resampling whole pushes.\n")
     print(f"{'model':12s}{'NMSE':>7s}{'':17s}{'NLPD':>8s}{'':19s}{'95 % coverage: dx':>17s}{'dy':>7s}{'dtheta':>8s}")
     for score in scores:
         spans = {key: score["interval"][key] for key in ("nmse", "nlpd")}

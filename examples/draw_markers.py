@@ -1,9 +1,9 @@
-"""The markers of push_validator as a picture: recorded from a live run, drawn with matplotlib.
+"""The markers of push_validator as a picture: recorded from a replay, drawn with matplotlib.
 
     python -m examples.draw_markers [PICTURE.png [MODEL]]
 
-predict_server, push_validator and push_replay run as processes; this one subscribes to push_markers and push_residual,
-keeps what was published and draws six windows of different kinds. No viewer takes part: it is not RViz that is seen.
+predict_server, push_validator and push_replay run as processes. This one subscribes to push_markers and push_residual
+and draws six windows of different kinds. The picture is no screenshot of RViz.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
 PICTURE, MODEL = ROOT / "docs" / "pictures" / "markers.png", LOGS / "vhgp.pushmodel"
 RATE, PATIENCE = 10.0, 180.0  # recorded seconds per second; s
-SIDE, BELOW, ABOVE = 0.086, 0.092, 0.106  # m that are shown beside, below and above a slider's centre
+SIDE, BELOW, ABOVE = 0.086, 0.092, 0.106  # m shown to the sides of, below and above the slider's centre
 COLUMNS, WIDTH = 3, 9.0  # inches
 CAPTION, FOOT = 0.25, 0.42  # inches
 BACKGROUND = "#303030"  # RViz's default
@@ -51,20 +51,20 @@ KINDS: tuple[tuple[str, Kind], ...] = (
     ("near a corner", lambda w, at: abs(at - 0.5) > 0.42),
     ("oblique: the pusher slides", lambda w, at: abs(w.angle) > 1.0),
     ("50 mm/s", lambda w, at: w.velocity > 0.04),
-    ("outside the 95 %", lambda w, at: size_of(w) > LIMIT),
+    ("outside the 95 % ellipse", lambda w, at: size_of(w) > LIMIT),
 )
 
 
 class Listener:
-    """What was published: markers and residuals of the windows, by the time of their end."""
+    """The published markers and residuals, by the end time of their window."""
 
-    def __init__(self, listening: rclpy.node.Node) -> None:
+    def __init__(self, subscriber_node: rclpy.node.Node) -> None:
         self.markers: dict[tuple[int, int], MarkerArray] = {}
         self.residuals: dict[tuple[int, int], PushResidual] = {}
         self.finished = False
-        listening.create_subscription(MarkerArray, "push_markers", self._on_markers, 1000)
-        listening.create_subscription(PushResidual, "push_residual", self._on_residual, 1000)
-        listening.create_subscription(String, "replay_status", self._on_status, LATCHED)
+        subscriber_node.create_subscription(MarkerArray, "push_markers", self._on_markers, 1000)
+        subscriber_node.create_subscription(PushResidual, "push_residual", self._on_residual, 1000)
+        subscriber_node.create_subscription(String, "replay_status", self._on_status, LATCHED)
 
     def _on_markers(self, message: MarkerArray) -> None:
         self.markers[_stamp(message.markers[0])] = message
@@ -77,7 +77,7 @@ class Listener:
 
 
 def main(arguments: Sequence[str] = ()) -> int:
-    """Record the markers of a replay and draw some of them."""
+    """Record the markers of a replay and draw six of them."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     picture, model = (Path(text) for text in (*arguments, *map(str, (PICTURE, MODEL)[len(arguments) :])))
@@ -85,43 +85,45 @@ def main(arguments: Sequence[str] = ()) -> int:
     if not model.exists():
         command = ["train", str(TRAINING), "--model", "vhgp", "--out", str(model)]
         subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
-    with _listening() as (heard, spin), ExitStack() as running:
+    with _subscribed() as (received, spin), ExitStack() as running:
         running.enter_context(node("predict_server", {"models": [str(model)]}))
         running.enter_context(node("push_validator", {"model": str(model)}))
         replay = {"recording": str(HELD_OUT), "play.rate": RATE, "wait_for_subscribers": 30.0}
         running.enter_context(node("push_replay", replay))
-        _hear_all(heard, spin)
-    print(f"{len(heard.markers)} windows heard")
-    chosen = choose(heard, load_rig_for([HELD_OUT]).outline)
+        _receive_all(received, spin)
+    print(f"Received the markers of {len(received.markers)} windows.")
+    chosen = choose(received, load_rig_for([HELD_OUT]).outline)
     draw_windows(picture, chosen)
     print(picture)
     return 0
 
 
-def choose(heard: Listener, outline: Outline) -> list[tuple[str, MarkerArray]]:
-    """Of each kind the window whose error, in standard deviations, is the median of that kind."""
+def choose(received: Listener, outline: Outline) -> list[tuple[str, MarkerArray]]:
+    """Choose, for each kind, the window with the median error in standard deviations."""
     chosen = []
     for name, is_of_kind in KINDS:
-        of_kind = [w for key, w in heard.residuals.items() if key in heard.markers and is_of_kind(w, along(outline, w))]
+        of_kind = [
+            w for key, w in received.residuals.items() if key in received.markers and is_of_kind(w, along(outline, w))
+        ]
         if not of_kind:
-            raise SystemExit(f"no window is of the kind: {name}")
+            raise SystemExit(f'no window of the kind "{name}"')
         window = sorted(of_kind, key=size_of)[len(of_kind) // 2]
-        chosen.append((f"{name} ({len(of_kind)} windows)", heard.markers[_stamp(window)]))
+        chosen.append((f"{name} ({len(of_kind)} windows)", received.markers[_stamp(window)]))
     return chosen
 
 
 def along(outline: Outline, window: PushResidual) -> float:
-    """Where on its edge a window's contact lies, 0 to 1."""
+    """Position of a window's contact on its edge, 0 to 1."""
     return float(outline.edge(np.array([window.contact]))[1][0])
 
 
 def size_of(window: PushResidual) -> float:
-    """The Mahalanobis distance of the outcome from the prediction."""
+    """Mahalanobis distance between outcome and prediction."""
     return float(np.linalg.norm(window.standardised))
 
 
 def draw_windows(path: Path, windows: Sequence[tuple[str, MarkerArray]]) -> None:
-    """Windows side by side, all at one scale, each around its slider."""
+    """Draw windows next to each other, at one scale, each around its slider."""
     rows = -(-len(windows) // COLUMNS)
     width = WIDTH / COLUMNS
     height = width * (BELOW + ABOVE) / (2.0 * SIDE)
@@ -141,9 +143,9 @@ def draw_windows(path: Path, windows: Sequence[tuple[str, MarkerArray]]) -> None
 
 
 NOTE = (
-    "The messages of push_markers that a replay of bags/square_abs_test made, seen from above and drawn with "
-    "matplotlib: no screenshot of RViz.\nGrey: before; blue: predicted; orange: observed. Dot in ellipse: the centre; "
-    "stroke on dial: the heading. Of each kind the window of median error."
+    "Messages on push_markers during a replay of bags/square_abs_test, seen from above, drawn with matplotlib.\n"
+    "Grey: start; blue: predicted; orange: observed. Dot in ellipse: centre; line on dial: heading. "
+    "Of each kind, the window with the median error."
 )
 
 
@@ -166,28 +168,28 @@ def _centre(array: MarkerArray) -> np.ndarray:
     return np.asarray(np.mean([[point.x, point.y] for point in start.points[:-1]], axis=0))
 
 
-def _hear_all(heard: Listener, spin: Callable[[float], None]) -> None:
-    """Until the replay has finished and no window came for two seconds."""
+def _receive_all(received: Listener, spin: Callable[[float], None]) -> None:
+    """Spin until the replay has finished and no window has arrived for two seconds."""
     deadline, last, count = time.monotonic() + PATIENCE, time.monotonic(), 0
-    while not heard.finished or time.monotonic() - last < 2.0:
+    while not received.finished or time.monotonic() - last < 2.0:
         spin(0.1)
-        if len(heard.markers) != count:
-            last, count = time.monotonic(), len(heard.markers)
+        if len(received.markers) != count:
+            last, count = time.monotonic(), len(received.markers)
         if time.monotonic() > deadline:
-            raise SystemExit(f"the replay did not finish within {PATIENCE:.0f} s; see {LOGS}/*.log")
+            raise SystemExit(f"the replay did not finish within {PATIENCE:.0f} s: see {LOGS}/*.log")
 
 
 @contextmanager
-def _listening() -> Iterator[tuple[Listener, Callable[[float], None]]]:
+def _subscribed() -> Iterator[tuple[Listener, Callable[[float], None]]]:
     rclpy.init()
-    listening = rclpy.create_node("draw_markers")
+    subscriber_node = rclpy.create_node("draw_markers")
     executor = SingleThreadedExecutor()
-    executor.add_node(listening)
+    executor.add_node(subscriber_node)
     try:
-        yield Listener(listening), executor.spin_once
+        yield Listener(subscriber_node), executor.spin_once
     finally:
         executor.shutdown()
-        listening.destroy_node()
+        subscriber_node.destroy_node()
         rclpy.try_shutdown()
 
 

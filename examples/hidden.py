@@ -1,7 +1,7 @@
-"""A recording with an effect that nobody names here: a seed draws it from the registry of the blind benchmark.
+"""A recording during which the rig changes; a seed draws the change from the effects of the blind benchmark.
 
-Slider, table and sensors are those of bags/square_abs_train. The first pushes are like those of training, then the
-effect sets in. What was drawn goes to a file of its own, which is read when all is over.
+Slider, table and sensors are those of bags/square_abs_train. The first pushes are as in training, then the change sets
+in. A separate file holds what was drawn; the demo reads it only at the end.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PLAIN, TRACED, REST = 25, 150, 80  # pushes: before the effect, with it until th
 
 @dataclass(frozen=True)
 class Hidden:
-    """Where things are. recorded: the pushes until the trace; whole: those and the rest; truth: what was drawn."""
+    """Paths. recorded: the pushes before the trace; whole: those and the later ones; truth: what was drawn."""
 
     recorded: Path
     whole: Path
@@ -40,35 +40,35 @@ class Hidden:
 
 
 def make_hidden(folder: Path, seed: int) -> Hidden:
-    """Draw an effect, simulate, write both recordings and, apart from them, the truth."""
+    """Draw a change, simulate, write both recordings and, in another folder, the truth."""
     places = Hidden(folder / "changed", folder / "changed_whole", folder / "truth" / "hidden.json")
     rng = np.random.default_rng([seed, 7])
     plain = standard_bags()["square_abs_train"]
     pushes = random_pushes(PLAIN + TRACED + REST, SPEEDS, TRAVEL, rng)
     spec = replace(plain, pushes=pushes, seed=int(rng.integers(2**31)), name=places.whole.name)
-    act, told = _drawn(spec, rng)
+    act, truth = _drawn(spec, rng)
     whole = simulate(replace(spec, changes=act))
     begins = conditions(spec).values["elapsed_time"]
     write_recording(places.whole, whole)
     write_recording(places.recorded, _until(whole, float(begins[PLAIN + TRACED])))
     places.truth.parent.mkdir(parents=True, exist_ok=True)
-    places.truth.write_text(json.dumps(told, indent=1))
+    places.truth.write_text(json.dumps(truth, indent=1))
     return places
 
 
 def _drawn(spec: SimulationSpec, rng: np.random.Generator) -> tuple[Changes, Mapping[str, Any]]:
-    """What acts from push PLAIN on, as strongly to the end, and what a reader is told of it."""
+    """A constant change from push PLAIN on, and its description for the reader."""
     world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, conditions(spec), rng)
     kinds = GROUPS[GROUP]
     kind = replace(kinds[int(rng.integers(len(kinds)))], drivers=("constant",), alone=1.0)
     drawn = draw(kind, SIZE, world)
-    assert isinstance(drawn.act, Changes)  # no fault of the measurement is in this group
-    told = {"mechanism": drawn.kind, "value": drawn.value, "unit": drawn.unit, "size": SIZE, "from push": PLAIN}
-    return _later(drawn.act), {**told, "right names": drawn.names}
+    assert isinstance(drawn.act, Changes)  # this group has no measurement errors
+    truth = {"mechanism": drawn.kind, "value": drawn.value, "unit": drawn.unit, "size": SIZE, "from push": PLAIN}
+    return _later(drawn.act), {**truth, "right names": drawn.names}
 
 
 def _later(changes: Changes) -> Changes:
-    """The same from push PLAIN on, nothing before."""
+    """The same changes from push PLAIN on; none before."""
     laws = {f.name: getattr(changes, f.name) for f in fields(changes) if f.name != "added_mass"}
     gated: dict[str, Any] = {name: _gated(law) for name, law in laws.items() if law is not None}
     return replace(changes, **gated)
@@ -84,7 +84,7 @@ def _gated(law: Law) -> Law:
 
 
 def _until(recording: Recording, seconds: float) -> Recording:
-    """What was recorded in the first seconds."""
+    """The first seconds of a recording."""
     first = min(int(recording.slider.stamp[0]), int(recording.pusher.stamp[0]))
     last = first + round(seconds * 1e9)
     wrench = None if recording.wrench is None else _cut(recording.wrench, last)

@@ -1,4 +1,4 @@
-"""What /diagnostics says while a replay is validated: a table drawn anew, or lines where there is no screen."""
+"""The scores on /diagnostics during a replay: a live table in a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-LINE_PERIOD = 2.0  # s between two lines where there is no screen
+LINE_PERIOD = 2.0  # s between two lines without a terminal
 COLUMNS = ("windows", "pushes", "nmse", "nlpd", "coverage 0.95 dx", "coverage 0.95 dy", "coverage 0.95 dtheta")
 
 
 class LiveTable:
-    """A context manager that listens to /diagnostics; show() draws what it heard."""
+    """A context manager that subscribes to /diagnostics; show() draws the latest values."""
 
     def __init__(self) -> None:
         self._values: dict[str, dict[str, str]] = {}
@@ -30,7 +30,7 @@ class LiveTable:
     def __enter__(self) -> LiveTable:
         rclpy.init()
         self._node = Node("demo_table")
-        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 10)
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, 10)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
@@ -64,7 +64,7 @@ class LiveTable:
         except ExternalShutdownException:
             return
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self._values[status.name] = {entry.key: entry.value for entry in status.values}
 
@@ -81,7 +81,7 @@ class LiveTable:
 
     def _table(self) -> Table:
         replay = next((values for name, values in self._values.items() if "push_replay" in name), {})
-        table = Table(title=f"online validation; replay late p99 {replay.get('late_p99_us', '-')} us")
+        table = Table(title=f"Online validation (99 % of messages at most {replay.get('late_p99_us', '–')} µs late)")
         for column in ("model", *COLUMNS):
             table.add_column(column, justify="right")
         for name in self._models():

@@ -1,8 +1,8 @@
-"""The residual loop on screen: an alarm, its cause traced, the extended model served, the error before and after.
+"""The residual loop, step by step: an alarm, the trace of its cause, the extended model, the error before and after.
 
-A replay changes on the way; by what, is not known here (examples/hidden.py). The validator's alarm says that the model
-no longer fits, the action trace_residual says what the model lacks, load_model puts the extended model into service,
-and a validator asks both models about the same later pushes.
+The rig changes during a replay; examples/hidden.py draws the change and hides it. The validator's alarm reports that
+the model no longer fits. The action trace_residual finds the cause, and load_model loads the extended model. A second
+validation compares both models on the pushes after the trace.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REPLAY_PATIENCE, TRACE_PATIENCE, PATIENCE = 200.0, 240.0, 30.0  # s
 
 @dataclass(frozen=True)
 class Traced:
-    """What came of a trace: message and verdict of the action, the extended model's file (None: there is none)."""
+    """The result of a trace: its message, its verdict, and the file of the extended model (None: no extension)."""
 
     message: str
     verdict: Mapping[str, Any]
@@ -46,14 +46,14 @@ class Traced:
 
 
 class Operator:
-    """Hears the alarm, asks for the trace, loads the model: what a person at the rig would do. A context manager."""
+    """Receives the alarm, requests the trace, loads the model, as a person at the rig would. A context manager."""
 
     def __enter__(self) -> Operator:
         rclpy.init()
         self.alarm: PushAlarm | None = None
         self._node = Node("demo_operator")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(PushAlarm, "push_alarm", self._hear, latched)
+        self._node.create_subscription(PushAlarm, "push_alarm", self._receive, latched)
         self._load = self._node.create_client(LoadModel, "load_model")
         self._trace = ActionClient(self._node, TraceResidual, "trace_residual")
         self._executor = SingleThreadedExecutor()
@@ -72,13 +72,13 @@ class Operator:
         rclpy.try_shutdown()
 
     def stop_listening(self) -> None:
-        """Later alarms are of no interest."""
+        """Ignore later alarms."""
         self._listens = False
 
     def trace(self, model: str, output: Path) -> Traced:
-        """Have what was recorded in a folder traced. Raises SystemExit if the server does not do it."""
+        """Trace the residuals that a validator wrote into a folder. Raises SystemExit if that fails."""
         if not self._trace.wait_for_server(PATIENCE):
-            raise SystemExit("trace_residual is not offered")
+            raise SystemExit(f"no action server trace_residual within {PATIENCE:.0f} s")
         goal = TraceResidual.Goal(model=model, output=str(output))
         handle = _answer(self._trace.send_goal_async(goal, feedback_callback=self._progress), PATIENCE)
         result = _answer(handle.get_result_async(), TRACE_PATIENCE).result
@@ -88,20 +88,20 @@ class Operator:
         return Traced(result.message, json.loads(result.verdict), extended)
 
     def load(self, path: Path, name: str) -> str:
-        """Have a model served beside the others. Raises SystemExit if it is refused."""
+        """Load a model into the server, in addition to the others. Raises SystemExit if the server refuses it."""
         if not self._load.wait_for_service(PATIENCE):
-            raise SystemExit("load_model is not offered")
+            raise SystemExit(f"no service load_model within {PATIENCE:.0f} s")
         response = _answer(self._load.call_async(LoadModel.Request(path=str(path), name=name)), PATIENCE)
         if not response.success:
             raise SystemExit(f"load_model: {response.message}")
         return str(response.message)
 
-    def _hear(self, message: PushAlarm) -> None:
+    def _receive(self, message: PushAlarm) -> None:
         if self._listens and self.alarm is None:
             self.alarm = message
             print(
-                f"   ALARM on push_alarm: push {message.push_id}, the {message.pushes}th, evidence 10^"
-                f"{message.log10_evidence:.1f} (false with a probability of at most {message.false_alarm_rate:g})",
+                f"   ALARM after {message.pushes} pushes ({message.push_id}): the model no longer fits (evidence "
+                f"{_odds(message.log10_evidence)}; false-alarm rate at most {message.false_alarm_rate:.0%}).",
                 flush=True,
             )
 
@@ -118,37 +118,37 @@ class Operator:
 
 
 def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
-    """Run it, tell it, and answer where the picture is. Raises SystemExit if a node fails."""
-    print("4. a second replay, at first like the training; then something changes, nobody says what", flush=True)
+    """Run the loop, print its steps, and return the path of the picture. Raises SystemExit if a node fails."""
+    print("4. Replay a second recording. After some pushes the rig changes, in a way that no node knows.", flush=True)
     hidden = make_hidden(out, seed)
     before, after = out / "changed_online", out / "after_online"
     with node("predict_server", {"models": [str(model)]}, "loop_server"), Operator() as operator:
         _replay(model, [], hidden.recorded, before, RATE)
-        time.sleep(1.0)  # the alarm may be on its way
+        time.sleep(1.0)  # the alarm may still be in transit
         operator.stop_listening()
         if operator.alarm is None:
-            print("   the alarm did not fire; the trace is asked for all the same")
-        print("5. trace_residual on what was recorded")
+            print("   The alarm did not fire. The trace is requested all the same.")
+        print("5. Trace the cause in the residuals that the validator recorded (action trace_residual).")
         traced = operator.trace(name, before)
         _print_lines(traced.message)
-        print("6. load the extended model, and go on")
+        print("6. Load the extended model and continue.")
         served = None if traced.extended is None else f"{name}_extended"
         if traced.extended is None or served is None:
-            print("   there is none: the trace did not find enough to change the model; it goes on as it is")
+            print("   There is no extended model: the trace found too little to change the model.")
         else:
             _print_lines(operator.load(traced.extended, served))
-        # From the beginning: what counts pushes or time counts as before. Judged are the pushes after the trace only.
+        # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.
         _replay(model, [served] if served else [], hidden.whole, after, RATE_AGAIN)
     story = story_of(model, traced.extended, served, before, after, operator.alarm)
     _print_scores(story)
     truth = json.loads(hidden.truth.read_text())  # not before
-    told = ", ".join(f"{key} {value}" for key, value in truth.items() if key != "right names")
-    print(f"   what had been hidden: {told}")
+    revealed = ", ".join(f"{key} {value}" for key, value in truth.items() if key != "right names")
+    print(f"   The hidden change was: {revealed}.")
     return draw_story(out / "loop.png", story, traced.verdict, truth)
 
 
 def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate: float) -> None:
-    """Replay a recording before a validator until its result is written."""
+    """Replay a recording and validate it; return when the validator has written its result."""
     shutil.rmtree(output, ignore_errors=True)
     result = output / "validation.json"
     validator: dict[str, Any] = {"model": str(model), "output": str(output), "report": False}
@@ -162,12 +162,14 @@ def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate
         deadline = time.monotonic() + REPLAY_PATIENCE
         while not result.exists():
             if time.monotonic() > deadline:
-                raise SystemExit(f"{result} was not written within {REPLAY_PATIENCE:.0f} s; see {output.parent}/*.log")
+                raise SystemExit(
+                    f"the validator wrote no {result} within {REPLAY_PATIENCE:.0f} s: see {output.parent}/*.log"
+                )
             time.sleep(0.1)
 
 
 def _print_scores(story: Story) -> None:
-    print(f"   the {story.n_later} pushes after the trace, which it never saw, by both models:")
+    print(f"   Error on the {story.n_later} pushes after the trace (the trace did not use them):")
     for label, comparison in story.later.items():
         score: dict[str, Any] = metrics_json(comparison)
         spans = score["interval"]
@@ -179,8 +181,13 @@ def _print_lines(text: str) -> None:
     print(textwrap.fill(text, 116, initial_indent="   ", subsequent_indent="   ", break_long_words=False), flush=True)
 
 
+def _odds(log10_evidence: float) -> str:
+    """Evidence as odds: 138 : 1, or 10^9 : 1 if it is larger than a million."""
+    return f"{10.0**log10_evidence:.0f} : 1" if log10_evidence < 6.0 else f"10^{log10_evidence:.0f} : 1"
+
+
 def _answer(future: Future, patience: float) -> Any:
-    """What a future holds, once it does; the executor's thread works on it."""
+    """The result of a future that the executor's thread completes. Raises SystemExit after `patience` seconds."""
     deadline = time.monotonic() + patience
     while not future.done():
         if time.monotonic() > deadline:

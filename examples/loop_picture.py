@@ -1,4 +1,4 @@
-"""The story of the loop as numbers and as one picture."""
+"""The residual loop of the demo as numbers and as one picture."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ BLUE, ORANGE = COLOURS[0], COLOURS[1]
 
 @dataclass(frozen=True)
 class Story:
-    """score: by model, (pushes, 2) of push number and mean square of its standardised residual. later: by model, the
-    pushes after the trace. traced: how many pushes the trace had. alarm: number of the push at which it fired."""
+    """The numbers of the picture.
+
+    score: by model, (pushes, 2) of push number and mean square of its standardised residual. later: by model, the
+    pushes after the trace. traced: how many pushes the trace used. alarm: number of the push at which the alarm fired.
+    """
 
     score: Mapping[str, Array]
     later: Mapping[str, Comparison]
@@ -44,7 +47,7 @@ class Story:
 def story_of(
     model: Path, extended: Path | None, served: str | None, before: Path, after: Path, alarm: Any | None
 ) -> Story:
-    """Put together what the validators wrote before and after the trace."""
+    """Read what the validators wrote before and after the trace."""
     first, table = (load_evidence([path / "pushes.csv"]).table for path in (before, after))
     traced = int(np.max(first.covariates["push_index"])) + 1
     files = {DEPLOYED: (model, after / "windows.json")}
@@ -60,7 +63,7 @@ def story_of(
 
 
 def draw_story(path: Path, story: Story, verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> Path:
-    """The residual of every push with the alarm and the trace, and the error of the rest by both models."""
+    """Draw the residual of every push with alarm and trace, and both models' error on the pushes after the trace."""
 
     def paint(figure: Figure) -> None:
         layout: dict[str, Axes] = figure.subplot_mosaic(
@@ -86,7 +89,7 @@ def _scores(answered: list[dict[str, Any]], table: PushTable) -> Array:
 
 def _comparison(path: Path, answered: list[dict[str, Any]], table: PushTable, first: int) -> Comparison:
     if len(answered) != len(table):
-        raise SystemExit(f"{path.name} has answered {len(answered)} of {len(table)} windows")
+        raise SystemExit(f"{path.name} predicted {len(answered)} of {len(table)} windows")
     rows = table.covariates["push_index"] >= first
     mean = np.array([window["predicted"] for window in answered])[rows]
     covariance = np.array([window["covariance"] for window in answered]).reshape(-1, 3, 3)[rows]
@@ -104,14 +107,20 @@ def _paint_story(axes: Axes, story: Story, change: int) -> None:
         axes.semilogy(*score.T, marker, color=colour, markersize=3.0, alpha=0.45, linestyle="none")
         axes.semilogy(*_running(score, (0, change, story.traced)), color=colour, linewidth=1.8, label=f"{label} model")
     axes.axhline(1.0, color=NEARBY, linewidth=0.8, linestyle=":")
-    _mark(axes, change, "the hidden effect sets in", "--", 0.98)
-    _mark(axes, story.traced, "trace, extended model loaded" if EXTENDED in story.score else "trace", "-", 0.98)
+    _mark(axes, change, "hidden change sets in", "--", 0.98)
+    _mark(
+        axes,
+        story.traced,
+        "cause traced, extended model loaded" if EXTENDED in story.score else "cause traced",
+        "-",
+        0.98,
+    )
     if story.alarm is not None:
-        _mark(axes, story.alarm, f"alarm, at push {story.alarm + 1}", "-", 0.90)
+        _mark(axes, story.alarm, f"alarm (after {story.alarm + 1} pushes)", "-", 0.90)
     axes.set(
         xlabel="push",
         xlim=(-2, last + 2),
-        ylabel="mean square of the standardised\nresidual of a push (1: as predicted)",
+        ylabel="mean squared standardised residual\nof a push (1: as predicted)",
     )
     axes.legend(loc="lower center", ncols=2)
     grid(axes)
@@ -124,7 +133,7 @@ def _mark(axes: Axes, place: float, text: str, style: str, height: float) -> Non
 
 
 def _running(score: Array, cuts: tuple[int, ...]) -> tuple[Array, Array]:
-    """Running geometric mean over 15 pushes, broken where something changes."""
+    """Running geometric mean over 15 pushes, interrupted at the cuts."""
     x, y = [], []
     for begin, end in zip(cuts, (*cuts[1:], np.inf), strict=True):
         part = score[(score[:, 0] >= begin) & (score[:, 0] < end)]
@@ -146,7 +155,12 @@ def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
             value, row, xerr=[[value - span["low"]], [span["high"] - value]], fmt="o", color=colour, capsize=3.0
         )
         axes.annotate(
-            f"{value:.2f}", (value, row), xytext=(0, 6), textcoords="offset points", ha="center", color=colour
+            f"{value:.2f}".replace("-", "−"),
+            (value, row),
+            xytext=(0, 6),
+            textcoords="offset points",
+            ha="center",
+            color=colour,
         )
     axes.set(
         xlabel=f"{name}, the {story.n_later} pushes after the trace",
@@ -158,19 +172,33 @@ def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
 
 
 def _title(verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> str:
-    said = "\n    and ".join(_said(effect) for effect in verdict["effects"]) or "nothing"
-    hidden = f"{truth['mechanism']} {truth['value']:.3g} {_unit(truth['unit'])}".strip()
-    return (
-        f"traced ({verdict['verdict']}): {said}\nhidden, revealed at the end: {hidden} (the simulator's own parameter)"
-    )
+    found = "\n    and ".join(_found(effect) for effect in verdict["effects"]) or "no effect"
+    hidden = f"{_words(truth['mechanism'])} {_number(truth['value'])} {_unit(truth['unit'])}".strip()
+    return f"Found by the trace: {found}\nHidden until the end: {hidden} (the simulator's own parameter)"
 
 
-def _said(effect: Mapping[str, Any]) -> str:
-    name = f"{effect['mechanism'] or 'unknown mechanism'} by {effect['covariate']} ({effect['form']})"
+def _found(effect: Mapping[str, Any]) -> str:
+    """An effect in words: contact friction, changes with elapsed time (step), 0.25 (95 % CI 0.2 to 0.3)."""
+    name = f"{_words(effect['mechanism'] or 'unknown mechanism')}, {_dependence(effect)}"
     size = effect["parameter"]
     if size is None:
         return name
-    return f"{name}, {size['value']:.3g} ({size['low']:.3g} to {size['high']:.3g}) {_unit(size['unit'])}".strip()
+    low, high = (_number(size[end]) for end in ("low", "high"))
+    return f"{name}, {_number(size['value'])} {_unit(size['unit'])}".strip() + f" (95 % CI {low} to {high})"
+
+
+def _dependence(effect: Mapping[str, Any]) -> str:
+    if effect["form"] == "constant":
+        return "constant"
+    return f"changes with {_words(effect['covariate'])} ({_words(effect['form'])})"
+
+
+def _words(identifier: str) -> str:
+    return identifier.replace("_", " ")
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
 
 
 def _unit(unit: str) -> str:

@@ -1,7 +1,7 @@
-"""Markers drawn with matplotlib, seen from above: what a viewer makes of the same messages, where there is no viewer.
+"""Draw visualization_msgs/Marker messages with matplotlib, seen from above.
 
-Types, poses, scales and colours are taken from the messages as visualization_msgs/Marker defines them; what lies in a
-message is all that is known here. Not like a viewer: no perspective, no light; lines are at least LEAST_LINE wide.
+Types, poses, scales and colours are those of the messages. Unlike in a viewer there is no perspective and no light, and
+lines are at least LEAST_LINE wide.
 """
 
 from __future__ import annotations

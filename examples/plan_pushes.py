@@ -1,8 +1,8 @@
 """A planner that uses the services: bring a square to a goal pose with few pushes. `python -m examples.plan_pushes`.
 
-A model of bags/square_abs_train is served by a process of its own. What thousands of pushes would do is asked once, in
-batches. Then, push by push: choose (planning/choose.py), let rollout_pushes say how sure that is, and carry it out in
-the cell, the simulated rig on which the recording was made. The slider is not put back between pushes.
+predict_server loads a model of bags/square_abs_train. The planner requests predictions of thousands of pushes once, in
+batches. For each push it then chooses (planning/choose.py), requests the probability of success from rollout_pushes,
+and pushes on the simulated rig on which the recording was made. The slider stays where each push leaves it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from push_predictor.types import Array
 ROOT = Path(__file__).resolve().parents[1]
 TRAINING = ROOT / "bags" / "square_abs_train"
 OUT = ROOT / "out" / "planner"
-WINDOW, VELOCITY = 0.2, 0.02  # s, m/s: most of the training pushes
+WINDOW, VELOCITY = 0.2, 0.02  # s, m/s: as in most of the training pushes
 WINDOWS = (1, 2, 3, 4, 5, 6, 8)  # 4 to 32 mm
 START = np.array([-0.05, -0.02, 0.4])
 GOAL = Goal(np.array([0.03, 0.02, 0.0]), distance=0.002, turn=0.05)
@@ -49,27 +49,29 @@ SAMPLES = 500
 def main(arguments: Sequence[str] = ()) -> int:
     """Plan and push; the exit status is 0 if the goal is reached."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", type=Path, help="a model of a square; trained on bags/square_abs_train unless given")
-    parser.add_argument("--seed", type=int, default=1, help="of what differs from push to push in the cell")
+    parser.add_argument(
+        "--model", type=Path, help="a model file of the square (default: train one on bags/square_abs_train)"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of the simulated rig's noise (default %(default)s)")
     options = parser.parse_args(arguments)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     for folder in (OUT, LOGS):
         folder.mkdir(parents=True, exist_ok=True)
     path = options.model or _trained()
-    print(f"serve {path}", flush=True)
+    print(f"Model: {path}", flush=True)
     model = load_model(path)
     with node("predict_server", {"models": [str(path)]}, "planner_server"), PlannerClient(WINDOW) as client:
         pushes = _asked(client, model)
         steps = list(_pushed(client, pushes, options.seed))
     reached = bool(GOAL.reached(GOAL.ahead(steps[-1].after)))
-    print(f"{'reached' if reached else 'NOT reached'} with {len(steps)} pushes")
+    print(f"Goal {'reached' if reached else 'NOT reached'} with {len(steps)} pushes.")
     _draw(steps, model.rig.outline)
     return 0 if reached else 1
 
 
 def _trained() -> Path:
-    """The model file, trained now unless an earlier run left it."""
+    """The model file, trained unless an earlier run has written it."""
     path = OUT / "vhgp.pushmodel"
     if not path.exists():
         command = ["train", str(TRAINING), "--model", "vhgp", "--n-train", "500", "--out", str(path)]
@@ -78,7 +80,7 @@ def _trained() -> Path:
 
 
 def _asked(client: PlannerClient, model: PushModel) -> Repertoire:
-    """What the pushes do that the model knows, by the service."""
+    """The pushes that the model knows, with predictions from the service."""
     outline = model.rig.outline
     edges = len(outline.vertices)
     contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
@@ -89,12 +91,12 @@ def _asked(client: PlannerClient, model: PushModel) -> Repertoire:
     pushes = repertoire(
         client.predict, PusherGeometry(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, persistent_fraction
     )
-    print(f"{len(pushes)} pushes stay in the model's domain; asked in {time.monotonic() - begun:.1f} s", flush=True)
+    print(f"{len(pushes)} pushes in the model's domain, predicted in {time.monotonic() - begun:.1f} s.", flush=True)
     return pushes
 
 
 def _pushed(client: PlannerClient, pushes: Repertoire, seed: int) -> Iterator[Step]:
-    """Push after push, until the goal is reached or LIMIT are made."""
+    """Push until the goal is reached, at most LIMIT times."""
     slider = START
     for count in range(1, LIMIT + 1):
         choice = choose_push(pushes, slider, GOAL, PROBABILITY)
@@ -102,34 +104,38 @@ def _pushed(client: PlannerClient, pushes: Repertoire, seed: int) -> Iterator[St
             return
         samples = client.outcomes(slider, choice.push, SAMPLES, seed=count)
         after = push_once(_spec(choice, 1000 * seed + count), slider[None])[0]
-        _tell(count, slider, choice, samples, after)
-        yield Step(slider, choice, _way(choice), samples, after)
+        _print_step(count, slider, choice, samples, after)
+        yield Step(slider, choice, _travel(choice), samples, after)
         slider = after
 
 
 def _spec(choice: Choice, seed: int) -> SimulationSpec:
-    """The chosen push in the cell: the rig of the recording, its slider and its table."""
+    """The chosen push on the simulated rig: slider and table of the recording."""
     velocity, contact, angle = choice.push.inputs[0]
-    plan = PushPlan(*np.array([[contact], [angle], [velocity], [_way(choice)]]))
+    plan = PushPlan(*np.array([[contact], [angle], [velocity], [_travel(choice)]]))
     return SimulationSpec("rect1", "abs", plan, seed=seed)
 
 
-def _way(choice: Choice) -> float:
-    """Of the tip, m."""
+def _travel(choice: Choice) -> float:
+    """Distance travelled by the tip, m."""
     return float(choice.push.inputs[0, 0] * WINDOW * choice.push.windows[0])
 
 
-def _tell(count: int, before: Array, choice: Choice, samples: Array, after: Array) -> None:
+def _print_step(count: int, before: Array, choice: Choice, samples: Array, after: Array) -> None:
     _, contact, angle = choice.push.inputs[0]
-    way = 1e3 * _way(choice)
-    print(f"push {count}: {_pose(GOAL.ahead(before))} to go, seen from the slider")
+    travel = 1e3 * _travel(choice)
+    print(f"Push {count}. The goal is at {_pose(GOAL.ahead(before))} in the slider's frame.")
     print(
-        f"   chosen   contact {contact:.3f}, angle {angle:+.2f} rad, {way:.0f} mm; {choice.expected:.1f} to be expected"
+        f"   chosen     contact {contact:.3f}, angle {angle:+.2f} rad, {travel:.0f} mm; "
+        f"{choice.expected:.1f} pushes expected in all"
     )
     sure = float(GOAL.reached(GOAL.ahead(samples)).mean())
-    print(f"   it reaches the goal with probability {choice.probability:.2f}; rollout_pushes says {sure:.2f}")
-    print(f"   foreseen {_pose(choice.mean)}, sd {_pose(np.sqrt(np.diag(choice.covariance)))}")
-    print(f"   got      {_pose(after)}: {'there' if GOAL.reached(GOAL.ahead(after)) else 'not there yet'}", flush=True)
+    print(f"   It reaches the goal with probability {choice.probability:.2f} (by rollout_pushes: {sure:.2f}).")
+    print(f"   predicted  {_pose(choice.mean)}, sd {_pose(np.sqrt(np.diag(choice.covariance)))}")
+    print(
+        f"   observed   {_pose(after)}: {'at the goal' if GOAL.reached(GOAL.ahead(after)) else 'not at the goal yet'}"
+    )
+    sys.stdout.flush()
 
 
 def _pose(pose: Array) -> str:
@@ -137,13 +143,13 @@ def _pose(pose: Array) -> str:
 
 
 def _draw(steps: Sequence[Step], outline: Outline) -> None:
-    """Write the picture, if matplotlib is there."""
+    """Write the picture, if matplotlib is installed."""
     try:
         path = draw_pushes(OUT / "pushes.png", steps, GOAL, outline)
     except PushPredictorError as error:
         print(error)
     else:
-        print(f"picture: {path}")
+        print(f"Picture: {path}")
 
 
 if __name__ == "__main__":

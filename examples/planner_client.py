@@ -1,4 +1,4 @@
-"""A planner's end of the services: what it asks predict_server, as arrays."""
+"""A client of predict_server for planners, in arrays."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import PredictPushBatch, RolloutPushes
 
-PATIENCE = 60.0  # s for an answer, server restarts included
-TIMEOUT = 5.0  # s after which an unanswered request is sent again: the longest answer takes less
-DEEP = QoSProfile(depth=1000)  # a client is handed the answers to others too: ten of them would crowd out its own
+PATIENCE = 60.0  # s, for a response, restarts of the server included
+TIMEOUT = 5.0  # s, after which a request is sent again; the longest response takes less
+DEEP = QoSProfile(depth=1000)  # a client also receives the responses to other clients: ten would displace its own
 
 
 class PlannerClient:
-    """Asks predict_push_batch and rollout_pushes of the default model; window: s, of the model. A context manager.
+    """A client of predict_push_batch and rollout_pushes for the default model. A context manager.
 
-    A request that is not answered within `timeout` (s) is sent again, as long as `patience` (s) lasts: a server may be
-    started again meanwhile. What went unanswered is told on stderr.
+    window: duration (s) of the model's windows. A request without a response within `timeout` (s) is sent again until
+    `patience` (s) has passed: the server may restart meanwhile. Each timeout is reported on stderr.
     """
 
     def __init__(self, window: float, *, timeout: float = TIMEOUT, patience: float = PATIENCE) -> None:
@@ -75,22 +75,22 @@ class PlannerClient:
         return np.reshape(response.samples, (-1, 3))
 
     def _call(self, client: Any, request: Any) -> Any:
-        """The answer. Raises SystemExit that says what was waited for, and how long."""
+        """The response. Raises SystemExit that names the service and the time waited."""
         begun, unanswered = monotonic(), 0
         while (left := begun + self._patience - monotonic()) > 0.0:
             if not client.wait_for_service(left):
                 break
             if (response := _answer(client, request, min(self._timeout, left))) is not None:
                 if unanswered:
-                    _say(
+                    _log(
                         client,
-                        f"answers again after {monotonic() - begun:.1f} s; {unanswered} requests went unanswered",
+                        f"responds again after {monotonic() - begun:.1f} s; {unanswered} requests had no response",
                     )
                 return response
             unanswered += 1
-            _say(client, f"no answer within {self._timeout:g} s, asking again")
-        told = f"did not answer {unanswered} requests" if unanswered else "is not offered"
-        raise SystemExit(f"{client.srv_name} {told} within {self._patience:g} s: does predict_server run?")
+            _log(client, f"no response within {self._timeout:g} s, sending the request again")
+        problem = f"no response to {unanswered} requests" if unanswered else "no such service"
+        raise SystemExit(f"{client.srv_name}: {problem} within {self._patience:g} s. Is predict_server running?")
 
     def _spin(self) -> None:
         try:
@@ -100,7 +100,7 @@ class PlannerClient:
 
 
 def _answer(client: Any, request: Any, timeout: float) -> Any:
-    """None if there is none in time: then it is not waited for any more."""
+    """The response; None after `timeout` seconds, and the request is dropped."""
     answered, future = threading.Event(), client.call_async(request)
     future.add_done_callback(lambda _: answered.set())
     if answered.wait(timeout):
@@ -109,7 +109,7 @@ def _answer(client: Any, request: Any, timeout: float) -> Any:
     return None
 
 
-def _say(client: Any, text: str) -> None:
+def _log(client: Any, text: str) -> None:
     print(f"{client.srv_name}: {text}", file=sys.stderr, flush=True)
 
 

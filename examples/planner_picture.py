@@ -1,4 +1,4 @@
-"""The picture of a planned sequence of pushes: where the slider was before each, what was foreseen, what came of it."""
+"""The picture of a planned sequence of pushes: start, predicted and observed pose of each push, and the goal."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ ARROW = 0.012  # m, at least
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One push: slider before and after (3,), what was chosen, the tip's way (m), samples of rollout_pushes (p, 3)."""
+    """One push: slider before and after (3,), the choice, travel of the tip (m), samples of rollout_pushes (p, 3)."""
 
     before: Array
     choice: Choice
-    way: float
+    travel: float
     samples: Array
     after: Array
 
 
 def draw_pushes(path: Path, steps: Sequence[Step], goal: Goal, outline: Outline) -> Path:
-    """A panel for each push. Raises PushPredictorError if matplotlib is not installed."""
+    """Draw a panel for each push. Raises PushPredictorError if matplotlib is not installed."""
     columns = min(COLUMNS, max(len(steps), 1))
     rows = -(-len(steps) // columns) or 1
 
@@ -45,7 +45,7 @@ def draw_pushes(path: Path, steps: Sequence[Step], goal: Goal, outline: Outline)
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for count, (axes, step) in enumerate(zip(panels, steps, strict=False), 1):
             _paint(axes, step, goal, outline)
-            axes.set_title(f"push {count}: reaches the goal with probability {step.choice.probability:.2f}", loc="left")
+            axes.set_title(f"Push {count}: probability of reaching the goal {step.choice.probability:.2f}", loc="left")
         for axes in panels[len(steps) :]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
@@ -63,7 +63,7 @@ def _paint(axes: Axes, step: Step, goal: Goal, outline: Outline) -> None:
         color=PREDICTED,
         markersize=1.5,
         alpha=0.4,
-        label="centre, by rollout_pushes",
+        label="predicted centre (rollout_pushes)",
     )
     _paint_outline(axes, outline, step.after, color=OBSERVED, label="after")
     axes.plot(*(1e3 * step.after[:2]), "o", color=OBSERVED, markersize=3.0)
@@ -81,10 +81,10 @@ def _paint_outline(axes: Axes, outline: Outline, pose: Array, **style: Any) -> N
 
 
 def _paint_push(axes: Axes, step: Step, outline: Outline) -> None:
-    """An arrow along the tip's way, to where it touched."""
+    """Draw an arrow along the path of the tip, up to the first contact."""
     _, contact, angle = step.choice.push.inputs[0]
     point = outline.point(np.array([contact]))[0]
     along = rotate(outline.inward_normal(np.array([contact]))[0], np.array(angle))
-    way = max(step.way, ARROW)
-    tail, head = 1e3 * to_world(np.stack([point - way * along, point]), step.before)
+    travel = max(step.travel, ARROW)
+    tail, head = 1e3 * to_world(np.stack([point - travel * along, point]), step.before)
     axes.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.2})

@@ -1,4 +1,4 @@
-"""Nodes as processes of their own, as a launch file would start them."""
+"""Nodes as separate processes, as a launch file starts them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import Any
 import yaml
 
 LOGS = Path(__file__).resolve().parents[1] / "out" / "demo"
-GRACE = 15.0  # s to end after SIGINT
+GRACE = 15.0  # s, from SIGINT to SIGKILL
 
 
 @contextmanager
 def node(executable: str, parameters: Mapping[str, Any], log_name: str = "") -> Iterator[None]:
-    """Run one of this package's nodes; leaving the context interrupts it as Ctrl-C would.
+    """Run one of this package's nodes; leaving the context interrupts it as Ctrl-C does.
 
-    What it prints goes to out/demo/EXECUTABLE.log, or LOG_NAME.log. Raises SystemExit if it did not end well.
+    Its output goes to out/demo/EXECUTABLE.log, or LOG_NAME.log. Raises SystemExit if its exit status is not 0.
     """
     assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_text(value)}")]
     command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *assigned]
@@ -37,9 +37,9 @@ def node(executable: str, parameters: Mapping[str, Any], log_name: str = "") -> 
             process.kill()
             status = process.wait()
     if status != 0:
-        raise SystemExit(f"{executable} ended with status {status}; see {log}")
+        raise SystemExit(f"{executable} ended with status {status}: see {log}")
 
 
 def _text(value: Any) -> str:
-    """A parameter as YAML on one line."""
+    """The value of a parameter as YAML on one line."""
     return str(yaml.safe_dump(value, default_flow_style=True, width=10_000).removesuffix("\n...\n").strip())

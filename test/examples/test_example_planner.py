@@ -1,4 +1,4 @@
-"""The example planner end to end over DDS, and the cell in which it pushes."""
+"""The example planner end to end over DDS, and the simulated rig on which it pushes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_push_moves_the_slider_that_it_meets():
     assert np.abs(wrap_angle(after[:, 2] - SLIDERS[:, 2])).max() < 0.2
 
 
-def test_the_same_seed_scatters_a_row_alike_whatever_the_others_do():
+def test_the_noise_of_a_push_depends_on_the_seed_and_not_on_the_other_pushes():
     first = push_once(pushes([0.1, 0.4], [0.3, 0.1], [0.008, 0.004]), SLIDERS)
     second = push_once(pushes([0.1, 0.9], [0.3, -0.5], [0.008, 0.030]), SLIDERS)
     np.testing.assert_allclose(second[0], first[0], atol=1e-5)
@@ -67,9 +67,9 @@ def test_the_example_reaches_its_goal(model, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(plan_pushes, "LOGS", tmp_path)
     monkeypatch.setattr(processes, "LOGS", tmp_path)
     assert plan_pushes.main(["--model", str(model)]) == 0
-    told = capsys.readouterr().out
-    assert re.search(r"reached with \d+ pushes", told) and "NOT" not in told
-    sure = re.findall(r"with probability (\d\.\d\d); rollout_pushes says (\d\.\d\d)", told)
+    output = capsys.readouterr().out
+    assert re.search(r"Goal reached with \d+ pushes", output) and "NOT" not in output
+    sure = re.findall(r"with probability (\d\.\d\d) \(by rollout_pushes: (\d\.\d\d)\)", output)
     assert sure and all(abs(float(ours) - float(theirs)) < 0.2 for ours, theirs in sure)
     assert (tmp_path / "pushes.png").stat().st_size > 10_000
 
