@@ -18,7 +18,7 @@ from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
-from push_predictor.recordings.windows.stream_faults import recording_faults
+from push_predictor.recordings.windows.stream_faults import describe_recording_faults
 
 
 def recorded_windows(
@@ -32,7 +32,7 @@ def recorded_windows(
     finder = WindowFinder(require_rig(recording), window_options(model))
     windows = finder.find(recording)
     if tell is not None:
-        for fault in recording_faults(recording, finder.counts):
+        for fault in describe_recording_faults(recording, finder.counts):
             tell(fault)
     if not windows:
         raise RecordingError(f"{path}: no push was found in {len(recording.slider)} slider poses")

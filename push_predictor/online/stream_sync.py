@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from time import monotonic
 
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
-from push_predictor.recordings.windows.finder import HOLD
-from push_predictor.recordings.windows.scalars import APART
-from push_predictor.recordings.windows.stream_faults import APART as CLOCKS_APART
-from push_predictor.recordings.windows.stream_faults import apart_words
+from push_predictor.recordings.windows.finder import LONGEST_LAG
+from push_predictor.recordings.windows.scalar_track import LONGEST_GAP
+from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, describe_clock_offset
 
 PATIENCE = 5.0  # s of waiting for a stream that lags behind
-SENSOR_LAG, SCALAR_LAG = 0.5e9 * HOLD, 0.5 * APART  # ns; the finder goes on without a stream that lags by twice as much
+# ns; the finder proceeds without a stream that lags by twice as much
+SENSOR_LAG, SCALAR_LAG = 0.5e9 * LONGEST_LAG, 0.5 * LONGEST_GAP
 SILENT = 2.0  # s without a sample after which a stream is called silent
 LAGS = 50  # portions of a stream over which its stamps are compared with the slider's
 
@@ -69,7 +69,7 @@ class StreamSync:
     def apart(self) -> dict[str, float]:
         """By how much (s) the stamps of a stream stay ahead of (or behind) the slider's, for those that do."""
         nearest = {name: min(lags, key=abs) for name, lags in self._lags.items() if len(lags) == LAGS}
-        return {name: lag for name, lag in nearest.items() if abs(lag) > CLOCKS_APART}
+        return {name: lag for name, lag in nearest.items() if abs(lag) > CLOCK_TOLERANCE}
 
     def silent(self) -> list[str]:
         """The sensors that have stopped while others continue."""
@@ -83,7 +83,7 @@ class StreamSync:
 
     def problems(self) -> list[str]:
         """What keeps windows from being found, in words."""
-        found = [apart_words(name, lag) for name, lag in self.apart().items()]
+        found = [describe_clock_offset(name, lag) for name, lag in self.apart().items()]
         return found + [
             f"No sample from the {name} for {SILENT:g} s, others continue: no window can be found."
             for name in self.silent()

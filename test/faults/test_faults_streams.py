@@ -18,7 +18,12 @@ from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.stream_faults import APART, FAULTS, clocks_apart, recording_faults
+from push_predictor.recordings.windows.stream_faults import (
+    CLOCK_TOLERANCE,
+    FAULTS,
+    clock_offset,
+    describe_recording_faults,
+)
 from push_predictor.types import Array
 
 Stream = PoseStream | WrenchStream
@@ -334,9 +339,9 @@ def test_clocks_of_pusher_and_slider_that_are_apart_make_no_window_and_are_told(
     if force_too and recording.wrench is not None:
         shifted = replace(shifted, wrench=replace(recording.wrench, stamp=recording.wrench.stamp + shift))
     windows, counts = found_in(shifted)
-    assert clocks_apart(shifted.pusher, shifted.slider) == pytest.approx(sign * lag, abs=0.05)
+    assert clock_offset(shifted.pusher, shifted.slider) == pytest.approx(sign * lag, abs=0.05)
     ahead = "ahead of" if sign > 0 else "behind"
-    assert any(f"{ahead} those of the slider" in text for text in recording_faults(shifted, counts))
+    assert any(f"{ahead} those of the slider" in text for text in describe_recording_faults(shifted, counts))
     for window in windows:
         tip = at(shifted.pusher, [window.start, window.end])[:, :2]
         driven, moved = np.hypot(*(tip[1] - tip[0])), np.hypot(*window.displacement[:2])
@@ -358,10 +363,10 @@ def test_a_tip_that_seems_to_go_into_the_slider_makes_no_window(lag: float) -> N
 
 def test_clocks_of_a_good_recording_are_not_apart() -> None:
     for truth in CLEAN.values():
-        assert abs(clocks_apart(truth.recording.pusher, truth.recording.slider)) < APART
-        words = recording_faults(truth.recording, found_in(truth.recording)[1])
+        assert abs(clock_offset(truth.recording.pusher, truth.recording.slider)) < CLOCK_TOLERANCE
+        words = describe_recording_faults(truth.recording, found_in(truth.recording)[1])
         assert words == ([] if truth.recording.wrench is not None else [words[0]]), words
-    assert "geometry alone" in words[0] if (words := recording_faults(FORCELESS.recording, {})) else False
+    assert "geometry alone" in words[0] if (words := describe_recording_faults(FORCELESS.recording, {})) else False
 
 
 @OFTEN
@@ -421,7 +426,7 @@ def test_one_clock_that_is_set_back_alone_does_not_stop_the_others() -> None:
         finder.add_pusher(rows(alone, part))  # type: ignore[arg-type] # a slice does as well
         finder.add_slider(rows(recording.slider, part))  # type: ignore[arg-type] # a slice does as well
         windows += finder.take_ready()
-        assert sum(len(stamp) for _, stamp, _ in finder._later) < 10_000
+        assert sum(len(stamp) for _, stamp, _ in finder._postponed) < 10_000
     windows += finder.finish()
     assert finder.counts["clock_set_back"] == 1
     assert_true(windows, clean(recording), [(START + 20 * SECOND, START + 1000 * SECOND)])

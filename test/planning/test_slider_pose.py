@@ -27,7 +27,7 @@ from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter,
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.windows.cut import pusher_line
+from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.windows.track import NANOSECOND, Track
@@ -238,7 +238,7 @@ def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
     tips = np.column_stack([recording.pusher.x, recording.pusher.y])
     pusher.extend(pusher.order.take(recording.pusher.stamp, tips, True), origin)
     for window, pose, spread, in_domain in zip(windows, poses, spreads, shown.in_domain, strict=True):
-        line = pusher_line(pusher, (window.start - origin) * NANOSECOND)
+        line = pusher_motion(pusher, (window.start - origin) * NANOSECOND)
         push = WorldPush(window.slider_start, line.position, line.velocity, window.duration, window.covariates)
         after = slider_after(tabulated, push)
         np.testing.assert_allclose(after.pose, pose, rtol=0.0, atol=1e-9)

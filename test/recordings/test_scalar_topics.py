@@ -15,7 +15,7 @@ from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.scalars import ScalarTrack
+from push_predictor.recordings.windows.scalar_track import ScalarTrack
 from push_predictor.types import Array
 
 SECOND = 10**9
@@ -56,13 +56,13 @@ def test_over_a_long_gap_it_keeps_what_was_sent_last() -> None:
 def test_samples_that_do_not_come_later_are_refused_and_counted() -> None:
     warmth = track((1.0, 1.0), (1.0, 5.0), (0.9, 6.0), (2.0, 2.0))
     warmth.add(stream((2.0, 7.0), (3.0, 3.0)))
-    assert warmth.refused == 3
+    assert warmth.discarded == 3
     assert [at(warmth, time) for time in (1.0, 1.5, 2.5)] == [1.0, 1.5, 2.5]
 
 
 def test_a_clock_that_is_set_back_begins_it_anew() -> None:
     warmth = track((100.0, 1.0), (101.0, 2.0), (3.0, 7.0))
-    assert at(warmth, 100.0) == 7.0 and not warmth.passed(START + 4 * SECOND)
+    assert at(warmth, 100.0) == 7.0 and not warmth.known_at(START + 4 * SECOND)
     warmth.add(stream((5.0, 9.0)))
     assert at(warmth, 4.0) == 8.0
 

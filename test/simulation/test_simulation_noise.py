@@ -87,8 +87,8 @@ def test_pressure_noise_has_unit_variance_along_the_whole_push() -> None:
     for travelled in KNOT_SPACING * np.array([0.0, 0.5, 2.3, 9.0]):
         assert np.sqrt(np.mean(noise.at(np.full(2000, travelled)) ** 2)) == pytest.approx(1.0, rel=0.03)
     near, far = (
-        np.mean(noise.at(np.zeros(2000)) * noise.at(np.full(2000, way)))
-        for way in (0.3 * KNOT_SPACING, 2.0 * KNOT_SPACING)
+        np.mean(noise.at(np.zeros(2000)) * noise.at(np.full(2000, travelled)))
+        for travelled in (0.3 * KNOT_SPACING, 2.0 * KNOT_SPACING)
     )
     assert near > 0.8
     assert far == pytest.approx(PERSISTENT_SHARE, abs=0.05)

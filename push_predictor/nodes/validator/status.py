@@ -20,7 +20,7 @@ from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
-from push_predictor.recordings.windows.stream_faults import fault_words
+from push_predictor.recordings.windows.stream_faults import describe_faults
 
 SILENT = f"No data for {SILENCE:g} s. Call `~/finish` to write the results."
 NO_SERVER = "No node offers predict_push. Start predict_server."
@@ -134,7 +134,7 @@ def _stream_figures(run: ValidationRun) -> dict[str, object]:
 
 def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
-    found += [*run.sync.problems(), *fault_words(run.counts)]
+    found += [*run.sync.problems(), *describe_faults(run.counts)]
     if run.refused:
         found.append(f"{run.refused} predictions were refused, the last by {run.last_refusal}")
     if run.table_failure:

@@ -1,4 +1,4 @@
-"""Windows cut from the streams: one implementation, used offline and online.
+"""Push windows cut from the streams: one implementation, used offline and online.
 
-Import `finder` and `push_window`; the other modules are its steps.
+Import `finder`, `push_window` and `stream_faults`; the other modules are the steps of `finder`.
 """

@@ -1,4 +1,4 @@
-"""Cutting one window out of the tracks: contact, velocity, angle and what became of the slider."""
+"""Cut one window out of the tracks: contact, velocity, angle and the slider's displacement."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.recordings.windows.track import NANOSECOND, Track
 from push_predictor.types import Array
 
-SUNK, SUNK_SHARE = 0.0005, 0.5  # m, and of the tip's way: a tip that goes so far into the slider does not push it
-OUTRAN, OUTRAN_SHARE = 0.002, 1.25  # m, and of the tip's way: a slider that goes farther is moved by something else
+ENTERED, ENTERED_SHARE = 0.0005, 0.5  # m, share of the tip's displacement: a tip this much deeper enters the outline
+OUTRAN, OUTRAN_SHARE = 0.002, 1.25  # m, share of the tip's displacement: a slider this much farther is not pushed
 FIT_SAMPLES = 4  # or this many samples, where those take longer
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class PusherMotion:
     """The pusher at a window's start: position (2,) m and velocity (2,) m/s."""
 
     position: Array
@@ -28,20 +28,34 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Tracks:
-    """The streams; wrench is None where there is none."""
+class SensorTracks:
+    """The tracks of the sensors; wrench is None without a force sensor."""
 
     slider: Track
     pusher: Track
     wrench: Track | None
 
 
+@dataclass(frozen=True)
+class Interval:
+    """A window's start and end, ns; origin: stamp (ns) from which the tracks count their time."""
+
+    start: int
+    end: int
+    origin: int
+
+    @property
+    def seconds(self) -> Array:
+        """Start and end (2,) in the time of the tracks, s."""
+        return np.array([(self.start - self.origin) * NANOSECOND, (self.end - self.origin) * NANOSECOND])
+
+
 @dataclass(frozen=True, eq=False)
 class PushContext:
-    """What a window inherits from its push.
+    """The properties of a push that its windows share.
 
     push_id, push_index; first_touch ns; dwell: s without contact before it; tare: the force without contact (2,) N,
-    None where unknown; last_edge: that of the window before, None for the first; window_index: within the push.
+    None if unknown; last_edge: of the previous window, None for the first; window_index: within the push.
     """
 
     push_id: str
@@ -53,69 +67,80 @@ class PushContext:
     window_index: int
 
 
-def cut_window(
-    rig: Rig,
-    tracks: Tracks,
-    origin: int,
-    start: int,
-    end: int,
-    push: PushContext,
-    slid: float,
-) -> PushWindow | str:
-    """Cut the window from start to end (ns), or answer why it is none (a kind of stream_faults.FAULTS).
+@dataclass(frozen=True, eq=False)
+class _Command:
+    """How a window pushes: edge, contact, gap m, inward normal (2,) in the world, heading rad, angle rad, speed m/s."""
 
-    slid: m that the slider has been pushed so far.
+    edge: int
+    contact: float
+    gap: float
+    normal: Array
+    heading: float
+    angle: float
+    speed: float
+
+
+def cut_window(rig: Rig, tracks: SensorTracks, interval: Interval, push: PushContext, slid: float) -> PushWindow | str:
+    """Cut a window, or return the fault (a key of stream_faults.FAULTS) for which it is rejected.
+
+    slid: distance (m) that the slider has been pushed so far.
     """
-    begin, finish = (start - origin) * NANOSECOND, (end - origin) * NANOSECOND
-    pose, pose_after = tracks.slider.at(np.array([begin, finish]))[:, [0, 1, 3]]
-    line = pusher_line(tracks.pusher, begin)
-    touch = rig.outline.project(to_body(line.position, pose)[None])
-    edge, contact = contact_at(rig.outline, touch, push.last_edge)
-    normal = rotate(rig.outline.inward_normal(np.array([contact]))[0], pose[2])
-    heading = float(np.arctan2(line.velocity[1], line.velocity[0]))
-    angle = float(wrap_angle(np.array(heading - np.arctan2(normal[1], normal[0]))))
-    speed = float(np.hypot(*line.velocity))
-    if not (abs(angle) < np.pi / 2.0 and speed > 0.0):
+    times = interval.seconds
+    pose, pose_after = tracks.slider.at(times)[:, [0, 1, 3]]
+    command = _command(rig, pusher_motion(tracks.pusher, float(times[0])), pose, push.last_edge)
+    if not (abs(command.angle) < np.pi / 2.0 and command.speed > 0.0):
         return "not_a_push"
-    if fault := _impossible(rig, tracks, np.array([begin, finish])):
+    if fault := _motion_fault(rig, tracks, times):
         return fault
-    moved = rotate(pose_after[:2] - pose[:2], np.array(-heading))
+    moved = rotate(pose_after[:2] - pose[:2], np.array(-command.heading))
     return PushWindow(
         push_id=push.push_id,
         index=push.window_index,
-        start=start,
-        end=end,
-        velocity=speed,
-        contact=contact,
-        angle=angle,
-        duration=(end - start) * NANOSECOND,
+        start=interval.start,
+        end=interval.end,
+        velocity=command.speed,
+        contact=command.contact,
+        angle=command.angle,
+        duration=(interval.end - interval.start) * NANOSECOND,
         displacement=np.array([moved[0], moved[1], pose_after[2] - pose[2]]),
         slider_start=pose,
         slider_end=pose_after,
-        push_heading=heading,
+        push_heading=command.heading,
         covariates={
             "slid_distance": slid,
-            "push_heading": heading,
-            "edge": float(edge),
-            "contact_gap": float(touch.distance[0] - rig.pusher_radius),
-            **_conditions(pose, start, push),
-            **_forces(tracks.wrench, begin, finish, push.tare, normal),
+            **_conditions(command, pose, interval.start, push),
+            **_forces(tracks.wrench, times, push.tare, command.normal),
         },
     )
 
 
-def _impossible(rig: Rig, tracks: Tracks, times: Array) -> str:
-    """What cannot be between two times (s) of a push, empty if all can."""
+def _command(rig: Rig, pusher: PusherMotion, pose: Array, last_edge: int | None) -> _Command:
+    """The command of a pusher at a slider with the given pose (3,)."""
+    touch = rig.outline.project(to_body(pusher.position, pose)[None])
+    edge, contact = contact_at(rig.outline, touch, last_edge)
+    normal = rotate(rig.outline.inward_normal(np.array([contact]))[0], pose[2])
+    heading = float(np.arctan2(pusher.velocity[1], pusher.velocity[0]))
+    angle = float(wrap_angle(np.array(heading - np.arctan2(normal[1], normal[0]))))
+    gap = float(touch.distance[0] - rig.pusher_radius)
+    return _Command(edge, contact, gap, normal, heading, angle, float(np.hypot(*pusher.velocity)))
+
+
+def _motion_fault(rig: Rig, tracks: SensorTracks, times: Array) -> str:
+    """The fault of a motion between two times (2,) s that no push explains, empty without one."""
     poses, tips = tracks.slider.at(times)[:, [0, 1, 3]], tracks.pusher.at(times)[:, :2]
     driven, moved = np.hypot(*(tips[1] - tips[0])), np.hypot(*(poses[1] - poses[0])[:2])
     before, after = rig.outline.project(to_body(tips, poses)).distance
-    if before - after > max(SUNK, SUNK_SHARE * driven):
+    if before - after > max(ENTERED, ENTERED_SHARE * driven):
         return "left_behind"
     return "outran" if moved > OUTRAN + OUTRAN_SHARE * driven else ""
 
 
-def _conditions(pose: Array, start: int, push: PushContext) -> dict[str, float]:
+def _conditions(command: _Command, pose: Array, start: int, push: PushContext) -> dict[str, float]:
+    """The covariates that follow from geometry and time."""
     return {
+        "push_heading": command.heading,
+        "edge": float(command.edge),
+        "contact_gap": command.gap,
         "push_index": float(push.push_index),
         "dwell_time": push.dwell,
         "time_since_contact": (start - push.first_touch) * NANOSECOND,
@@ -125,14 +150,14 @@ def _conditions(pose: Array, start: int, push: PushContext) -> dict[str, float]:
     }
 
 
-def pusher_line(pusher: Track, begin: float) -> Line:
+def pusher_motion(pusher: Track, begin: float) -> PusherMotion:
     """Least-squares line through the pusher's first samples of a window that begins at `begin` (s)."""
     first = int(np.searchsorted(pusher.time, begin))
     last = max(int(np.searchsorted(pusher.time, begin + FIT_SPAN, side="right")), first + FIT_SAMPLES)
     time = pusher.time[first:last] - begin
     design = np.column_stack([np.ones_like(time), time])
     solution = np.linalg.lstsq(design, pusher.values[first:last, :2], rcond=None)[0]
-    return Line(solution[0], solution[1])
+    return PusherMotion(solution[0], solution[1])
 
 
 def contact_at(outline: Outline, touch: Projection, last_edge: int | None) -> tuple[int, float]:
@@ -149,19 +174,19 @@ def contact_at(outline: Outline, touch: Projection, last_edge: int | None) -> tu
 
 
 def _facing(outline: Outline, normal: Array, before: int, after: int) -> int:
-    """The one of two edges that faces the pusher more squarely."""
+    """The one of two edges that faces the pusher more directly."""
     middles = outline.edge_starts[[before, after]] + 0.5 * np.diff(outline.edge_starts)[[before, after]]
     return (before, after)[int(np.argmin(outline.inward_normal(middles) @ normal))]
 
 
-def _forces(wrench: Track | None, begin: float, finish: float, tare: Array | None, normal: Array) -> dict[str, float]:
-    """Mean force of the pusher on the slider in the window: along the inward normal, and to the left of it."""
+def _forces(wrench: Track | None, times: Array, tare: Array | None, normal: Array) -> dict[str, float]:
+    """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left."""
     if wrench is None:
         return {}
-    inside = (wrench.time >= begin) & (wrench.time <= finish)
+    inside = (wrench.time >= times[0]) & (wrench.time <= times[1])
     if not np.any(inside):
         return {}
     force = wrench.values[inside, :2].mean(axis=0) - (np.zeros(2) if tare is None else tare)
-    on_slider = -force  # the wrench is what the slider exerts on the pusher
+    on_slider = -force  # the wrench is the force of the slider on the pusher
     left = np.array([-normal[1], normal[0]])
     return {"normal_force": float(on_slider @ normal), "tangential_force": float(on_slider @ left)}

@@ -1,4 +1,4 @@
-"""Following pushes sample by sample: when contact and motion hold, and which stretches can carry windows."""
+"""Segment the samples into pushes: which are in contact and moving, and which intervals become windows."""
 
 from __future__ import annotations
 
@@ -14,27 +14,30 @@ from push_predictor.types import Array
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
 TARE_SAMPLES = 30
-NOISE_FACTOR = 5.0
+NOISE_FACTOR = 5.0  # standard deviations of the force in free motion
 CLOSING_SHARE = 0.15  # of the tip's speed; a gap that shrinks or grows faster is no contact
-LEAST_CLOSING = 0.001  # m/s, below the noise of a tracker
-INSIDE = 0.005  # m; a tip this deep inside the outline is not where it seems: clocks are apart, or frames
-LONGEST_BREAK = 2.0  # s; after a longer silence a contact counts as another push
+LEAST_CLOSING_SPEED = 0.001  # m/s, below the noise of a tracker
+INSIDE = 0.005  # m; a tip this deep inside the outline shows unsynchronised clocks or a wrong frame
+LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push
 
 
-class PushTracker:
-    """Feed it judged samples in order; it says which windows (start, end in ns) have become complete."""
+class PushSegmenter:
+    """Takes contact samples in order and returns the windows (start, end in ns) that are complete.
+
+    counts: resets and samples inside the outline. push: the current push, None between pushes.
+    """
 
     def __init__(self, options: WindowOptions) -> None:
         self.options = options
         self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
-        self._start: int | None = None  # of the window being filled
+        self._start: int | None = None  # of the incomplete window
         self._last_good = -np.inf
         self._last_time = -np.inf
         self._idle = 0.0
         self._pushes = 0
         self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
-        self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # near the slider, before the first push
+        self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # at rest near the slider, before a push
         self._touching = False
         self._inside = False
         self._first_touch: int | None = None
@@ -42,14 +45,14 @@ class PushTracker:
 
     @property
     def start(self) -> int | None:
-        """Start (ns) of the window that is being filled."""
+        """Start (ns) of the incomplete window, None without one."""
         return self._start
 
     def step(self, sample: ContactSample) -> list[tuple[int, int]]:
-        """Take one sample; returns the windows that end by it."""
-        self._note_interruptions(sample)
-        self._note_free_force(sample)
-        self._touching = touching = not (sample.blind or self._inside) and self._touches(sample)
+        """Add one sample and return the windows that end at or before it."""
+        self._update_breaks(sample)
+        self._update_tare(sample)
+        self._touching = touching = not (sample.in_break or self._inside) and self._touches(sample)
         if touching and self._first_touch is None:
             self._first_touch = sample.stamp
         if touching and sample.speed >= self.options.least_speed:
@@ -57,22 +60,22 @@ class PushTracker:
         self._not_pushing(sample, touching)
         return []
 
-    def _note_interruptions(self, sample: ContactSample) -> None:
-        lapse, self._last_time = sample.time - self._last_time, sample.time
-        if sample.broken:
+    def _update_breaks(self, sample: ContactSample) -> None:
+        elapsed, self._last_time = sample.time - self._last_time, sample.time
+        if sample.after_break:
             self._start = None
         else:
-            self._idle += lapse if np.isfinite(lapse) else 0.0
-        if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.blind:
+            self._idle += elapsed if np.isfinite(elapsed) else 0.0
+        if (inside := sample.gap < -INSIDE and sample.height <= self.options.lift) and not sample.in_break:
             self.counts["inside"] += not self._inside
             self._start = None
         self._inside = inside
-        if sample.jumped or (sample.broken and lapse > LONGEST_BREAK):
-            self.counts["resets"] += sample.jumped
+        if sample.repositioned or (sample.after_break and elapsed > LONGEST_BREAK):
+            self.counts["resets"] += sample.repositioned
             self._end_push()
 
-    def _note_free_force(self, sample: ContactSample) -> None:
-        if sample.force is None or sample.blind:
+    def _update_tare(self, sample: ContactSample) -> None:
+        if sample.force is None or sample.in_break:
             return
         if sample.height > self.options.lift or sample.gap > FREE_GAP:
             self._free_force.append(sample.force)
@@ -85,15 +88,15 @@ class PushTracker:
         pressed = sample.gap <= self.options.touch_gap and self._presses(sample.force)
         if sample.force is not None and self._free_force:
             return pressed
-        # What a resting tip reads may be a preload: it can keep a contact but not tell where one begins or ends.
+        # The force on a resting tip may be a preload: it can continue a contact but not show its begin or end.
         near = sample.gap <= self.options.touch_gap_alone
         return (near and self._stays(sample)) or (self._touching and pressed)
 
     def _stays(self, sample: ContactSample) -> bool:
-        """Whether the gap shrinks no more, as it does before the touch; without any force, nor grows, as after it."""
-        limit = max(LEAST_CLOSING, CLOSING_SHARE * sample.speed)
-        parts = sample.force is None and sample.closing < -limit
-        return not parts and (self._touching or sample.closing <= limit)
+        """Whether the gap does not shrink, as before a touch; without a force also not grow, as after one."""
+        limit = max(LEAST_CLOSING_SPEED, CLOSING_SHARE * sample.speed)
+        separates = sample.force is None and sample.closing_speed < -limit
+        return not separates and (self._touching or sample.closing_speed <= limit)
 
     def _presses(self, force: Array | None) -> bool:
         zero, noise = self._zero()
@@ -102,10 +105,10 @@ class PushTracker:
         return float(np.hypot(*(force - zero))) > max(self.options.least_force, NOISE_FACTOR * noise)
 
     def _zero(self) -> tuple[Array | None, float]:
-        """The sensor's reading and its noise (N) in free motion, before any near the slider at rest, else None."""
-        if not (seen := self._free_force or self._resting_force):
+        """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""
+        if not (forces := self._free_force or self._resting_force):
             return None, 0.0
-        readings = np.array(seen)
+        readings = np.array(forces)
         return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
 
     def _pushing(self, sample: ContactSample) -> list[tuple[int, int]]:
@@ -113,7 +116,7 @@ class PushTracker:
             self._begin_push(sample)
         self._idle = 0.0
         self._last_good, self._last_contact = sample.time, sample.stamp
-        if self._start is None and sample.underway:
+        if self._start is None and sample.at_speed:
             self._start = sample.stamp
         return self._complete(sample.stamp)
 
@@ -135,7 +138,7 @@ class PushTracker:
     def _begin_push(self, sample: ContactSample) -> None:
         first = self._first_touch if self._first_touch is not None else sample.stamp
         if self.push is not None and first == self.push.first_touch:
-            first = sample.stamp  # the pusher rested in contact: the next push begins where it moves again
+            first = sample.stamp  # the pusher rested in contact; this push begins with its motion
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
         self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._zero()[0], None, 0)
         self._pushes += 1
@@ -146,5 +149,5 @@ class PushTracker:
 
 
 def _push_id(stamp: int) -> str:
-    """Named by its first touch, so that the same push has the same name online, offline and in a copy."""
+    """The id from the time of first touch: a push gets the same id online, offline and in a copy."""
     return f"{TIMED_ID}{stamp // 10**9}.{stamp % 10**9 // 10**6:03d}"

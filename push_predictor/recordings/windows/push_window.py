@@ -1,4 +1,4 @@
-"""From streams to windows: the one definition of a push window, used offline and online (contract, section 2)."""
+"""The push window: its options and its fields (contract, section 2)."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-TIMED_ID = "push-"  # begins the id of a push that is named by the time of its first touch
+TIMED_ID = "push-"  # prefix of ids that contain the time of first touch
 
 
 @dataclass(frozen=True)
 class WindowOptions:
-    """How windows are cut. Lengths in m, times in s, speeds in m/s, forces in N.
+    """Options of the window finder. Lengths in m, times in s, speeds in m/s, forces in N.
 
-    stride: from one window's start to the next one's; None tiles them end to end.
-    touch_gap: largest distance between pusher and outline that may be contact where a force tells;
-    touch_gap_alone: the same where no force was recorded. least_force: what the force must exceed, beside five
-    standard deviations of its noise in free motion. least_speed: below it the pusher rests.
-    lift: a tip this far above the slider's frame is lifted. bounce: a loss of contact shorter than this is none.
-    push_pause: after no contact or no motion for this long, the next contact is another push.
+    duration: length of a window. stride: time from one start to the next; None tiles windows end to end.
+    touch_gap: largest gap between pusher and outline in contact, where the force confirms it; touch_gap_alone: the
+    same without a force. least_force: the force in contact exceeds this and five standard deviations of its noise in
+    free motion. least_speed: a slower pusher is at rest. lift: a tip this far above the slider's frame is lifted.
+    bounce: shorter losses of contact are ignored. push_pause: after no contact or no motion for this long, the next
+    contact is another push.
     """
 
     duration: float = 0.2
@@ -38,11 +38,11 @@ class WindowOptions:
 
 @dataclass(frozen=True, eq=False)
 class PushWindow:
-    """One window: what the pusher did and what the slider did.
+    """One window: the command of the pusher and the displacement of the slider.
 
-    start, end: header time, ns. velocity m/s, contact, angle rad, duration s as in contract section 1.
+    start, end: header time, ns. velocity m/s, contact, angle rad and duration s as in contract section 1.
     displacement (3,): dx, dy m, dtheta rad in the push frame. slider_start, slider_end (3,): x, y m, heading rad in
-    the world. push_heading: the push frame's x axis in the world, rad. covariates: conditions of the window.
+    the world. push_heading: heading of the push frame's x axis in the world, rad. covariates: values by name.
     """
 
     push_id: str
@@ -61,7 +61,7 @@ class PushWindow:
 
 
 def windows_to_table(windows: Sequence[PushWindow]) -> PushTable:
-    """The windows as rows; a covariate is kept where every window has it."""
+    """The windows as rows of a table; a covariate is kept if every window has it."""
     names = [name for name in (windows[0].covariates if windows else ()) if all(name in w.covariates for w in windows)]
     return PushTable(
         np.array([[w.velocity, w.contact, w.angle] for w in windows]).reshape(-1, 3),

@@ -1,8 +1,8 @@
-"""Putting the samples of one stream right while they arrive: stamps that come twice, too late or from the future.
+"""Filter one stream while samples arrive: discard repeated, late and future stamps and single-sample jumps.
 
-A stamp is judged by those that arrive after it, not by a clock: a recording keeps its stamps when it is replayed. Of
-the next HELD samples the longest row of rising stamps is believed; what does not fit it is left out. So one stamp that
-is a day ahead costs its own sample, and none of those that follow.
+A stamp is checked against the samples that arrive after it, not against a clock, because a replayed recording keeps its
+stamps. Of the next LOOKAHEAD samples the longest increasing sequence of stamps is accepted and the rest is discarded.
+So a single stamp that is a day ahead costs only its own sample.
 """
 
 from __future__ import annotations
@@ -16,148 +16,151 @@ import numpy as np
 
 from push_predictor.types import Array, BoolArray, IntArray
 
-HELD = 8  # samples that are looked at before the first of them is believed
-STEP_BACK = HELD // 2  # late samples in a row after which the clock was put back a little, and time is missing
-FAR = 1_000_000_000  # ns; a sample this far from both its neighbours is none, and a clock that goes back so far was set
-LEAP = 30 * 86_400_000_000_000  # ns; a clock that goes ahead so far was set: nobody pauses a month
-RECENT = 2000  # samples by which a repeated stamp is known
-NONE = np.iinfo(np.int64).min // 2
+LOOKAHEAD = 8  # samples examined before the first of them is accepted
+LATE_RUN = LOOKAHEAD // 2  # consecutive late samples after which the clock was set back a little and data are missing
+ISOLATION = 1_000_000_000  # ns; a sample this far from both neighbours is discarded; a clock this far back was set
+CLOCK_LEAP = 30 * 86_400_000_000_000  # ns; a clock this far ahead was set: no recording pauses for a month
+REMEMBERED = 2000  # accepted stamps kept to recognise a repeated one
+NO_STAMP = np.iinfo(np.int64).min // 2
 
-Torn = Callable[[Array, Array, Array], BoolArray]  # values before (n, k) and after (n, k), lapse (n,) s -> (n,)
+# From values before (n, k), values after (n, k) and the time between them (n,) s to (n,).
+IsJump = Callable[[Array, Array, Array], BoolArray]
 
 
 @dataclass(frozen=True, eq=False)
-class Ordered:
-    """Samples with rising stamps: stamp (n,) ns, values (n, k); broken (n,): do not join to the one before.
+class OrderedSamples:
+    """Samples with increasing stamps: stamp (n,) ns, values (n, k); interrupted (n,): data before it are missing.
 
-    clock_set: those that still wait are of a clock that was set.
+    clock_set: the samples still waiting have the time of a clock that was set.
     """
 
     stamp: IntArray
     values: Array
-    broken: BoolArray
+    interrupted: BoolArray
     clock_set: bool
 
 
 class StampOrder:
-    """Takes samples as they arrive, gives those that can be believed.
+    """Takes samples as they arrive and returns those that are in order.
 
-    torn: which values cannot follow others within a time; None: any may. counts: the samples left out, by kind
-    (repeated, late, ahead, jumps).
+    is_jump: which values cannot follow others within a time; None accepts all. counts: discarded samples by kind
+    (repeated, late, ahead, jumps). waiting: stamps and values of the samples that are not decided yet.
     """
 
-    def __init__(self, width: int, torn: Torn | None = None) -> None:
+    def __init__(self, width: int, is_jump: IsJump | None = None) -> None:
         self.counts: Counter[str] = Counter()
         self.waiting: tuple[IntArray, Array] = (np.empty(0, dtype=np.int64), np.empty((0, width)))
-        self.torn = torn
-        self._last = NONE
+        self.is_jump = is_jump
+        self._last = NO_STAMP
         self._last_values: Array | None = None
-        self._recent: deque[int] = deque(maxlen=RECENT)
-        self._behind = 0  # late samples since the last good one
+        self._recent: deque[int] = deque(maxlen=REMEMBERED)
+        self._late_since_last = 0
 
-    def take(self, stamp: IntArray, values: Array, final: bool = False) -> Ordered:
-        """Add samples (n,), (n, k); returns those that are settled, with `final` also the last ones."""
+    def take(self, stamp: IntArray, values: Array, final: bool = False) -> OrderedSamples:
+        """Add samples (n,), (n, k) and return the accepted ones; with `final` all are decided."""
         stamp, values = np.concatenate([self.waiting[0], stamp]), np.concatenate([self.waiting[1], values])
-        keep, broken = np.zeros(len(stamp), dtype=np.bool_), np.zeros(len(stamp), dtype=np.bool_)
-        rough = self._rough(stamp, values)
+        keep, interrupted = np.zeros(len(stamp), dtype=np.bool_), np.zeros(len(stamp), dtype=np.bool_)
+        irregular = self._irregular(stamp, values)
         place, clock_set = 0, False
-        while place < len(stamp) and (final or len(stamp) - place >= HELD):
-            if calm := self._calm(stamp, values, rough, place, final):
-                keep[place : place + calm] = True
-                broken[place] = self._behind >= STEP_BACK
-                self._note(stamp[place : place + calm], values[place + calm - 1])
-                place += calm
-                continue
-            chosen, skipped, clock_set = self._choose(stamp[place : place + HELD].tolist(), values[place:])
-            place += skipped
-            if clock_set:
-                break
-            if chosen:
-                keep[place], broken[place] = True, self._behind >= STEP_BACK
-                self._note(stamp[place : place + 1], values[place])
-                place += 1
+        while place < len(stamp) and (final or len(stamp) - place >= LOOKAHEAD):
+            accepted = self._regular_run(stamp, values, irregular, place, final)
+            if not accepted:
+                chosen, discarded, clock_set = self._decide(stamp[place : place + LOOKAHEAD].tolist(), values[place:])
+                place, accepted = place + discarded, int(chosen)
+                if clock_set:
+                    break
+            if accepted:
+                keep[place : place + accepted] = True
+                interrupted[place] = self._late_since_last >= LATE_RUN
+                self._accept(stamp[place : place + accepted], values[place + accepted - 1])
+                place += accepted
         self.waiting = stamp[place:], values[place:]
-        return Ordered(stamp[keep], values[keep], broken[keep], clock_set)
+        return OrderedSamples(stamp[keep], values[keep], interrupted[keep], clock_set)
 
-    def _rough(self, stamp: IntArray, values: Array) -> list[int]:
-        """Samples whose successor does not simply follow."""
+    def _irregular(self, stamp: IntArray, values: Array) -> list[int]:
+        """Indices of samples whose successor does not follow regularly."""
         step = np.diff(stamp)
-        rough = (step <= 0) | (step > FAR)
-        if self.torn is not None and len(step):
-            rough |= self.torn(values[:-1], values[1:], step * 1e-9)
-        return [*np.flatnonzero(rough).tolist(), len(stamp) - 1]
+        irregular = (step <= 0) | (step > ISOLATION)
+        if self.is_jump is not None and len(step):
+            irregular |= self.is_jump(values[:-1], values[1:], step * 1e-9)
+        return [*np.flatnonzero(irregular).tolist(), len(stamp) - 1]
 
-    def _calm(self, stamp: IntArray, values: Array, rough: Sequence[int], place: int, final: bool) -> int:
-        """How many samples from `place` on follow simply, and are followed so by HELD - 1 others."""
+    def _regular_run(self, stamp: IntArray, values: Array, irregular: Sequence[int], place: int, final: bool) -> int:
+        """Number of samples from `place` on that follow regularly and are followed by LOOKAHEAD - 1 regular ones."""
         if not self._follows(int(stamp[place]), values[place]):
             return 0
-        end = rough[bisect_left(rough, place)]  # the last of the row
-        whole = final and end == len(stamp) - 1
-        return max(0, end - place + 1 - (0 if whole else HELD - 1))
+        end = irregular[bisect_left(irregular, place)]  # the last sample of the run
+        complete = final and end == len(stamp) - 1
+        return max(0, end - place + 1 - (0 if complete else LOOKAHEAD - 1))
 
     def _follows(self, stamp: int, values: Array) -> bool:
-        return 0 < stamp - self._last <= FAR and not self._is_torn(values, stamp)
+        return 0 < stamp - self._last <= ISOLATION and not self._jumps_to(values, stamp)
 
-    def _is_torn(self, values: Array, stamp: int) -> bool:
-        if self.torn is None or self._last_values is None:
+    def _jumps_to(self, values: Array, stamp: int) -> bool:
+        if self.is_jump is None or self._last_values is None:
             return False
-        return bool(self.torn(self._last_values[None], values[None], np.array([(stamp - self._last) * 1e-9]))[0])
+        return bool(self.is_jump(self._last_values[None], values[None], np.array([(stamp - self._last) * 1e-9]))[0])
 
-    def _choose(self, block: list[int], values: Array) -> tuple[bool, int, bool]:
-        """What becomes of the first of some samples: is it (after those skipped) good, how many go, was a clock set."""
-        row = _longest_row(block, self._last)
-        if not row:
-            return self._late(block)
-        for stamp in block[: row[0]]:
-            self._leave_out("ahead" if stamp > self._last else self._kind_of_old(stamp))
-        stamp, after = block[row[0]], block[row[1]] if len(row) > 1 else None
-        if self._last != NONE and stamp - self._last > LEAP and after is not None:
-            return False, row[0], True
-        if self._is_alone(stamp, after):
-            self._leave_out("late" if self._last == NONE and after is not None else "ahead")
-            return False, row[0] + 1, False
-        if back := self._comes_back(values, row, stamp):
-            for _ in range(back - row[0]):
-                self._leave_out("jumps")
+    def _decide(self, block: list[int], values: Array) -> tuple[bool, int, bool]:
+        """Decide on the first of some samples.
+
+        Returns the number of samples to discard, whether the one after them is accepted, and whether a clock was set,
+        as (accepted, discarded, clock set).
+        """
+        sequence = _longest_increasing(block, self._last)
+        if not sequence:
+            return self._decide_late(block)
+        for stamp in block[: sequence[0]]:
+            self._discard("ahead" if stamp > self._last else self._kind_of_old(stamp))
+        stamp, after = block[sequence[0]], block[sequence[1]] if len(sequence) > 1 else None
+        if self._last != NO_STAMP and stamp - self._last > CLOCK_LEAP and after is not None:
+            return False, sequence[0], True
+        if self._is_isolated(stamp, after):
+            self._discard("late" if self._last == NO_STAMP and after is not None else "ahead")
+            return False, sequence[0] + 1, False
+        if back := self._return_from_jump(values, sequence, stamp):
+            for _ in range(back - sequence[0]):
+                self._discard("jumps")
             return False, back, False
-        return True, row[0], False
+        return True, sequence[0], False
 
-    def _comes_back(self, values: Array, row: list[int], stamp: int) -> int:
-        """Where a row of samples that begins with a leap is back again, by what one step may be; 0 if never."""
-        if not self._is_torn(values[row[0]], stamp):
+    def _return_from_jump(self, values: Array, sequence: list[int], stamp: int) -> int:
+        """Index at which samples that begin with a jump are back where they were; 0 if they never are."""
+        if not self._jumps_to(values[sequence[0]], stamp):
             return 0
-        return next((k for k in row[1:] if not self._is_torn(values[k], stamp)), 0)
+        return next((k for k in sequence[1:] if not self._jumps_to(values[k], stamp)), 0)
 
-    def _late(self, block: list[int]) -> tuple[bool, int, bool]:
-        row = _longest_row(block, NONE)
-        if len(block) == HELD and 2 * len(row) >= HELD and block[row[0]] < self._last - FAR:
+    def _decide_late(self, block: list[int]) -> tuple[bool, int, bool]:
+        sequence = _longest_increasing(block, NO_STAMP)
+        increasing = len(block) == LOOKAHEAD and 2 * len(sequence) >= LOOKAHEAD
+        if increasing and block[sequence[0]] < self._last - ISOLATION:
             return False, 0, True
-        self._leave_out(self._kind_of_old(block[0]))
+        self._discard(self._kind_of_old(block[0]))
         return False, 1, False
 
     def _kind_of_old(self, stamp: int) -> str:
         return "repeated" if stamp in self._recent else "late"
 
-    def _is_alone(self, stamp: int, after: int | None) -> bool:
-        """Far from the samples before and after? The first one of all is good if another follows near."""
-        far_before = stamp - self._last > FAR
-        far_after = after is None or after - stamp > FAR
-        return far_before and far_after and not (self._last == NONE and after is None)
+    def _is_isolated(self, stamp: int, after: int | None) -> bool:
+        """Whether a stamp is far from those before and after; the very first one only needs a near successor."""
+        far_before = stamp - self._last > ISOLATION
+        far_after = after is None or after - stamp > ISOLATION
+        return far_before and far_after and not (self._last == NO_STAMP and after is None)
 
-    def _leave_out(self, kind: str) -> None:
+    def _discard(self, kind: str) -> None:
         self.counts[kind] += 1
-        self._behind += kind == "late"
+        self._late_since_last += kind == "late"
 
-    def _note(self, stamps: IntArray, last_values: Array) -> None:
-        self._last, self._last_values, self._behind = int(stamps[-1]), last_values, 0
-        self._recent.extend(stamps[-RECENT:].tolist())
+    def _accept(self, stamps: IntArray, last_values: Array) -> None:
+        self._last, self._last_values, self._late_since_last = int(stamps[-1]), last_values, 0
+        self._recent.extend(stamps[-REMEMBERED:].tolist())
 
 
-def _longest_row(block: Sequence[int], last: int) -> list[int]:
-    """Places of the longest row of rising stamps after `last`; of rows of one length the one that arrived first."""
-    rows: list[list[int]] = [[] for _ in block]
+def _longest_increasing(block: Sequence[int], last: int) -> list[int]:
+    """Indices of the longest sequence of increasing stamps after `last`; of equally long ones the first to arrive."""
+    best: list[list[int]] = [[] for _ in block]
     for k in range(len(block) - 1, -1, -1):
         if block[k] > last:
-            later = [rows[j] for j in range(k + 1, len(block)) if block[j] > block[k]]
-            rows[k] = [k, *max(later, key=len, default=[])]
-    return max(rows, key=len, default=[])
+            later = [best[j] for j in range(k + 1, len(block)) if block[j] > block[k]]
+            best[k] = [k, *max(later, key=len, default=[])]
+    return max(best, key=len, default=[])

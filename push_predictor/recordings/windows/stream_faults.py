@@ -1,4 +1,4 @@
-"""Faults of the streams, counted by kind: what each kind is called, and what it is."""
+"""Faults of the streams by kind: names, descriptions, and warnings in words."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from collections.abc import Mapping
 
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 
+_CHECK = "Check clock synchronisation and the outline's frame"
 FAULTS = {
-    "repeated": "samples whose stamp came before: not used",
-    "late": "samples older than those that came before them: not used",
-    "ahead": "samples whose stamp is ahead of those that follow: not used",
-    "not_finite": "samples with a number that is none: not used",
-    "jumps": "leaps of a position that nothing moves by: a sample that leaps there and back is not used",
-    "dropouts": "gaps longer than 20 ms and four periods, in which no window lies",
-    "refused": "samples not used for any of these",
-    "resets": "times that the slider was put elsewhere, which ends a push",
-    "clock_set_back": "times that the clock was set: windows before and after are kept apart",
-    "not_a_push": "windows left out, the tip moves along or away",
-    "inside": "times that the tip lay over 5 mm inside the slider: clocks or frames are apart",
-    "left_behind": "windows left out, the tip went into a slider that did not give way: clocks or frames are apart",
-    "outran": "windows left out, the slider went farther than the tip drove it",
+    "repeated": "samples with the stamp of an earlier sample; discarded",
+    "late": "samples older than those received before them; discarded",
+    "ahead": "samples with a stamp ahead of those that follow; discarded",
+    "not_finite": "samples that contain NaN or infinity; discarded",
+    "jumps": "position changes that no motion explains; a sample that jumps away and back is discarded",
+    "dropouts": "gaps longer than 20 ms and four sample periods; no window spans them",
+    "refused": "samples discarded for any of these reasons",
+    "resets": "times that the slider was repositioned; each ends a push",
+    "clock_set_back": "times that the clock was set; windows before and after are kept separate",
+    "not_a_push": "windows rejected because the tip moves along the outline or away from it",
+    "inside": f"times that the tip lay over 5 mm inside the outline. {_CHECK}",
+    "left_behind": f"windows rejected because the tip enters the outline. {_CHECK}",
+    "outran": "windows rejected because the slider moved farther than the tip",
 }
-# What no good system does. Slider resets, repeated stamps and short gaps are everyday.
+# A sound system has none of these. Resets, repeated stamps and short dropouts are normal.
 WARNED = (
     "late",
     "ahead",
@@ -32,33 +33,34 @@ WARNED = (
     "left_behind",
     "outran",
 )
-APART = 0.25  # s that the clocks of two streams may differ before it is told
+CLOCK_TOLERANCE = 0.25  # s; larger clock offsets between two streams are reported
 
 
-def fault_words(counts: Mapping[str, int]) -> list[str]:
-    """In words, what kinds of fault occurred that a good system does not have; counts as of a WindowFinder."""
+def describe_faults(counts: Mapping[str, int]) -> list[str]:
+    """Sentences about the faults that a sound system does not have, from the counts of a WindowFinder."""
     return [f"{counts[kind]} {kind} ({FAULTS[kind]})" for kind in WARNED if counts.get(kind)]
 
 
-def recording_faults(recording: Recording, counts: Mapping[str, int]) -> list[str]:
-    """The same of a recording, with what only the whole of it tells: clocks that are apart, and no wrench."""
-    found = fault_words(counts)
+def describe_recording_faults(recording: Recording, counts: Mapping[str, int]) -> list[str]:
+    """The same for a whole recording, with clock offsets between its streams and a missing wrench."""
+    found = describe_faults(counts)
     if recording.wrench is None:
-        found.append("no wrench was recorded: windows are found by geometry alone")
+        found.append("no wrench was recorded: contact is found from geometry alone")
     for name, stream in (("pusher", recording.pusher), ("wrench", recording.wrench)):
-        if stream is not None and abs(lag := clocks_apart(stream, recording.slider)) > APART:
-            found.append(apart_words(name, lag))
+        if stream is not None and abs(offset := clock_offset(stream, recording.slider)) > CLOCK_TOLERANCE:
+            found.append(describe_clock_offset(name, offset))
     return found
 
 
-def clocks_apart(stream: PoseStream | WrenchStream, slider: PoseStream) -> float:
-    """By how much (s) a stream both begins and ends after (or before) the slider's: 0 unless it does both."""
+def clock_offset(stream: PoseStream | WrenchStream, slider: PoseStream) -> float:
+    """Time (s) by which a stream both begins and ends after (or before) the slider's; 0 unless it does both."""
     if not (len(stream) and len(slider)):
         return 0.0
     first, last = int(stream.stamp[0] - slider.stamp[0]), int(stream.stamp[-1] - slider.stamp[-1])
     return 1e-9 * min(first, last, key=abs) if first * last > 0 else 0.0
 
 
-def apart_words(name: str, lag: float) -> str:
-    """How the clock of a stream stands to the slider's."""
-    return f"the stamps of the {name} are {abs(lag):.3g} s {'ahead of' if lag > 0 else 'behind'} those of the slider"
+def describe_clock_offset(name: str, offset: float) -> str:
+    """A sentence about the clock of a stream relative to the slider's; offset in s, positive if ahead."""
+    side = "ahead of" if offset > 0 else "behind"
+    return f"the stamps of the {name} are {abs(offset):.3g} s {side} those of the slider"
