@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,19 @@ from push_predictor.recordings.streams import PoseStream, Recording, ScalarStrea
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
+NEEDS_ROS = re.compile(
+    r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data."""
+    needs_ros = {path: bool(NEEDS_ROS.search(path.read_text())) for path in {item.path for item in items}}
+    for item in items:
+        if needs_ros[item.path]:
+            item.add_marker(pytest.mark.ros)
+        if "measured_data" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.measured)
 
 
 @pytest.fixture(scope="session")
