@@ -162,13 +162,6 @@ def label_marker(text: str, centre: Array, reach: float, outside: bool, frame_id
     return MarkerArray(markers=[_Sheet(frame_id, stamp).text("label", place, text, RED if outside else WHITE)])
 
 
-def delete_markers(frame_id: str, stamp: int) -> MarkerArray:
-    """Takes everything this publisher drew off the screen; stamp in ns."""
-    marker = Marker(action=Marker.DELETEALL)
-    marker.header.frame_id, marker.header.stamp = frame_id, ns_to_stamp(stamp)
-    return MarkerArray(markers=[marker])
-
-
 def confidence_ellipse(centre: Array, covariance: Array) -> Array:
     """Points (ELLIPSE_POINTS, 2) of the closed curve that holds 95 % of N(centre (2,), covariance (2, 2))."""
     angle = np.linspace(0.0, 2.0 * np.pi, ELLIPSE_POINTS)

@@ -1,14 +1,13 @@
-"""A validated window <-> push_predictor_interfaces/PushResidual."""
+"""A validated window -> push_predictor_interfaces/PushResidual."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from msg_adapters import MessageError
-from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
+from msg_adapters.stamps import ns_to_stamp
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushResidual
 
@@ -51,21 +50,6 @@ def residual_to_message(window: ValidatedWindow, frame_id: str = "world") -> Pus
     message.predicted, message.observed = _flat(window.predicted), _flat(window.observed)
     message.covariance, message.standardised = _flat(window.covariance), _flat(window.standardised)
     return message
-
-
-def residual_from_message(message: Any) -> ValidatedWindow:
-    """The window of a message, as a recording of residuals holds it."""
-    return ValidatedWindow(
-        stamp_to_ns(message.header.stamp),
-        message.push_id,
-        int(message.window),
-        message.model,
-        np.array([message.velocity, message.contact, message.angle], dtype=np.float64),
-        float(message.duration),
-        np.array(message.predicted, dtype=np.float64),
-        np.array(message.covariance, dtype=np.float64).reshape(3, 3),
-        np.array(message.observed, dtype=np.float64),
-    )
 
 
 def _flat(values: Array) -> Array:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 
-from msg_adapters.poses import NORM_TOLERANCE
 from msg_adapters.predictions import covariates_of_push
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.errors import RequestError
@@ -18,6 +17,7 @@ from push_predictor.planning.slider_pose import SliderAfter, WorldPush
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
 
+NORM_TOLERANCE = 1e-3  # of a unit quaternion; float32 stays far below
 FLAT = 0.1  # rad out of the plane: there a projection is off by 0.5 %
 LIFT = WindowOptions().lift
 PLANAR = np.ix_([0, 1, 5], [0, 1, 5])  # x, y and the rotation about z among x, y, z, rotations about x, y, z

@@ -57,11 +57,6 @@ class Stop:
         while not self._event.wait(0.2):
             pass
 
-    @property
-    def requested(self) -> bool:
-        """Has anybody asked?"""
-        return self._event.is_set()
-
 
 def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | None = None, threads: int = 1) -> int:
     """Make a node, spin it until a signal or Stop, close it; answers the exit status.

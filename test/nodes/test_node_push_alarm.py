@@ -15,7 +15,7 @@ from synthetic import square_rig
 from validator_bench import WRITTEN, Status, replaying
 
 from push_predictor.evaluation.alarm.evidence import alarm_json
-from push_predictor.evaluation.alarm.scores import calibrate, judged
+from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
@@ -100,7 +100,7 @@ def offline(bench: dict[str, Path], recording: str) -> dict[str, object]:
     model = load_model(bench["model"])
     windows, comparison = validate_recording(model, bench[recording])
     table = windows_to_table(windows)
-    return alarm_json(judged(calibrate(model), table, comparison.mean, comparison.covariance))
+    return alarm_json(alarm_state(calibrate(model), table, comparison.mean, comparison.covariance))
 
 
 def test_a_change_in_the_middle_of_a_replay_is_told_once(changed: Outcome, bench: dict[str, Path]):

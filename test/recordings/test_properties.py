@@ -14,10 +14,10 @@ import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planar_messages import pose_message, wrench_message
 from rclpy.serialization import serialize_message
 from synthetic import Push, moved, translating_push
 
-from msg_adapters.poses import PlanarPose, PlanarWrench, pose_to_message, wrench_to_message
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.push_model import Prediction, PushModel
@@ -66,13 +66,13 @@ def through_messages(recording: Recording) -> Recording:
         recording,
         slider=slider_stream(*received(SLIDER, poses(recording.slider))),
         pusher=pusher_stream(*received(PUSHER, poses(recording.pusher))),
-        wrench=wrench_stream(*received(WRENCH, [wrench_to_message(PlanarWrench(*row)) for row in forces])),
+        wrench=wrench_stream(*received(WRENCH, [wrench_message(*row) for row in forces])),
     )
 
 
 def poses(stream: PoseStream) -> list[PoseStamped]:
     columns = zip(stream.stamp.tolist(), stream.x, stream.y, stream.z, stream.heading, strict=True)
-    return [pose_to_message(PlanarPose(*row)) for row in columns]
+    return [pose_message(*row) for row in columns]
 
 
 def received(kind: SampleRules, messages: list[PoseStamped] | list[WrenchStamped]) -> tuple[Array, Array]:
