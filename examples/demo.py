@@ -74,7 +74,7 @@ def _trained(kind: str) -> Path:
     if path.exists() and path.stat().st_mtime > max(part.stat().st_mtime for part in TRAINING.iterdir()):
         print(f"   {kind}: using {path.relative_to(ROOT)} of an earlier run")
         return path
-    command = ["train", str(TRAINING), "--model", kind, "--out", str(path)]
+    command = ["train", str(TRAINING), "--kind", kind, "--out", str(path)]
     subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
     return path
 

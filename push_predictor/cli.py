@@ -1,6 +1,6 @@
-"""The command line `push_predictor`: one module a sub-command, in push_predictor.commands.
+"""The command line `push_predictor`. Each sub-command is a module in push_predictor.commands.
 
-Exit status 0: done; 1: the work failed, one line on stderr says why; 2: the call was wrong.
+Exit status 0: done; 1: the work failed, and one line on stderr states why; 2: the call was wrong.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ COMMANDS = ("import", "simulate", "train", "predict", "evaluate", "validate", "t
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one sub-command and return the exit status."""
-    # A second thread gains little for a thousand rows, and costs tenfold where another process wants the core.
+    """Run one sub-command and return its exit status."""
+    # With a thousand rows a second thread gains little, and it is ten times slower if another process needs the core.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     options = build_parser().parse_args(arguments)
     try:
         check_json(options)
         options.run(options)
-        sys.stdout.flush()  # a full disk behind a pipe is told now, not when the interpreter ends
-    except BrokenPipeError:  # the reader of our output has gone, `| head` for instance
+        sys.stdout.flush()  # report a full disk here, not when the interpreter exits
+    except BrokenPipeError:  # the reader closed the pipe, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (PushPredictorError, OSError) as error:
         print(f"push_predictor {options.command}: {_one_line(error)}", file=sys.stderr)
@@ -39,8 +39,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The parser with all sub-commands."""
-    parser = argparse.ArgumentParser(prog="push_predictor", description="Models of planar pushing, from recordings.")
+    """Return the parser with all sub-commands."""
+    parser = argparse.ArgumentParser(
+        prog="push_predictor",
+        description="Learn models of planar pushing from recordings, check them, and explain their errors.",
+    )
     parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
@@ -50,7 +53,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _one_line(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename2 or error.filename}: {error.strerror}"  # the second one is where it should have gone
+        return f"{error.filename2 or error.filename}: {error.strerror}"  # filename2 is the destination
     return " ".join(str(error).split())
 
 

@@ -1,1 +1,4 @@
-"""The sub-commands of the command line. Each module has `add_parser` and does its heavy imports when it runs."""
+"""The sub-commands of the command line, one module each.
+
+Each module has `add_parser`. It imports numpy, scipy and ROS only when its command runs, so that --help is fast.
+"""

@@ -1,4 +1,4 @@
-"""The checks of `doctor` that need no ROS: Python, packages, a model, a recording, executables, space."""
+"""The checks of `doctor` that need no ROS: Python, packages, model, recording, executables, disk space."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ EXTRAS = {
 }
 NODES = ("predict_server", "push_replay", "push_validator")
 MODULES = {"PyYAML": "yaml"}
-ENOUGH = 200e6  # bytes: a recording of some minutes, a report
+ENOUGH = 200e6  # bytes: a recording of some minutes and a report
 
 
 def python_and_packages() -> Iterator[Finding]:
-    """The interpreter, what the package cannot do without, and what it can."""
+    """Check the Python version, the required packages and the extras."""
     yield _python()
     for name, least in NEEDED.items():
         yield _needed(name, least)
@@ -37,7 +37,7 @@ def python_and_packages() -> Iterator[Finding]:
 
 
 def model_predicts(given: Path | None) -> Finding:
-    """A model file, the shipped one if none is given, loads and predicts a push with a proper covariance."""
+    """Check that a model file (default: the shipped one) loads and predicts with a valid covariance."""
     try:
         import numpy as np
 
@@ -49,14 +49,14 @@ def model_predicts(given: Path | None) -> Finding:
         row = model.training.take(np.array([0]))
         prediction = model.predict_rows(row.inputs, row.duration, row.covariates)
         if not (np.isfinite(prediction.mean).all() and np.linalg.eigvalsh(prediction.covariance[0])[0] > 0.0):
-            return _broken("model", f"{path} answers {prediction.mean[0]}", _OF_A_MODEL)
-    except Exception as error:  # half an installation raises anything
+            return _broken("model", f"{path} predicts {prediction.mean[0]}, or an invalid covariance", _OF_A_MODEL)
+    except Exception as error:  # an incomplete installation raises exceptions of any kind
         return _broken("model", _words(error), _OF_A_MODEL)
     return Finding("model", "ok", f"{path} loads and predicts ({model.kind}, {len(model.training)} windows)")
 
 
 def recording_reads(given: Path | None) -> Finding:
-    """A recording, one simulated here if none is given, reads, and pushes are found in it."""
+    """Check that a recording (default: a simulated one) can be read and contains pushes."""
     try:
         from push_predictor.recordings.describe import describe_recording
 
@@ -65,14 +65,14 @@ def recording_reads(given: Path | None) -> Finding:
             found = describe_recording(path)
     except Exception as error:  # as above
         return _broken("recording", _words(error), _OF_A_RECORDING)
-    source = str(given) if given else "one of two simulated pushes, written here,"
+    source = str(given) if given else "simulated recording"
     if not found.get("windows"):
-        return _broken("recording", f"{source} has no push", f"push_predictor info {source} tells what it has")
-    return Finding("recording", "ok", f"{source} reads: {found['pushes']} pushes, {found['windows']} windows")
+        return _broken("recording", f"{source} contains no push", f"push_predictor info {source}")
+    return Finding("recording", "ok", f"{source}: {found['pushes']} pushes, {found['windows']} windows")
 
 
 def executables() -> Finding:
-    """Where the nodes' executables are: on the path, or where `ros2 run` looks."""
+    """Check that the nodes' executables are on PATH or where `ros2 run` looks."""
     paths = {name: shutil.which(name) for name in NODES}
     if all(paths.values()):
         return Finding("executables", "ok", ", ".join(str(path) for path in paths.values()))
@@ -80,31 +80,37 @@ def executables() -> Finding:
     for prefix in prefixes:
         if all((prefix / "lib" / "push_predictor" / name).exists() for name in NODES):
             return Finding("executables", "ok", f"in {prefix}: ros2 run push_predictor {NODES[0]}")
-    beside = Path(sys.executable).parent
-    if all((beside / name).exists() for name in NODES):
-        remedy = f"export PATH={beside}:$PATH"
+    folder = Path(sys.executable).parent
+    if all((folder / name).exists() for name in NODES):
+        remedy = f"export PATH={folder}:$PATH"
     else:
         remedy = ". install/setup.sh (colcon), or python -m push_predictor.nodes.NAME"
     missing = ", ".join(name for name, path in paths.items() if path is None)
-    return Finding("executables", "note", f"{missing}: not on PATH", "the nodes cannot be started by name", remedy)
+    return Finding(
+        "executables", "note", f"{missing}: not on PATH", "the nodes cannot be started by their names", remedy
+    )
 
 
-def room() -> Finding:
-    """Can files be written where temporary ones go?"""
+def space() -> Finding:
+    """Check that temporary files can be written, and the free space there."""
     place = tempfile.gettempdir()
     try:
         with tempfile.TemporaryFile() as file:
             file.write(b"0")
         free = shutil.disk_usage(place).free
     except OSError as error:
-        return _broken("space", f"{place}: {error.strerror}", "bags and keystores are staged there", "export TMPDIR=…")
+        return _broken(
+            "space", f"{place}: {error.strerror}", "bags and keystores are written there first", "export TMPDIR=FOLDER"
+        )
     if free < ENOUGH:
-        why = "recordings and reports may not find room"
-        return Finding("space", "note", f"{free / 1e6:.0f} MB free in {place}", why, "make room, or export TMPDIR=…")
+        why = "recordings and reports may not fit"
+        return Finding(
+            "space", "note", f"{free / 1e6:.0f} MB free in {place}", why, "delete files, or export TMPDIR=FOLDER"
+        )
     return Finding("space", "ok", f"{free / 1e9:.1f} GB free in {place}")
 
 
-_OF_A_MODEL = "predict_server serves it where no model is given"
+_OF_A_MODEL = "predict_server uses it by default"
 _OF_A_RECORDING = "training, validation and replay read recordings"
 
 
@@ -112,9 +118,9 @@ def _python() -> Finding:
     version = ".".join(map(str, sys.version_info[:3]))
     low, high = (".".join(map(str, bound)) for bound in PYTHON)
     if sys.version_info[:2] < PYTHON[0]:
-        return _broken("Python", version, f"{low} to {high} is needed", f"python{high} -m venv .venv")
+        return _broken("Python", version, f"Python {low} to {high} is required", f"python{high} -m venv .venv")
     if sys.version_info[:2] > PYTHON[1]:
-        return Finding("Python", "note", version, f"newer than what was tested, which is {low} to {high}")
+        return Finding("Python", "note", version, f"newer than the tested versions {low} to {high}")
     return Finding("Python", "ok", f"{version}, {sys.executable}")
 
 
@@ -124,9 +130,9 @@ def _needed(name: str, least: str) -> Finding:
         importlib.import_module(MODULES.get(name, name))
         version = metadata.version(name)
     except (ImportError, metadata.PackageNotFoundError) as error:
-        return _broken(name, f"not found ({error})", "nothing works without it", remedy)
+        return _broken(name, f"not found ({error})", "it is required", remedy)
     if _numbers(version) < _numbers(least):
-        return _broken(name, version, f"{least} or newer is needed", remedy)
+        return _broken(name, version, f"{least} or newer is required", remedy)
     return Finding(name, "ok", version)
 
 
@@ -139,7 +145,7 @@ def _extra(extra: str, names: tuple[str, ...], purpose: str) -> Finding:
 
 
 def _there(name: str) -> bool:
-    """Installed, as its metadata say: importing them all takes seconds."""
+    """Whether its metadata are installed. Importing all packages takes seconds."""
     try:
         return bool(metadata.version(name))
     except metadata.PackageNotFoundError:

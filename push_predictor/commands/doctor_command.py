@@ -1,4 +1,4 @@
-"""push_predictor doctor: is this installation sound, and if not, what mends it."""
+"""push_predictor doctor: check the installation and report how to fix it."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from push_predictor.commands.doctor_checks import (
     model_predicts,
     python_and_packages,
     recording_reads,
-    room,
+    space,
 )
 from push_predictor.commands.doctor_findings import Finding
 from push_predictor.commands.output import add_command, progress, write_json
 from push_predictor.errors import PushPredictorError
 
-PATIENCE = 90.0  # s for all that concerns ROS
+PATIENCE = 90.0  # s for all checks of ROS
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `doctor`."""
+    """Add the sub-command `doctor`."""
     parser = add_command(
         commands,
         "doctor",
-        "Is this installation sound? Checks Python, packages, ROS, interfaces, discovery and security; predict_server "
-        "has to answer a call, a model to predict, a recording to be read. Says what is missing, why that matters and "
-        "what mends it.",
+        "Check this installation. Tests Python, packages, ROS, interfaces, discovery and security. Calls "
+        "predict_server, predicts with a model and reads a recording. Reports what is missing, why it matters and "
+        "how to fix it.",
         "push_predictor doctor --recording bags/square_abs_test",
     )
     parser.add_argument("--model", type=Path, metavar="MODEL", help="check this model file (default: the shipped one)")
     parser.add_argument(
-        "--recording", type=Path, metavar="RECORDING", help="check this recording (default: one made for the purpose)"
+        "--recording", type=Path, metavar="RECORDING", help="check this recording (default: a simulated one)"
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Check everything, print. Raises PushPredictorError that names what is missing."""
+    """Run all checks and print the findings. Raises PushPredictorError that names what is missing."""
     with progress("doctor"):
         findings = list(_findings(options.model, options.recording))
     missing = [finding.name for finding in findings if finding.state == "missing"]
@@ -59,43 +59,43 @@ def run(options: argparse.Namespace) -> None:
 
 def _findings(model: Path | None, recording: Path | None) -> Iterator[Finding]:
     yield from python_and_packages()
-    yield from _of_ros()
+    yield from _ros_findings()
     yield executables()
     yield model_predicts(model)
     yield recording_reads(recording)
-    yield room()
+    yield space()
 
 
-def _of_ros() -> Iterator[Finding]:
-    """What push_predictor.nodes.doctor_graph finds; it runs apart, since a middleware may hang or crash."""
+def _ros_findings() -> Iterator[Finding]:
+    """Findings of push_predictor.nodes.doctor_graph, in its own process because a middleware may hang or crash."""
     process = subprocess.Popen(
         [sys.executable, "-m", "push_predictor.nodes.doctor_graph"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        start_new_session=True,  # it starts a node, which is to end with it
+        start_new_session=True,  # it starts a node, which must end with it
     )
     ended = ""
     try:
         out, err = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
-        ended = f"nothing came within {PATIENCE:.0f} s"
+        ended = f"no result within {PATIENCE:.0f} s"
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
     if ended:
         out, err = process.communicate()
-    yield from _told(out, ended or (err.strip().splitlines() or ["without a word"])[-1])
+    yield from _parsed(out, ended or (err.strip().splitlines() or ["no message"])[-1])
 
 
-def _told(out: str, ended: str) -> Iterator[Finding]:
-    """The findings in the lines; a check that was begun and did not end has a finding that says how it ended."""
+def _parsed(out: str, ended: str) -> Iterator[Finding]:
+    """Findings in the output lines. A check that began and did not finish gives a finding that states how it ended."""
     begun = "rclpy"
     for line in out.splitlines():
-        told = json.loads(line)
-        begun = "" if "state" in told else told["name"]
-        if "state" in told:
-            yield Finding(**told)
+        record = json.loads(line)
+        begun = "" if "state" in record else record["name"]
+        if "state" in record:
+            yield Finding(**record)
     if begun:
-        why, remedy = "the nodes will not run either", "python -m push_predictor.nodes.doctor_graph"
-        yield Finding(begun, "missing", f"the check ended before its time: {ended}", why, remedy)
+        why, remedy = "the nodes will fail in the same way", "python -m push_predictor.nodes.doctor_graph"
+        yield Finding(begun, "missing", f"the check did not finish: {ended}", why, remedy)

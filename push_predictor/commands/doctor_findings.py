@@ -1,4 +1,4 @@
-"""What a check of the installation found."""
+"""The result of one check of the installation."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ State: TypeAlias = Literal["ok", "note", "missing"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One check. missing: something needed is not there; note: something that may be wanted.
+    """Result of one check. missing: something required is absent; note: something optional is.
 
-    why and remedy, both in words, are empty where all is well; a remedy is a command where one helps.
+    why states what this means, remedy how to fix it, as a command where possible. Both are empty if all is well.
     """
 
     name: str
@@ -23,10 +23,10 @@ class Finding:
 
     @property
     def lines(self) -> list[str]:
-        """For people: what was found, and below it what that means and what mends it."""
+        """Lines to print: the finding, what it means, how to fix it."""
         below = [f"{'':25s}{text}" for text in (self.why, self.remedy and f"-> {self.remedy}") if text]
         return [f"{self.state:8s} {self.name:15s} {self.found}", *below]
 
     def record(self) -> dict[str, str]:
-        """For machines."""
+        """The entry in the JSON."""
         return asdict(self)

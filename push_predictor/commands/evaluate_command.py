@@ -1,4 +1,4 @@
-"""push_predictor evaluate: a model against data that the caller held out."""
+"""push_predictor evaluate: score a model on data it was not trained on."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from push_predictor.commands.output import add_command, add_rig, check_data, pro
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `evaluate`."""
+    """Add the sub-command `evaluate`."""
     parser = add_command(
         commands,
         "evaluate",
-        "NMSE, NLPD and coverage of a model on recordings or tables held out by the caller.",
+        "Score a model on data it was not trained on. Prints NMSE, NLPD and coverage with 95 % intervals.",
         "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
@@ -23,10 +23,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(options: argparse.Namespace) -> None:
-    """Evaluate and print; warn where a push was trained on, or the data are of another slider."""
+    """Score the model, print the scores, and warn about training pushes and other sliders."""
     from push_predictor.evaluation.metrics_text import metrics_lines
-    from push_predictor.evaluation.offline import rig_difference
-    from push_predictor.evaluation.validation import compare, metrics_json, trained_on
+    from push_predictor.evaluation.offline import rig_difference, training_overlap
+    from push_predictor.evaluation.validation import compare, metrics_json
     from push_predictor.models.request import check_table
     from push_predictor.models.store.model_file import load_model
     from push_predictor.recordings.load import known_rig, load_data
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
         rig = given or known_rig(path)
         if rig is not None and (difference := rig_difference(model, rig)):
             warn(f"{path}: {difference}")
-    if seen := trained_on(model, table):
-        warn(f"{len(seen)} of {len(table.pushes)} pushes were trained on ({seen[0]}, ...): not held out")
+    if overlap := training_overlap(model, table):
+        warn(overlap)
     if not write_json(options, metrics):
         print("\n".join(metrics_lines(metrics)))

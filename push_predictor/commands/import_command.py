@@ -1,4 +1,4 @@
-"""push_predictor import: foreign recordings become ours."""
+"""push_predictor import: convert recordings of other laboratories."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ KINDS = ("mit", "mit-square", "mlab", "mcube", "rosbag1")
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `import`."""
+    """Add the sub-command `import`."""
     parser = add_command(
         commands,
         "import",
-        "Convert recordings of other laboratories; says what it dropped, repaired and assumed.",
+        "Convert recordings of other laboratories. Reports what was dropped, repaired and assumed.",
         "push_predictor import mit-square pushes_3500.npz --out imported",
     )
-    parser.add_argument("kind", choices=KINDS, metavar="KIND", help=" | ".join(KINDS))
-    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="files or folders")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder that receives the result")
+    parser.add_argument("kind", choices=KINDS, metavar="KIND", help=f"format of the sources: {', '.join(KINDS)}")
+    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="files or folders to convert")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
     add_rig(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Import and report."""
+    """Convert the sources and print a report."""
     from push_predictor.recordings.importers import import_source
     from push_predictor.recordings.rig import load_rig
 

@@ -1,4 +1,4 @@
-"""push_predictor info: what a file holds, and what is damaged."""
+"""push_predictor info: describe a file and list what is damaged."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from push_predictor.commands.output import add_command, write_json
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `info`."""
+    """Add the sub-command `info`."""
     parser = add_command(
         commands,
         "info",
-        "What a recording, push table or model holds, and what is damaged in it.",
+        "Describe a recording, push table or model file. Lists what is damaged.",
         "push_predictor info bags/square_abs_test",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, a push table or a model")
+    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Describe and print."""
+    """Describe the file and print the description."""
     from push_predictor.recordings.describe import describe_recording, describe_table
     from push_predictor.recordings.table_file import is_recording
 

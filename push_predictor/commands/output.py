@@ -1,4 +1,4 @@
-"""What every command shares: --json, --rig, and word of progress when work takes long."""
+"""What all commands share: the options --json and --rig, checks of paths, warnings and progress messages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,31 +16,35 @@ from pathlib import Path
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
 
-PATIENCE = 2.0  # s before the first word, and between words
+PATIENCE = 2.0  # s before the first progress message, and between messages
+
+HELP_WIDTH = 100  # characters
 
 
 def add_command(
     commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, summary: str, example: str
 ) -> argparse.ArgumentParser:
-    """A sub-parser with --json and an example at the end of its help."""
+    """Return a sub-parser with --json and an example. The first sentence of the summary is its line in the overview."""
     parser = commands.add_parser(
         name,
-        help=summary,
-        description=summary,
+        help=summary.partition(". ")[0].removesuffix("."),
+        description=textwrap.fill(summary, HELP_WIDTH),
         epilog=f"example:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--json", metavar="FILE|-", help="write the result as JSON to a file, or to stdout with -")
+    parser.add_argument("--json", metavar="FILE|-", help="write the result as JSON to this file, or to stdout (-)")
     return parser
 
 
 def add_rig(parser: argparse.ArgumentParser) -> None:
-    """The option --rig."""
-    parser.add_argument("--rig", type=Path, metavar="FILE.yaml", help="the push_rig record, where the data hold none")
+    """Add the option --rig."""
+    parser.add_argument(
+        "--rig", type=Path, metavar="FILE.yaml", help="rig file, needed if the data contain no push_rig record"
+    )
 
 
 def write_json(options: argparse.Namespace, result: Mapping[str, object]) -> bool:
-    """Write the result where --json says; True if it went to stdout, so that nothing else should."""
+    """Write the result as JSON if asked; return True if it went to stdout, which then takes nothing else."""
     if options.json is None:
         return False
     text = json.dumps(result, indent=2, allow_nan=False)
@@ -51,41 +56,41 @@ def write_json(options: argparse.Namespace, result: Mapping[str, object]) -> boo
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file; an older one is replaced when the new one is complete. Raises OSError that names the path."""
+    """Write a file; an older one is replaced only by a complete new one. Raises OSError that names the path."""
     write_whole(path, text.encode())
 
 
 def warn(text: str) -> None:
-    """Say something on stderr that does not stop the work."""
+    """Print a warning on stderr."""
     print(f"warning: {text}", file=sys.stderr)
 
 
 def check_output(option: str, path: Path | None, *, folder: bool = False) -> None:
-    """Raise RequestError unless a file (or a folder with its files) can be written there: before the work, not after.
+    """Raise RequestError unless a file (or a folder) can be written there. Missing folders are created later.
 
-    Folders that are not there will be made.
+    Called before the work, so that hours of it are not lost at the end.
     """
     if path is None:
         return
     if path.exists() and path.is_dir() != folder:
-        accepted = "a folder, this is a file" if folder else "the path of a file, this is a folder"
+        accepted = "a folder: this is a file" if folder else "the path of a file: this is a folder"
         raise RequestError(option, str(path), accepted)
     places = [path.absolute(), *path.absolute().parents] if folder else path.absolute().parents
     place = next(place for place in places if place.exists())
     if not place.is_dir():
-        raise RequestError(option, str(path), f"a path in a folder, {place} is none")
+        raise RequestError(option, str(path), f"a path inside a folder: {place} is a file")
     if not os.access(place, os.W_OK | os.X_OK):
-        raise RequestError(option, str(path), f"a path in a folder that may be written to, {place} may not")
+        raise RequestError(option, str(path), f"a path in a folder with write permission: {place} has none")
 
 
 def check_json(options: argparse.Namespace) -> None:
-    """The same for --json."""
+    """Raise RequestError unless the file of --json can be written."""
     if options.json not in (None, "-"):
         check_output("--json", Path(options.json))
 
 
 def check_data(paths: Sequence[Path]) -> None:
-    """Raise RecordingError for a path that is not there, or that can be neither recording nor table."""
+    """Raise RecordingError for a path that does not exist or is neither a recording nor a push table."""
     for path in paths:
         if not path.exists():
             raise RecordingError(f"{path}: no such file or folder")
@@ -94,24 +99,24 @@ def check_data(paths: Sequence[Path]) -> None:
 
 
 def check_seed(seed: int) -> None:
-    """Raise RequestError for a seed that no generator takes."""
+    """Raise RequestError for a negative seed."""
     if seed < 0:
-        raise RequestError("--seed", seed, "an integer from 0 on")
+        raise RequestError("--seed", seed, "an integer of at least 0")
 
 
 @contextmanager
-def progress(doing: str) -> Iterator[None]:
-    """Say on stderr what is being done and for how long, once it takes more than two seconds."""
-    done, begun = threading.Event(), time.monotonic()
+def progress(task: str) -> Iterator[None]:
+    """Print the task and the elapsed time on stderr every two seconds while it runs."""
+    done, start = threading.Event(), time.monotonic()
 
-    def speak() -> None:
+    def report() -> None:
         while not done.wait(PATIENCE):
-            print(f"{doing}: {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+            print(f"{task}: {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
 
-    speaker = threading.Thread(target=speak, daemon=True)
-    speaker.start()
+    reporter = threading.Thread(target=report, daemon=True)
+    reporter.start()
     try:
         yield
     finally:
         done.set()
-        speaker.join()
+        reporter.join()

@@ -1,4 +1,4 @@
-"""push_predictor predict: the outcome of one push."""
+"""push_predictor predict: predict the outcome of one push."""
 
 from __future__ import annotations
 
@@ -8,27 +8,35 @@ from pathlib import Path
 from push_predictor.commands.output import add_command, write_json
 from push_predictor.errors import RequestError
 
+INSIDE = "The push lies within the training data."
+OUTSIDE = "The push lies outside the training data: the prediction is an extrapolation."
+
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `predict`."""
+    """Add the sub-command `predict`."""
     parser = add_command(
         commands,
         "predict",
-        "Predict the outcome of one push: mean and covariance of dx, dy (m) and dtheta (rad).",
+        "Predict the outcome of one push. Prints mean and standard deviation of dx, dy and dtheta; --json gives the "
+        "covariance in m and rad.",
         "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
-    parser.add_argument("--velocity", required=True, type=float, metavar="V", help="m/s")
-    parser.add_argument("--contact", required=True, type=float, metavar="C", help="fraction of the perimeter")
-    parser.add_argument("--angle", required=True, type=float, metavar="A", help="rad from the inward normal")
-    parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="s (default %(default)s)")
-    meaning = "what an extended model needs besides; may be repeated"
+    parser.add_argument("--velocity", required=True, type=float, metavar="V", help="speed of the pusher in m/s")
+    parser.add_argument(
+        "--contact", required=True, type=float, metavar="C", help="contact point, as a fraction of the perimeter"
+    )
+    parser.add_argument(
+        "--angle", required=True, type=float, metavar="A", help="push angle in rad, from the inward normal"
+    )
+    parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="duration in s (default %(default)s)")
+    meaning = "a covariate that an extended model needs; may be repeated"
     parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help=meaning)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Check, predict, print."""
+    """Check the push, predict its outcome, print it."""
     import numpy as np
 
     from push_predictor.models.request import PushRequest, check_request
@@ -52,9 +60,9 @@ def run(options: argparse.Namespace) -> None:
     sd, noise = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(prediction.process_covariance[0]))
     for k, (name, unit, scale) in enumerate((("dx", "mm", 1e3), ("dy", "mm", 1e3), ("dtheta", "deg", np.degrees(1.0)))):
         print(
-            f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (noise alone {noise[k] * scale:.3f})"
+            f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (process noise {noise[k] * scale:.3f})"
         )
-    print("inside the training data" if result["in_domain"] else "outside the training data: take with care")
+    print(INSIDE if result["in_domain"] else OUTSIDE)
 
 
 def _covariate(text: str) -> tuple[str, float]:
@@ -64,5 +72,5 @@ def _covariate(text: str) -> tuple[str, float]:
     except ValueError:
         number = None
     if not name or number is None:
-        raise RequestError("--covariate", text, "NAME=VALUE with a number")
+        raise RequestError("--covariate", text, "NAME=VALUE, where VALUE is a number")
     return name, number

@@ -1,4 +1,4 @@
-"""Where a long piece of work is: a bar in a terminal, a line now and then anywhere else."""
+"""Progress of long computations: a bar in a terminal, a line every few seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from push_predictor.commands.output import PATIENCE
 
 
 class ProgressBar:
-    """Told of stages and of pieces of work (paper.work.Watch, paper.report.Stages); shows them on stderr."""
+    """Shows stages and batches of jobs on stderr; implements the paper's protocols Watch and Stages."""
 
     def __init__(self) -> None:
         self._stage, self._doing, self._done, self._count = "", "", 0, 0
-        self._begun, self._said = time.monotonic(), time.monotonic()
+        self._begun, self._reported = time.monotonic(), time.monotonic()
         self._bar = _terminal_bar()
         self._task: int | None = None
 
@@ -31,36 +31,38 @@ class ProgressBar:
             self._bar.stop()
 
     def stage(self, number: int, of: int, title: str) -> None:
-        """A part of the whole begins."""
+        """Start a stage."""
         self._stage = f"{number}/{of} {title}"
 
     def begin(self, doing: str, count: int) -> None:
-        """A batch of pieces of work begins."""
+        """Start a batch of jobs."""
         self._doing, self._done, self._count = doing, 0, count
         if self._bar is not None:
             if self._task is not None:
                 self._bar.remove_task(self._task)
             self._task = self._bar.add_task(f"{self._stage}: {doing}", total=count)
-        self._speak(finished=False)
+        self._report(finished=False)
 
     def advance(self) -> None:
-        """One piece is done."""
+        """Count one finished job."""
         self._done += 1
         if self._bar is not None:
             self._bar.advance(self._task)
-        self._speak(finished=self._done == self._count)
+        self._report(finished=self._done == self._count)
 
-    def _speak(self, finished: bool) -> None:
-        """A line at the end of a batch and every few seconds, where there is no terminal to draw on."""
+    def _report(self, finished: bool) -> None:
+        """Print a line at the end of a batch and every few seconds, if there is no bar."""
         now = time.monotonic()
-        if self._bar is None and (now - self._said > 5 * PATIENCE or (finished and now - self._said > PATIENCE)):
-            self._said = now
-            told = f"{self._stage}: {self._doing} {self._done} of {self._count}, {now - self._begun:.0f} s"
-            print(told, file=sys.stderr, flush=True)
+        if self._bar is None and (
+            now - self._reported > 5 * PATIENCE or (finished and now - self._reported > PATIENCE)
+        ):
+            self._reported = now
+            line = f"{self._stage}: {self._doing} {self._done} of {self._count}, {now - self._begun:.0f} s"
+            print(line, file=sys.stderr, flush=True)
 
 
 def _terminal_bar() -> Any:
-    """A bar of rich, None where stderr is no terminal or rich is not installed."""
+    """A bar of rich; None if stderr is no terminal or rich is not installed."""
     if not sys.stderr.isatty():
         return None
     try:

@@ -1,4 +1,4 @@
-"""push_predictor report: HTML with pictures, JSON beside it."""
+"""push_predictor report: write an HTML page with figures, and its numbers as JSON."""
 
 from __future__ import annotations
 
@@ -15,46 +15,58 @@ if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
 
 KINDS = ("vhgp", "gp", "analytical")
-SPEEDS = (0.01, 0.02, 0.05)
+SPEEDS = (0.01, 0.02, 0.05)  # m/s
 PAPER_IS_MISSING = (
     "`report paper` needs the package push_predictor_paper: pip install ./push_predictor_paper in the repository"
 )
-OF_ONE_KIND = {"paper": ("data", "recordings", "jobs", "cluster"), "validation": ("model", "recording")}
+OPTIONS_OF_KIND = {"paper": ("data", "recordings", "jobs", "cluster"), "validation": ("model", "recording")}
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `report`."""
+    """Add the sub-command `report`."""
     parser = add_command(
         commands,
         "report",
-        "A page with tables and pictures. paper: what Bauza and Rodriguez 2017 report, claim by claim, on simulated "
-        "pushes and, with --data, on measured ones; what was computed is kept in DIR/work, an interrupted report goes "
-        "on from there. validation: models against a recording they were not trained on; without --model and "
-        "--recording, both are made by the rig simulator (a square on abs).",
+        "Write an HTML page with tables and figures. `report validation` compares models with a recording. Without "
+        "--model and --recording it simulates both: a square on ABS. `report paper` checks the claims of Bauza and "
+        "Rodriguez (2017) on simulated pushes, with --data also on measured ones. It keeps its results in DIR/work, "
+        "so an interrupted report continues there.",
         "push_predictor report validation --model square_abs.pushmodel --recording bags/square_abs_test --out report",
     )
-    parser.add_argument("kind", choices=tuple(OF_ONE_KIND), metavar="KIND", help="paper or validation")
-    parser.add_argument("--quick", action="store_true", help="less of everything, to see that it runs")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder that receives the report")
+    parser.add_argument("kind", choices=tuple(OPTIONS_OF_KIND), metavar="KIND", help="paper or validation")
+    parser.add_argument("--quick", action="store_true", help="use few pushes, to test that it runs")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
     paper = parser.add_argument_group("report paper")
     paper.add_argument(
-        "--data", type=Path, metavar="FOLDER", help="measured pushes: mit_square, or files of the MIT set"
+        "--data", type=Path, metavar="FOLDER", help="measured pushes: mit_square, or files of the MIT push data set"
     )
-    paper.add_argument("--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings (about 1 GB)")
-    paper.add_argument("--jobs", type=int, metavar="N", help="pieces of work at once (default: one per core)")
-    paper.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler; all machines see --out and --data")
+    paper.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"
+    )
+    paper.add_argument("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)")
+    paper.add_argument(
+        "--cluster", metavar="ADDRESS", help="address of a dask scheduler whose machines all see --out and --data"
+    )
     validation = parser.add_argument_group("report validation")
-    validation.add_argument("--model", type=Path, nargs="+", metavar="MODEL", help="files; the first is the main one")
-    validation.add_argument("--recording", type=Path, metavar="RECORDING", help="held out from training")
+    validation.add_argument(
+        "--model",
+        type=Path,
+        nargs="+",
+        metavar="MODEL",
+        help="model files; the report compares the others with the first",
+    )
+    validation.add_argument(
+        "--recording", type=Path, metavar="RECORDING", help="a recording that was not used for training"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Compute and write the page."""
-    for kind, names in OF_ONE_KIND.items():
+    """Compute the results and write the page."""
+    for kind, names in OPTIONS_OF_KIND.items():
         for name in names:
             if kind != options.kind and getattr(options, name) is not None:
-                raise RequestError(f"--{name}", getattr(options, name), f"`report {kind}` alone")
+                raise RequestError(f"--{name}", getattr(options, name), f"it with `report {kind}` only")
     check_output("--out", options.out, folder=True)
     options.out.mkdir(parents=True, exist_ok=True)
     if options.kind == "paper":
@@ -69,17 +81,18 @@ def _paper(options: argparse.Namespace) -> None:
         from push_predictor_paper.report import report_paper
         from push_predictor_paper.work import Work
     except ModuleNotFoundError as error:
-        if not (error.name or "").startswith("push_predictor_paper"):
-            raise
+        package = (error.name or "").partition(".")[0]
+        if package != "push_predictor_paper":
+            raise PushPredictorError(f"`report paper` needs {package}; pip install 'push_predictor[report]'") from None
         raise PushPredictorError(PAPER_IS_MISSING) from None
     from push_predictor.commands.progress_bar import ProgressBar
 
     if options.jobs is not None and options.jobs < 1:
-        raise RequestError("--jobs", options.jobs, "a number from 1 on")
+        raise RequestError("--jobs", options.jobs, "an integer of at least 1")
     if options.data is not None and not options.data.is_dir():
         raise RequestError("--data", str(options.data), "a folder that exists")
     plan = QUICK if options.quick else FULL
-    with _spread(options.cluster), ProgressBar() as bar:
+    with _parallel(options.cluster), ProgressBar() as bar:
         work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
         keep = None if options.recordings is None else options.recordings.resolve()
         page, content = report_paper(plan, work, options.out, options.data, keep, bar)
@@ -88,8 +101,8 @@ def _paper(options: argparse.Namespace) -> None:
 
 
 @contextmanager
-def _spread(cluster: str | None) -> Iterator[None]:
-    """While it lasts, joblib sends its work to a dask scheduler, if one was named."""
+def _parallel(cluster: str | None) -> Iterator[None]:
+    """Send joblib's jobs to a dask scheduler, if one was given."""
     if cluster is None:
         yield
         return
@@ -97,7 +110,7 @@ def _spread(cluster: str | None) -> Iterator[None]:
         import joblib
         from distributed import Client
     except ImportError as error:
-        raise PushPredictorError(f"--cluster needs dask ({error}); pip install 'dask[distributed]'") from None
+        raise PushPredictorError(f"--cluster: it needs dask ({error}); pip install 'dask[distributed]'") from None
     with Client(cluster, timeout="10s"), joblib.parallel_config(backend="dask"):
         yield
 
@@ -123,7 +136,7 @@ def _validation(options: argparse.Namespace) -> None:
 
 
 def _simulated(out: Path, pushes: int) -> tuple[list[PushModel], Path]:
-    """Models trained on one simulated recording, and another one to try them on."""
+    """Models trained on one simulated recording, and a second recording to test them on."""
     import numpy as np
 
     from push_predictor.models.train import train_model

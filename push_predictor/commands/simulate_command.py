@@ -1,4 +1,4 @@
-"""push_predictor simulate: a recording from the rig simulator."""
+"""push_predictor simulate: write a recording of simulated pushes."""
 
 from __future__ import annotations
 
@@ -9,25 +9,29 @@ from push_predictor.commands.output import add_command, check_output, check_seed
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `simulate`."""
+    """Add the sub-command `simulate`."""
     parser = add_command(
         commands,
         "simulate",
-        "Make a recording of random pushes with the rig simulator.",
+        "Simulate random pushes and write them as a recording.",
         "push_predictor simulate --shape rect1 --surface abs --pushes 60 --speed 0.02 0.05 --seed 1 --out pushes",
     )
-    parser.add_argument("--shape", required=True, help="rect1, ellip1, ellip2, ellip3 or hex")
-    parser.add_argument("--surface", required=True, help="plywood, delrin, pu or abs")
-    parser.add_argument("--pushes", required=True, type=int, metavar="N", help="how many")
-    parser.add_argument("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds, m/s")
-    parser.add_argument("--travel", type=float, default=0.03, help="m that each push drives (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="same seed, same recording")
-    parser.add_argument("--out", required=True, type=Path, metavar="RECORDING", help="folder, or FILE.mcap")
+    parser.add_argument("--shape", required=True, help="slider: rect1, ellip1, ellip2, ellip3 or hex")
+    parser.add_argument("--surface", required=True, help="table: plywood, delrin, pu or abs")
+    parser.add_argument("--pushes", required=True, type=int, metavar="N", help="number of pushes")
+    parser.add_argument("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds in m/s")
+    parser.add_argument(
+        "--travel", type=float, default=0.03, metavar="D", help="length of each push in m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="K", help="random seed: the same seed gives the same recording"
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="RECORDING", help="output: a folder, or FILE.mcap")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Simulate and write."""
+    """Simulate the pushes and write the recording."""
     import numpy as np
 
     from push_predictor.errors import RequestError
@@ -36,7 +40,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 
     if options.pushes < 1:
-        raise RequestError("--pushes", options.pushes, "a number from 1 on")
+        raise RequestError("--pushes", options.pushes, "an integer of at least 1")
     check_seed(options.seed)
     check_output("--out", options.out, folder=options.out.suffix != ".mcap")
     rng = np.random.default_rng([options.seed, 0])

@@ -1,10 +1,11 @@
-"""push_predictor train: a model from recordings or tables."""
+"""push_predictor train: train a model from recordings or push tables."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.commands.output import (
     add_command,
@@ -13,70 +14,64 @@ from push_predictor.commands.output import (
     check_output,
     check_seed,
     progress,
+    warn,
     write_json,
 )
 from push_predictor.errors import RequestError
 
+if TYPE_CHECKING:
+    from push_predictor.models.push_model import PushModel
+    from push_predictor.recordings.rig import Rig
+    from push_predictor.recordings.table import PushTable
+
+KINDS = ("vhgp", "gp", "analytical")
+
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `train`."""
+    """Add the sub-command `train`."""
     parser = add_command(
         commands,
         "train",
-        "Train a model and save it.",
-        "push_predictor train bags/square_abs_train --model vhgp --out square_abs.pushmodel",
+        "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
+        "mean with constant noise; analytical is quasi-static mechanics.",
+        "push_predictor train bags/square_abs_train --kind vhgp --out square_abs.pushmodel",
     )
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
-    parser.add_argument("--model", required=True, choices=("vhgp", "gp", "analytical"), help="which kind")
-    parser.add_argument("--n-train", type=int, metavar="N", help="rows, at random; default: all up to 1000, evenly")
+    kind = parser.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--kind", choices=KINDS, help="kind of model")
+    kind.add_argument("--model", dest="old_kind", choices=KINDS, help="old name of --kind")
+    parser.add_argument(
+        "--n-train", type=int, metavar="N", help="draw N windows at random (default: all up to 1000, else 1000 evenly)"
+    )
     parser.add_argument(
         "--inducing",
         type=int,
         metavar="M",
-        help="vhgp: a sparse one with M inducing inputs; default: dense up to 2000 rows, beyond that sparse with 100",
+        help="vhgp: train a sparse model with M inducing inputs (default: dense up to 2000 windows, else M = 100)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="of the choice of rows")
-    parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure")
-    parser.add_argument("--stride", type=float, metavar="S", help="s between window starts; default: end to end")
-    parser.add_argument("--name", help="name in the services; default: the file's stem")
-    parser.add_argument("--out", required=True, type=Path, metavar="MODEL", help="the model file")
+    parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of --n-train (default 0)")
+    parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure distribution")
+    parser.add_argument("--stride", type=float, metavar="S", help="s between window starts (default: the duration)")
+    parser.add_argument("--name", help="name of the model in the services (default: the name of the file)")
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE.pushmodel", help="output: the model file")
     add_rig(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Load, train, save."""
+    """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
     from push_predictor.recordings.load import load_data, load_rig_for
     from push_predictor.recordings.windows.push_window import WindowOptions
 
-    check_data(options.data)
-    check_seed(options.seed)
-    check_output("--out", options.out)
-    if options.fit and options.model != "analytical":
-        raise RequestError("--fit", options.model, "it with --model analytical only, a learnt model has nothing to fit")
-    if options.inducing is not None and (options.model != "vhgp" or options.inducing < 1):
-        raise RequestError("--inducing", options.inducing, "a number from 1 on, with --model vhgp only")
-    if options.stride is not None and not 0.0 < options.stride < float("inf"):
-        raise RequestError("--stride", options.stride, "a number above 0, in s")
+    if options.old_kind is not None:
+        warn("`train --model KIND` is now `train --kind KIND`. The old name will be removed.")
+    kind = options.kind or options.old_kind
+    _check(options, kind)
     rig = load_rig_for(options.data, options.rig)
     with progress("read"):
         table = load_data(options.data, rig, WindowOptions(stride=options.stride))
-    count = len(training_rows(table, options.n_train, options.seed))
-    if m := inducing_inputs(options.model, count, options.inducing):
-        print(f"train vhgp: a sparse one of {count} windows, by up to {m} inducing inputs", file=sys.stderr)
-    with progress(f"train {options.model}"):
-        model = train_model(
-            table,
-            rig,
-            options.model,
-            name=options.name or options.out.stem,
-            sources=[path.name for path in options.data],
-            options=TrainingOptions(
-                n_train=options.n_train, seed=options.seed, fit=options.fit, inducing=options.inducing
-            ),
-        )
+    model = _trained(options, kind, table, rig)
     save_model(model, options.out)
     result = {
         "model": str(options.out),
@@ -87,6 +82,30 @@ def run(options: argparse.Namespace) -> None:
         "n_rows": len(table),
     }
     if not write_json(options, result):
-        print(
-            f"{options.out}: {model.kind}, {len(model.training)} of {len(table)} windows, {result['n_pushes']} pushes"
-        )
+        used = f"{len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
+        print(f"{options.out}: {model.kind}, trained on {used}")
+
+
+def _check(options: argparse.Namespace, kind: str) -> None:
+    """Raise RecordingError or RequestError for options that cannot work, before any data are read."""
+    check_data(options.data)
+    check_seed(options.seed)
+    check_output("--out", options.out)
+    if options.fit and kind != "analytical":
+        raise RequestError("--fit", kind, "it with --kind analytical only: a learnt model has no friction to estimate")
+    if options.inducing is not None and (kind != "vhgp" or options.inducing < 1):
+        raise RequestError("--inducing", options.inducing, "an integer of at least 1, with --kind vhgp only")
+    if options.stride is not None and not 0.0 < options.stride < float("inf"):
+        raise RequestError("--stride", options.stride, "a number above 0, in s")
+
+
+def _trained(options: argparse.Namespace, kind: str, table: PushTable, rig: Rig) -> PushModel:
+    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
+
+    count = len(training_rows(table, options.n_train, options.seed))
+    if m := inducing_inputs(kind, count, options.inducing):
+        print(f"train vhgp: sparse, {count} windows, up to {m} inducing inputs", file=sys.stderr)
+    choices = TrainingOptions(n_train=options.n_train, seed=options.seed, fit=options.fit, inducing=options.inducing)
+    name, sources = options.name or options.out.stem, [path.name for path in options.data]
+    with progress(f"train {kind}"):
+        return train_model(table, rig, kind, name=name, sources=sources, options=choices)

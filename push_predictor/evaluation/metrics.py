@@ -17,7 +17,7 @@ def nmse(mean: Array, outcomes: Array, training_mean: Array) -> Array:
     """Normalised squared error (k,) of predictions (n, k): over the deviation from the training mean (k,)."""
     error = np.sum((outcomes - mean) ** 2, axis=0)
     spread = np.sum((outcomes - training_mean) ** 2, axis=0)
-    return np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0)
+    return np.asarray(np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0))
 
 
 def gaussian_nlpd(mean: Array, variance: Array, outcomes: Array) -> Array:

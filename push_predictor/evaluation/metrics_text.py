@@ -1,30 +1,37 @@
-"""Metrics as a person reads them."""
+"""Scores as text for a terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+LEGEND = (
+    "NMSE: 0 is perfect, 1 is no better than the training mean. NLPD: nats per window in SI units, lower is better.",
+    "exact NLPD: of the exact predictive density of a VHGP; NLPD is of the Gaussian with the same moments.",
+    "in 90 %: share of outcomes inside the predicted 90 % interval.",
+)
+
 
 def metrics_lines(metrics: Mapping[str, Any]) -> list[str]:
-    """Text lines: what was scored, a line for each output and the total, the intervals of the totals."""
+    """Lines of text: what was scored, a line per output and the total, intervals of the totals, how to read them."""
+    levels = "".join(f"{f'in {100.0 * float(level):.0f} %':>9s}" for level in metrics["coverage"])
     lines = [
         f"{metrics['model']}: {metrics['n_test']} windows of {metrics['n_pushes']} pushes, "
-        f"trained on {metrics['n_train']} windows; NLPD in nats, SI units",
-        f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact':>10s}{'cov50':>8s}{'cov90':>8s}{'cov95':>8s}",
+        f"trained on {metrics['n_train']} windows",
+        f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact NLPD':>12s}{levels}",
         *(_output_line(metrics, name) for name in ("dx", "dy", "dtheta", "total")),
     ]
     interval = metrics["interval"]
     if interval["nmse"] is not None:
-        lines.append(f"95 % by push: NMSE {_range(interval['nmse'])}, NLPD {_range(interval['nlpd'])}")
-    return lines
+        lines.append(f"95 % intervals of the totals: NMSE {_range(interval['nmse'])}, NLPD {_range(interval['nlpd'])}")
+    return [*lines, *LEGEND]
 
 
 def _output_line(metrics: Mapping[str, Any], name: str) -> str:
     shares = [level and level.get(name) for level in metrics["coverage"].values()]
     exact = (metrics["exact_nlpd"] or {}).get(name)
-    cells = [_cell(metrics["nmse"][name], 9), _cell(metrics["nlpd"][name], 10), _cell(exact, 10)]
-    return f"{name:8s}" + "".join(cells + [_cell(share, 8) for share in shares])
+    cells = [_cell(metrics["nmse"][name], 9), _cell(metrics["nlpd"][name], 10), _cell(exact, 12)]
+    return f"{name:8s}" + "".join(cells + [_cell(share, 9) for share in shares])
 
 
 def _cell(value: float | None, width: int) -> str:

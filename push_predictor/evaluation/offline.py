@@ -64,6 +64,12 @@ def rig_difference(model: PushModel, rig: Rig) -> str:
     return ""
 
 
+def training_overlap(model: PushModel, table: PushTable) -> str:
+    """A warning that names how many pushes of a table were used for training, empty if none."""
+    used, pushes = len(trained_on(model, table)), len(table.pushes)
+    return f"{used} of these {pushes} pushes were used for training: the scores are optimistic." if used else ""
+
+
 def validate_recording(
     model: PushModel, path: Path, rig: Rig | None = None, tell: Callable[[str], None] | None = None
 ) -> tuple[list[PushWindow], Comparison]:

@@ -71,10 +71,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
             "-",
         ],
         "other slider": [*simulate[:2], "ellip1", *simulate[3:], "--pushes", "2", "--out", str(folder / "round")],
-        "gp": ["train", str(folder / "train"), "--model", "gp", "--out", str(folder / "gp.pushmodel")],
-        "vhgp": ["train", str(folder / "train"), "--model", "vhgp", "--n-train", "15", "--name", "hetero"]
+        "gp": ["train", str(folder / "train"), "--kind", "gp", "--out", str(folder / "gp.pushmodel")],
+        "vhgp": ["train", str(folder / "train"), "--kind", "vhgp", "--n-train", "15", "--name", "hetero"]
         + ["--out", str(folder / "vhgp.pushmodel"), "--json", "-"],
-        "analytical": ["train", str(folder / "train"), "--model", "analytical", "--fit"]
+        "analytical": ["train", str(folder / "train"), "--kind", "analytical", "--fit"]
         + ["--out", str(folder / "analytical.pushmodel"), "--json", str(folder / "train.json")],
     }
     printed = {}
@@ -128,7 +128,9 @@ def test_every_command_has_help_with_an_example_and_json(command: str, run):
         [],
         ["bogus"],
         ["train"],
-        ["train", "data", "--model", "forest", "--out", "m"],
+        ["train", "data", "--kind", "forest", "--out", "m"],
+        ["train", "data", "--out", "m"],
+        ["train", "data", "--kind", "gp", "--model", "gp", "--out", "m"],
         ["predict", "m", "--velocity", "fast", "--contact", "0", "--angle", "0"],
         ["import", "martian", "x", "--out", "y"],
         ["evaluate", "m"],
@@ -185,9 +187,18 @@ def test_train_says_what_it_learned_from(place: Place):
     assert load_model(Path(place.path("gp.pushmodel"))).name == "gp"
 
 
+def test_train_accepts_the_old_name_of_kind_with_a_warning(place: Place, run):
+    call = ["train", place.path("train"), "--out", place.path("old.pushmodel"), "--json", "-"]
+    old, new = run(*call, "--model", "analytical"), run(*call, "--kind", "analytical")
+    assert without_progress(old.err) == [
+        "warning: `train --model KIND` is now `train --kind KIND`. The old name will be removed."
+    ]
+    assert old.json == new.json and not without_progress(new.err)
+
+
 def test_a_shorter_stride_gives_more_windows_to_train_on(place: Place, run):
     out = place.path("dense.pushmodel")
-    call = ["train", place.path("train"), "--model", "analytical", "--out", out, "--json", "-"]
+    call = ["train", place.path("train"), "--kind", "analytical", "--out", out, "--json", "-"]
     assert run(*call, "--stride", "0.05").json["n_rows"] > 2 * run(*call).json["n_rows"]
 
 
@@ -237,10 +248,10 @@ def test_evaluate_and_validate_give_the_metrics_of_the_library(kind: str, place:
     loaded = load_model(Path(model))
     assert evaluated.json == json.loads(json.dumps(metrics_json(compare(loaded, load_data([Path(recording)])))))
     _, comparison = validate_recording(loaded, Path(recording))
-    told = validated.json
-    assert told.pop("alarm")["fired"] is False
-    assert told == json.loads(json.dumps(metrics_json(comparison)))
-    for metrics in (evaluated.json, told):
+    online = validated.json
+    assert online.pop("alarm")["fired"] is False
+    assert online == json.loads(json.dumps(metrics_json(comparison)))
+    for metrics in (evaluated.json, online):
         assert_contract(metrics)
         assert (metrics["n_pushes"], metrics["n_train"]) == (4, len(loaded.training))
     assert (validated.json["exact_nlpd"] is None) is (kind != "vhgp")
@@ -256,16 +267,18 @@ def test_evaluate_warns_about_pushes_that_were_trained_on(place: Place, run):
     model = place.path("gp.pushmodel")
     outcome = run("evaluate", model, place.path("train"), place.path("test.csv"), "--json", "-")
     assert outcome.status == 0 and outcome.json["n_pushes"] == 10
-    assert without_progress(outcome.err)[0].startswith("warning: 6 of 10 pushes were trained on (push-")
-    told = without_progress(run("validate", model, place.path("train")).err)
-    assert told[0].startswith("warning: 6 of 6 pushes were trained on")
+    assert without_progress(outcome.err)[0].startswith(
+        "warning: 6 of these 10 pushes were used for training: the scores are optimistic."
+    )
+    warned = without_progress(run("validate", model, place.path("train")).err)
+    assert warned[0].startswith("warning: 6 of these 6 pushes were used for training")
 
 
 def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
     outcome = run("validate", place.path("analytical.pushmodel"), place.path("round"), "--json", "-")
     assert_contract(outcome.json)
-    told = without_progress(outcome.err)[0]
-    assert told.startswith("warning: ") and "'rect1'" in told and "'ellip1'" in told
+    warned = without_progress(outcome.err)[0]
+    assert warned.startswith("warning: ") and "'rect1'" in warned and "'ellip1'" in warned
 
 
 def test_metrics_in_words_hold_the_numbers_of_the_json(place: Place, run):
@@ -324,7 +337,7 @@ def test_import_writes_a_table_and_its_rig_which_train_reads(run, tmp_path: Path
     assert np.allclose(table.inputs[:, 1], columns["c"] / 4) and np.allclose(table.outcomes[:, 1], -columns["dy"])
     assert load_rig(out / "pushes_40.rig.yaml").shape == "rect1"
     model = str(tmp_path / "m.pushmodel")
-    assert run("train", str(out / "pushes_40.csv"), "--model", "gp", "--out", model).status == 0
+    assert run("train", str(out / "pushes_40.csv"), "--kind", "gp", "--out", model).status == 0
     assert_one_line(run("import", "mit-square", str(source), "--out", str(out)), "import", ["pushes_40.csv exists"])
     assert "assumed" in run("import", "mit-square", str(source), "--out", str(tmp_path / "other")).out
 
@@ -340,10 +353,21 @@ def test_report_writes_a_page_with_pictures_and_the_metrics(place: Place, run, t
         assert_contract(metrics)
 
 
+@pytest.mark.parametrize("missing", ["push_predictor_paper", "push_predictor_paper.report"])
+def test_report_paper_without_its_package_names_the_command_that_installs_it(
+    missing: str, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "push_predictor_paper"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, missing, None)
+    outcome = run("report", "paper", "--quick", "--out", str(tmp_path / "paper"))
+    assert_one_line(outcome, "report", ["push_predictor_paper", "pip install ./push_predictor_paper"])
+
+
 # --- what goes wrong -------------------------------------------------------------------------------------------------
 
 SIMULATE = ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.02", "--out", "{tmp}/x"]
-TRAIN = ["train", "{train}", "--model", "gp", "--out", "{tmp}/m"]
+TRAIN = ["train", "{train}", "--kind", "gp", "--out", "{tmp}/m.pushmodel"]
 
 
 def changed(call: list[str], option: str, value: str) -> list[str]:

@@ -21,7 +21,7 @@ from push_predictor.commands.doctor_checks import (
     model_predicts,
     python_and_packages,
     recording_reads,
-    room,
+    space,
 )
 from push_predictor.commands.doctor_findings import Finding
 from push_predictor.nodes import doctor_graph
@@ -70,14 +70,15 @@ def test_without_ros_it_says_so_and_checks_the_rest(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("code", "words"), [("import time; time.sleep(60)", "nothing came within"), ("import os; os.abort()", "ended")]
+    ("code", "words"),
+    [("import time; time.sleep(60)", "no result within"), ("import os; os.abort()", "did not finish")],
 )
 def test_a_middleware_that_hangs_or_crashes_is_a_finding(
     code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("PYTHONPATH", with_module(tmp_path, "rclpy", code))
     monkeypatch.setattr(doctor_command, "PATIENCE", 2.0 if "sleep" in code else 30.0)
-    (finding,) = doctor_command._of_ros()
+    (finding,) = doctor_command._ros_findings()
     assert (finding.name, finding.state) == ("rclpy", "missing") and words in finding.found
 
 
@@ -126,7 +127,7 @@ def test_what_is_needed_and_what_is_extra_is_what_the_package_declares():
 def test_a_package_that_is_too_old_or_missing_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor_checks, "NEEDED", {"numpy": "99.0", "no-such-package": "1.0"})
     old, gone = (finding for finding in python_and_packages() if finding.state == "missing")
-    assert (old.name, old.why, old.remedy) == ("numpy", "99.0 or newer is needed", "pip install 'numpy>=99.0'")
+    assert (old.name, old.why, old.remedy) == ("numpy", "99.0 or newer is required", "pip install 'numpy>=99.0'")
     assert gone.name == "no-such-package" and gone.found.startswith("not found")
 
 
@@ -160,10 +161,10 @@ def test_executables_beside_the_interpreter_are_found_by_the_path_that_is_propos
 
 def test_no_room_for_temporary_files_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
-    assert room().state == "missing"
+    assert space().state == "missing"
     monkeypatch.setattr(tempfile, "tempdir", None)
     monkeypatch.setattr(doctor_checks, "ENOUGH", 1e30)
-    assert room().state == "note"
+    assert space().state == "note"
 
 
 # --- what is printed -------------------------------------------------------------------------------------------------

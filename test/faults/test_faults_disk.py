@@ -173,7 +173,7 @@ def test_links_stay_links_devices_stay_devices_and_names_may_be_long(tmp_path: P
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["train", "{in}/t.csv", "--rig", "{in}/rig.yaml", "--model", "analytical", "--out", "{out}/m.pushmodel"],
+        ["train", "{in}/t.csv", "--rig", "{in}/rig.yaml", "--kind", "analytical", "--out", "{out}/m.pushmodel"],
         ["predict", "{in}/m", "--velocity", "0.02", "--contact", "0.1", "--angle", "0", "--json", "{out}/p.json"],
         ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.02", "--out", "{out}/bag"],
     ],

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ DEFAULT_RATE = 0.01
 POWERS = (0.2, 0.4, 0.6, 0.8)  # of the bets e p^(e - 1)
 PATIENCE = 50.0  # pushes; a change is expected early, but never ruled out: P(not begun by t) = (1 + t / this)^-1/2
 SMALLEST = 1e-12  # p value; a bet on less would be lost in rounding
+SIZE = "size of the residual"  # the score that measures how large the errors are
 MOST_KEPT = 20_000  # scores of each kind that a new one is ranked among; beyond that the oldest new ones are dropped
 
 
@@ -144,9 +146,29 @@ def alarm_json(state: AlarmState | None, off: str = "") -> dict[str, object]:
     }
 
 
+def alarm_sentence(alarm: Mapping[str, Any]) -> str:
+    """The field `alarm` of the JSON as a sentence: whether the model still fits, and the evidence."""
+    if "off" in alarm:
+        return f"No alarm was computed: {alarm['off']}"
+    evidence, pushes = f"evidence of a change {_odds(alarm['log10_evidence'])}", alarm["pushes"]
+    if not alarm["fired"]:
+        return f"No alarm: the model fits after {pushes} pushes ({evidence}, alarm at {_odds(alarm['threshold'])})."
+    rate = f"false-alarm rate at most {100.0 * alarm['false_alarm_rate']:g} %"
+    where = f"detected at push {alarm['push_id']}, number {pushes}"
+    return f"The model no longer fits: {_finding(alarm['score'])} ({where}; {evidence}; {rate})."
+
+
 def with_alarm(text: str, alarm: Mapping[str, object]) -> str:
     """The JSON text of a validation with the field `alarm` in it."""
     return json.dumps({**json.loads(text), "alarm": dict(alarm)}, indent=2, allow_nan=False) + "\n"
+
+
+def _odds(log10_evidence: float) -> str:
+    return f"{10.0**log10_evidence:.3g} : 1" if log10_evidence < 3.0 else f"10^{log10_evidence:.0f} : 1"
+
+
+def _finding(score: str) -> str:
+    return "errors are too large" if score == SIZE else f"errors are biased ({score})"
 
 
 class _Ranking:

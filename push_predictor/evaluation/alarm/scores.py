@@ -15,6 +15,7 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import (
     DEFAULT_RATE,
+    SIZE,
     Alarm,
     AlarmState,
     ScoreKind,
@@ -36,7 +37,6 @@ from push_predictor.types import Array
 FOLDS = 10
 FEWEST_PUSHES = 10  # of the calibration; below that no evidence would come of hundreds of pushes
 MEAN_SIZE = 0.9247  # of the cube root of the mean of three squared standard normals
-SIZE = "size of the residual"
 SIZE_WEIGHT, OUTPUT_WEIGHT = 0.3, 0.2  # shares of the false alarms; the mechanisms have the rest
 
 
