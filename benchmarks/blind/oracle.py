@@ -1,4 +1,4 @@
-"""What a model gains that is given the truth: the true mechanism with its true driver and form, on the same split."""
+"""What a model gains that is given the truth: the true mechanism with its true driver and basis, on the same split."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.drivers import standard_form, two_dimensional
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.evidence.drivers import standard_basis, two_dimensional
 from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.residuals.evidence.split import held_out_rows
-from push_predictor.residuals.extension.extended_model import extend, gain, refit_base
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import gain
+from push_predictor.residuals.extension.refit import refit_base
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:
@@ -29,33 +33,35 @@ def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> 
     held_out = held_out_rows(table)
     analysis, rest = table.take(~held_out), table.take(held_out)
     refit = refit_base(model, analysis)
-    nlpd = gain(refit, extend(refit, analysis, [true_term(truth, analysis)], model), rest)[1]
+    evidence = evidence_of(model, analysis)
+    after = extend(refit, evidence, [candidate(evidence, *true_term(truth, analysis))])
+    nlpd = gain(refit, after, rest)[1]
     return {"value": nlpd.value, "low": nlpd.low, "high": nlpd.high}
 
 
 def true_term(truth: Mapping[str, Any], table: PushTable) -> tuple[str | None, str, DriverBasis]:
-    """Mechanism (None: the generic one), covariate and form of the truth, on the windows of a table."""
+    """Mechanism (None: the generic one), covariate and basis of the truth, on the windows of a table."""
     known = {mechanism.name for mechanism in LIBRARY}
     named = [name for name in truth["names"] if name in known]
     mechanism = named[0] if named and None not in truth["names"] else None
-    return mechanism, truth["covariates"][0], true_form(truth, table)
+    return mechanism, truth["covariates"][0], true_basis(truth, table)
 
 
-def true_form(truth: Mapping[str, Any], table: PushTable) -> DriverBasis:
-    """The form of the truth with centre and scale of the driver in these windows."""
-    driver, form = truth["covariates"][0], truth["form"]
-    if form == "constant" and (driver not in table.covariates or truth["names"][0] is not None):
+def true_basis(truth: Mapping[str, Any], table: PushTable) -> DriverBasis:
+    """The basis of the truth with centre and scale of the driver in these windows."""
+    driver, basis = truth["covariates"][0], truth["form"]
+    if basis == "constant" and (driver not in table.covariates or truth["names"][0] is not None):
         return DriverBasis("constant")
-    if form == "map" or driver == "slider_x":
+    if basis == "map" or driver == "slider_x":
         return two_dimensional(table)
     values = table.covariates[driver]
-    if form == "category" or driver == "edge":
+    if basis == "category" or driver == "edge":
         return DriverBasis("category", (driver,), levels=tuple(float(level) for level in np.unique(values)))
-    if form == "periodic":
+    if basis == "periodic":
         return DriverBasis("periodic", (driver,))
-    if form == "step":
+    if basis == "step":
         return DriverBasis("step", (driver,), place=float(truth["place"]))
-    return standard_form(_smooth(truth), driver, values)
+    return standard_basis(_smooth(truth), driver, values)
 
 
 def _smooth(truth: Mapping[str, Any]) -> str:

@@ -29,15 +29,18 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.enumeration import Candidate, candidates_of
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
+from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.evidence.drivers import driver_names
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.loading import Loaded, load_evidence
+from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
-from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
-from push_predictor.residuals.extension.extended_model import compared, extend, gain
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import compared, gain
 from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.selection.forward_selection import Term, search
+from push_predictor.residuals.selection.forward_selection import search
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.types import Array
 
 ALPHA = 0.05  # of a step; the gate guards against what this lets in
@@ -78,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         report(loaded, 2 if options.quick else MOST_TRIES)
 
 
-def mit_square(data: Path, work: Path) -> Loaded:
+def mit_square(data: Path, work: Path) -> LoadedData:
     """The 3500 windows of the measured square; nobody knows the order of its pushes."""
     import_source("mit-square", [data / "mit_square" / "pushes_3500.npz"], work)
     loaded = load_evidence([work / "pushes_3500.csv"])
@@ -86,16 +89,16 @@ def mit_square(data: Path, work: Path) -> Loaded:
     return replace(loaded, table=replace(loaded.table, covariates=known))
 
 
-def mlab(data: Path, work: Path) -> Loaded:
+def mlab(data: Path, work: Path) -> LoadedData:
     """The seven logs of 50 whole pushes of the triangle, on different supports and two surfaces."""
     import_source("mlab", [data / "mlab" / "sensor_log"], work)
     return load_evidence(sorted(work.glob("*.csv")))
 
 
-LADDERS: dict[str, Callable[[Path, Path], Loaded]] = {"mit-square": mit_square, "mlab": mlab}
+LADDERS: dict[str, Callable[[Path, Path], LoadedData]] = {"mit-square": mit_square, "mlab": mlab}
 
 
-def report(loaded: Loaded, most_tries: int = MOST_TRIES) -> None:
+def report(loaded: LoadedData, most_tries: int = MOST_TRIES) -> None:
     """Climb, then open the pushes put aside, and print a row a step."""
     aside = held_out_rows(loaded.table)
     table, held = loaded.table.take(~aside), loaded.table.take(aside)
@@ -110,12 +113,12 @@ def report(loaded: Loaded, most_tries: int = MOST_TRIES) -> None:
         print(_detail(step))
 
 
-def names_of(loaded: Loaded) -> list[str]:
+def names_of(loaded: LoadedData) -> list[str]:
     """The drivers that are tried."""
     return driver_names(loaded.table)
 
 
-def climb(loaded: Loaded, most_tries: int = MOST_TRIES) -> list[Step]:
+def climb(loaded: LoadedData, most_tries: int = MOST_TRIES) -> list[Step]:
     """What was tried, from the textbook's model on, on the pushes that are not put aside."""
     table = loaded.table.take(~held_out_rows(loaded.table))
     at_gate = held_out_rows(table)
@@ -136,15 +139,15 @@ def climb(loaded: Loaded, most_tries: int = MOST_TRIES) -> list[Step]:
     return tried
 
 
-def _suspect(model: PushModel, table: PushTable, names: Sequence[str], refused: Set[Label]) -> Term | None:
+def _suspect(model: PushModel, table: PushTable, names: Sequence[str], refused: Set[Label]) -> SelectedTerm | None:
     """What gains most of what the search finds without a driver, and with one; but for what was refused."""
-    evidence, basis = evidence_of(model, table, physics_of(model)), inputs_basis(model, table)
-    candidates = [_of_all_levels(c, table) for c in candidates_of(evidence, names, basis) if c.label not in refused]
-    found: list[Term] = []
+    evidence, inputs = evidence_of(model, table), inputs_basis(model, table)
+    candidates = [_of_all_levels(c, table) for c in candidates_of(evidence, names, inputs) if c.label not in refused]
+    found: list[SelectedTerm] = []
     for constant in (True, False):
-        chosen = [c for c in candidates if (c.form.name == "constant") == constant]
+        chosen = [c for c in candidates if (c.basis.name == "constant") == constant]
         if chosen:
-            found += search(evidence, chosen, basis, ALPHA / 2.0, most_terms=1).terms
+            found += search(evidence, chosen, inputs, ALPHA / 2.0, most_terms=1).terms
     return max(found, key=lambda term: term.rivals[0].gain, default=None)
 
 
@@ -155,15 +158,16 @@ def _all_by(covariate: str) -> Set[Label]:
 
 def _of_all_levels(candidate: Candidate, table: PushTable) -> Candidate:
     """A category in which every level has its own coefficient: the textbook has none that they could differ from."""
-    if candidate.form.name != "category":
+    if candidate.basis.name != "category":
         return candidate
-    form = replace(candidate.form, levels=(NO_LEVEL, *candidate.form.levels))
-    return replace(candidate, form=form, values=form.values(table.covariates, len(table)))
+    basis = replace(candidate.basis, levels=(NO_LEVEL, *candidate.basis.levels))
+    return replace(candidate, basis=basis, values=basis.values(table.covariates, len(table)))
 
 
-def _judged(model: PushModel, found: Term, rest: PushTable, gate: PushTable) -> Step:
+def _judged(model: PushModel, found: SelectedTerm, rest: PushTable, gate: PushTable) -> Step:
     best = found.best
-    after = extend(model, rest, [(best.mechanism, best.covariate, best.form)])
+    evidence = evidence_of(model, rest)
+    after = extend(model, evidence, [candidate(evidence, best.mechanism, best.covariate, best.basis)])
     assert isinstance(after.predictor, ExtendedPredictor)
     effect, (_, nlpd) = after.predictor.effects[-1], gain(model, after, gate)
     refused = "" if nlpd.high < 0.0 else "no gain at the gate"
@@ -179,7 +183,7 @@ def _plausible(effect: Effect, table: PushTable) -> bool:
     if effect.mechanism is None:
         return True
     mechanism = mechanism_named(effect.mechanism)
-    values = effect.form.values(table.covariates, len(table))
+    values = effect.basis.values(table.covariates, len(table))
     return mechanism.plausible(values @ effect.coefficients.reshape(len(mechanism.parameters), -1).T)
 
 
@@ -205,7 +209,7 @@ def named(step: Step) -> str:
     """What a reader calls the step."""
     if step.effect is None:
         return "textbook"
-    return f"{_label(step.effect.mechanism, step.effect.covariate)} ({step.effect.form.name})"
+    return f"{_label(step.effect.mechanism, step.effect.covariate)} ({step.effect.basis.name})"
 
 
 def parameters(effect: Effect) -> list[str]:
@@ -224,9 +228,9 @@ def parameters(effect: Effect) -> list[str]:
 
 
 def _column(effect: Effect, k: int) -> str:
-    if effect.form.name == "category":
-        return f"{effect.covariate} {effect.form.levels[k + 1]:g}"
-    return f"column {k + 1} of {effect.form.name}"
+    if effect.basis.name == "category":
+        return f"{effect.covariate} {effect.basis.levels[k + 1]:g}"
+    return f"column {k + 1} of {effect.basis.name}"
 
 
 def _label(mechanism: str | None, covariate: str) -> str:

@@ -1,4 +1,4 @@
-"""What a trace found, as the contract's section 5 tells it, and what its report shows."""
+"""The result of a trace: all that its JSON contains and its report shows."""
 
 from __future__ import annotations
 
@@ -37,12 +37,16 @@ class Sized:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """One effect as it is told: p_value is family-wise, share_of_residual that of the residual's sum of squares."""
+    """One effect of the JSON, on whatever channel it was found.
+
+    mechanism: None if unknown. basis: of the dependence on the covariate. p_value: family-wise. share_of_residual: of
+    the sum of squares of the standardised residual.
+    """
 
     mechanism: str | None
     covariate: str
     outputs: tuple[str, ...]
-    form: str
+    basis: str
     parameter: Sized | None
     p_value: float
     share_of_residual: float
@@ -70,7 +74,7 @@ class Gain:
 class HeldOut:
     """The held-out pushes, predicted by the deployed model, by the refit and by the extended model.
 
-    digest: sha256 of their rows, taken before the first look at them.
+    digest: SHA-256 of their rows, taken before they were first used.
     """
 
     table: PushTable
@@ -82,11 +86,13 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """All that a trace found. effects go with terms, strongest first.
+    """All that a trace found.
 
-    analysis: the windows that the search saw, residual and left (n, 3) their standardised residuals before and after
-    what was found. equivalent: rivals of the first effect's driver; mechanisms: rivals of its mechanism. extended: the
-    model with the effects, None where the motion model stays. notes: what a reader must know, in sentences.
+    effects: strongest first; terms: the same as effects of a model, empty if the mean of the motion is unchanged.
+    equivalent: rivals of the first effect's covariate; mechanisms: rivals of its mechanism. analysis: the windows that
+    were searched; residual, unexplained (n, 3): their standardised residuals before and after. extended: the model with
+    the effects, None if the motion model does not change. remaining: mechanism and covariate of the strongest effect
+    that is still significant. notes: further sentences for the reader.
     """
 
     verdict: Verdict
@@ -99,14 +105,14 @@ class Trace:
     undecided: bool
     analysis: PushTable
     residual: Array
-    left: Array
+    unexplained: Array
     held_out: HeldOut
     gain_nmse: Gain
     gain_nlpd: Gain
     extended: PushModel | None
     tested: tuple[Tested, ...]
     minimum_detectable: Mapping[str, Mapping[str, Any]]
-    remaining: str | None
+    remaining: tuple[str | None, str] | None
     experiment: tuple[Mapping[str, float], ...]
     alpha: float
     notes: tuple[str, ...] = field(default=())

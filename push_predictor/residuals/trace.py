@@ -1,7 +1,8 @@
-"""Trace the residual of a deployed model to an effect that the model lacks, add it, and measure again.
+"""Trace the residual of a deployed model to an effect that the model lacks, add the effect, and measure again.
 
-The order is that of trust: an error of measurement is put right before anything is said about motion; a motion effect
-before the scatter; the force's channel by itself. The held-out pushes are opened once, at the end.
+Channels are judged in order of trust. A measurement error is corrected before anything is concluded about the motion,
+and effects on the mean before effects on the variance; the wrench is judged by itself. The held-out pushes are opened
+once, at the end.
 """
 
 from __future__ import annotations
@@ -20,28 +21,31 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.channels.corrections import NO_STREAMS, correct
+from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
-from push_predictor.residuals.channels.motion import MotionFinding, MotionTerm, motion_effects
+from push_predictor.residuals.channels.motion import MotionFinding, motion_effects
 from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
 from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.evidence.loading import Loaded, cut_anew, load_evidence, previous_residual
+from push_predictor.residuals.evidence.loading import LoadedData, cut_again, load_evidence, previous_residual
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
-from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.extension.coefficients import estimated_effects
 from push_predictor.residuals.extension.effect_size import size_of
-from push_predictor.residuals.extension.extended_model import Term, compared, estimate, extend, gain, refit_base
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import compared, gain
+from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
-from push_predictor.residuals.reporting.notes import CUT_AGAIN, notes_of, notes_of_data
+from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
 
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
-BADLY_OFF = 0.5  # excess of the squared residuals from which a correction of the measurement must show in them
+BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
 Watch = Callable[[str, float], None]
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 
 
 def no_watch(stage: str, done: float) -> None:
-    """Nobody is waiting."""
+    """Report progress to nobody."""
 
 
 def trace_data(
@@ -63,200 +67,140 @@ def trace_data(
 
 def trace(
     model: PushModel,
-    loaded: Loaded,
+    loaded: LoadedData,
     *,
     alpha: float = 0.01,
     covariates: Sequence[str] | None = None,
     seed: int = 0,
     watch: Watch = no_watch,
 ) -> Trace:
-    """Find what the model leaves over in these windows and what drives it.
+    """Find what the model fails to explain in these windows, and what it depends on.
 
-    alpha: probability of any false alarm where there is nothing. covariates: drivers to try, all recorded ones if None.
-    watch: told of each stage, and which share of the work is done, when it begins.
-    Raises RequestError for an alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
+    alpha: probability of any false alarm if nothing changed. covariates: those to try, all recorded ones if None.
+    watch: called with the name of each stage and the share of the work done when it begins. Raises RequestError for an
+    alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
     """
     _check(loaded.table, alpha, covariates)
     context = _Context.of(model, loaded, alpha, covariates, seed)
-    training, physics = model.training, physics_of(model)
+    analysis, training = context.evidence.table, model.training
     watch("measurement", 0.1)
-    measured = measurement_errors(context.analysis, training, loaded.rig, context.share("measurement"), seed)
+    measured = measurement_errors(analysis, training, loaded.rig, context.share("measurement"), seed)
     if measured is not None and measured.errors:
-        corrected = _cut_again(context, measured)
-        if _puts_right(context, corrected):
+        corrected = _corrected(context, measured)
+        if _explains_residuals(context, corrected):
             return _of_measurement(context, measured, corrected)
     watch("motion", 0.15)
-    motion = motion_effects(model, context.analysis, context.share("motion"), context.covariates, seed)
+    motion = motion_effects(model, context.evidence, context.share("motion"), context.covariates, seed)
     watch("force", 0.6)
-    forces = wrench_effects(context.analysis, training, physics, context.share("wrench"), seed)
+    forces = wrench_effects(analysis, training, context.evidence.physics, context.share("wrench"), seed)
     watch("extended model", 0.7)
-    biased = _biased(forces) if not motion.terms and not motion.scatter else None
+    biased = _biased(forces) if not motion.terms and not motion.variance else None
     if biased is not None:
-        return _of_measurement(context, biased, _cut_again(context, biased))
+        return _of_measurement(context, biased, _corrected(context, biased))
     return _of_motion(context, motion, measured, forces)
 
 
 @dataclass(frozen=True, eq=False)
 class _Context:
-    """A trace's question, and its data, split once. analysis: what is searched; held_out: opened at the end."""
+    """The question of a trace and its data, split once: evidence of the analysis pushes, and the held-out pushes."""
 
     model: PushModel
-    loaded: Loaded
+    loaded: LoadedData
     alpha: float
     covariates: tuple[str, ...] | None
     seed: int
-    analysis: PushTable
+    evidence: Evidence
     held_out: PushTable
 
     @classmethod
     def of(
-        cls, model: PushModel, loaded: Loaded, alpha: float, covariates: Sequence[str] | None, seed: int
+        cls, model: PushModel, loaded: LoadedData, alpha: float, covariates: Sequence[str] | None, seed: int
     ) -> _Context:
-        """Split the windows, the residual of the push before among their covariates."""
-        table = loaded.table
-        z = evidence_of(model, table, physics_of(model)).z
-        table = replace(table, covariates={**table.covariates, "previous_residual": previous_residual(table, z)})
+        """Predict all windows, add the previous push's residual to their covariates, and split them."""
+        every = evidence_of(model, loaded.table)
+        before = previous_residual(loaded.table, every.z)
+        table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
         held = held_out_rows(table)
         names = None if covariates is None else tuple(covariates)
-        return cls(model, loaded, alpha, names, seed, table.take(~held), table.take(held))
+        return cls(model, loaded, alpha, names, seed, replace(every, table=table).take(~held), table.take(held))
 
     def share(self, channel: str) -> float:
         """The part of alpha that a channel may spend."""
         return SHARES[channel] * self.alpha
 
 
-def _puts_right(context: _Context, corrected: PushTable | None) -> bool:
-    """Whether the model, where it is badly off, is much less so once the measurement is corrected.
+@dataclass(frozen=True, eq=False)
+class _Corrected:
+    """The same pushes, cut again from corrected streams."""
 
-    A tip that gives way opens the gap as a clock that is late does; but no correction brings the predictions back.
-    Where there are no streams to correct, or the model is hardly off, the gap decides alone.
+    evidence: Evidence
+    held_out: PushTable
+
+
+@dataclass(frozen=True, eq=False)
+class _Extension:
+    """The refit, the model with the effects (the refit if none were added), all effects found, and the gain."""
+
+    refit: PushModel
+    after: PushModel
+    effects: tuple[Effect, ...]
+    added: bool
+    nmse: Gain = NO_GAIN
+    nlpd: Gain = NO_GAIN
+
+
+# --- measurement ---------------------------------------------------------------------------------------------------
+
+
+def _corrected(context: _Context, measured: MeasurementFinding) -> _Corrected | None:
+    """The windows of the recordings after all corrections; None without recordings."""
+    if context.loaded.recordings is None:
+        return None
+    recordings = list(context.loaded.recordings)
+    for error in measured.errors:
+        recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
+    table = cut_again(recordings, context.loaded.rig, window_options(context.model))
+    held = held_out_rows(table)
+    return _Corrected(evidence_of(context.model, table.take(~held)), table.take(held))
+
+
+def _explains_residuals(context: _Context, corrected: _Corrected | None) -> bool:
+    """Whether a correction halves the residuals of a model that is badly off.
+
+    A compliant tip opens the gap like a late clock, but no correction of the clock brings the predictions back. Without
+    streams to correct, or with small residuals, the gap alone decides.
     """
     if corrected is None:
         return True
-    before, after = (_excess(context.model, t) for t in (context.analysis, corrected.take(~held_out_rows(corrected))))
+    before, after = _excess(context.evidence), _excess(corrected.evidence)
     return before < BADLY_OFF or after < 0.5 * before
 
 
-def _excess(model: PushModel, table: PushTable) -> float:
-    """By how much squared residuals, in units of the prediction, exceed their 1; wild ones count 25."""
-    z = evidence_of(model, table, physics_of(model)).z
-    return float(np.mean(np.minimum(z**2, 25.0))) - 1.0
-
-
-def _of_motion(
-    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
-) -> Trace:
-    model, terms = context.model, [_as_term(t) for t in motion.terms if not t.own]
-    refit = refit_base(model, context.analysis)
-    after = extend(refit, context.analysis, terms, model) if terms else refit
-    added = iter(
-        after.predictor.effects[-len(terms) :] if terms and isinstance(after.predictor, ExtendedPredictor) else ()
-    )
-    effects = tuple(_as_seen(t, context) if t.own else next(added) for t in motion.terms)
-    equivalent = motion.equivalent if motion.terms or motion.scatter else _drivers(forces)
-    nmse, nlpd = gain(refit, after, context.held_out, model.training_mean) if terms else (NO_GAIN, NO_GAIN)
-    return Trace(
-        verdict=_verdict(motion, forces),
-        kind="mean" if motion.terms else "variance" if motion.scatter else None,
-        model=model,
-        effects=_told(motion, forces, effects, context),
-        terms=effects,
-        equivalent=equivalent,
-        mechanisms=motion.mechanisms,
-        undecided=bool(equivalent),
-        analysis=context.analysis,
-        residual=motion.residual,
-        left=evidence_of(after, context.analysis, physics_of(model)).z,
-        held_out=_held_out(context, model, refit, after, context.held_out),
-        gain_nmse=nmse,
-        gain_nlpd=nlpd,
-        extended=after if terms and nlpd.high < 0.0 else None,
-        tested=(
-            *_family_wise(motion.tested, "motion"),
-            *_family_wise(measured.tested if measured else (), "measurement"),
-            *_family_wise(forces.tested, "wrench"),
-        ),
-        minimum_detectable=motion.minimum_detectable,
-        remaining=motion.remaining,
-        experiment=motion.experiment,
-        alpha=context.alpha,
-        notes=notes_of(context.loaded, motion, measured, forces),
-    )
-
-
-def _verdict(motion: MotionFinding, forces: WrenchFinding) -> Verdict:
-    if motion.terms:
-        if motion.terms[0].mechanism is None:
-            return "driver_only"
-        return "mechanism_only" if motion.equivalent else "effect"
-    if motion.scatter:
-        return "variance"
-    return "wrench_only" if forces.effects else "none"
+def _excess(evidence: Evidence) -> float:
+    """Mean excess of the squared standardised residuals over 1; each square counts at most 25."""
+    return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
 
 
 def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
-    """A bias of the force sensor is an error of measurement, though it is found on the force's channel."""
+    """A bias of the force sensor as a measurement error, though it is found on the wrench channel."""
     first = next(iter(forces.effects), None)
     if first is None or first.mechanism != WRENCH_BIAS:
         return None
     size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
     error = MeasurementFault(first.mechanism, first.parameters, first.p_value, first.rivals, size)
-    return MeasurementFinding((error,), forces.tested, forces.scatter, forces.against_training)
+    return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)
 
 
-def _drivers(forces: WrenchFinding) -> tuple[str, ...]:
-    """Rivals of what drives the force first."""
-    first = next(iter(forces.effects), None)
-    return () if first is None else tuple(name for name in first.rivals if name != WRENCH_BIAS)
-
-
-def _told(
-    motion: MotionFinding, forces: WrenchFinding, effects: tuple[Effect, ...], context: _Context
-) -> tuple[FoundEffect, ...]:
-    """What was found on the channel that the verdict is about."""
-    if motion.terms:
-        sizes = [size_of(effect, context.analysis) for effect in effects]
-        return tuple(
-            FoundEffect(t.mechanism, t.covariate, t.outputs, t.form.name, size, _of_all(t.p_value, "motion"), t.share)
-            for t, size in zip(motion.terms, sizes, strict=True)
-        )
-    if motion.scatter:
-        return tuple(
-            FoundEffect(None, s.covariate, s.outputs, s.form.name, None, _of_all(s.p_value, "motion"), 0.0)
-            for s in motion.scatter
-        )
-    return tuple(
-        FoundEffect(e.mechanism, e.covariate, (), e.form, parameter, _of_all(e.p_value, "wrench"), 0.0)
-        for e in forces.effects
-        for parameter in e.parameters
-    )
-
-
-def _as_term(term: MotionTerm) -> Term:
-    return term.mechanism, term.covariate, term.form
-
-
-def _as_seen(term: MotionTerm, context: _Context) -> Effect:
-    """An effect in the model's own inputs, at its whole size; a refit takes it over, so that no model is given it."""
-    evidence = evidence_of(context.model, context.analysis, physics_of(context.model))
-    return estimate(evidence, [_as_term(term)])[0][0]
-
-
-def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: PushTable | None) -> Trace:
-    """The error told and, where there are streams, put right in them: the same pushes cut again, the model as it is."""
-    model = context.model
-    refit = refit_base(model, context.analysis)
-    held = context.held_out if corrected is None else corrected.take(held_out_rows(corrected))
-    left = evidence_of(model, context.analysis if corrected is None else corrected.take(~held_out_rows(corrected)),
-                       physics_of(model)).z  # fmt: skip
-    evidence = evidence_of(model, context.analysis, physics_of(model))
-    first = measured.errors[0]
+def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: _Corrected | None) -> Trace:
+    """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
+    model, first = context.model, measured.errors[0]
+    refit = refit_base(model, context.evidence.table)
     return Trace(
         verdict="measurement",
         kind="mean",
         model=model,
         effects=tuple(
-            FoundEffect(e.mechanism, CONSTANT, (), "constant", parameter, _of_all(e.p_value, "measurement"), 0.0)
+            FoundEffect(e.mechanism, CONSTANT, (), "constant", parameter, _of_trace(e.p_value, "measurement"), 0.0)
             for e in measured.errors
             for parameter in e.parameters
         ),
@@ -264,10 +208,10 @@ def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: 
         equivalent=(),
         mechanisms=first.rivals,
         undecided=bool(first.rivals),
-        analysis=context.analysis,
-        residual=evidence.z,
-        left=left,
-        held_out=_held_out(context, model, refit, model, held),
+        analysis=context.evidence.table,
+        residual=context.evidence.z,
+        unexplained=(corrected or context).evidence.z,
+        held_out=_held_out(context, refit, model, (corrected or context).held_out),
         gain_nmse=NO_GAIN,
         gain_nlpd=NO_GAIN,
         extended=None,
@@ -280,34 +224,122 @@ def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: 
     )
 
 
-def _cut_again(context: _Context, measured: MeasurementFinding) -> PushTable | None:
-    """The table of the recordings with their streams put right, error by error; None where there are no recordings."""
-    if context.loaded.recordings is None:
-        return None
-    righted = list(context.loaded.recordings)
-    for error in measured.errors:
-        righted = [correct(recording, error.mechanism, error.values) for recording in righted]
-    return cut_anew(righted, context.loaded.rig, window_options(context.model))
+# --- motion, variance and wrench -----------------------------------------------------------------------------------
 
 
-def _held_out(context: _Context, model: PushModel, refit: PushModel, after: PushModel, held: PushTable) -> HeldOut:
-    """Held-out pushes by all three; after on `held`, which differs where the measurement was put right."""
-    mean, before = model.training_mean, context.held_out
+def _of_motion(
+    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
+) -> Trace:
+    extension = _extension(context, motion)
+    equivalent = motion.equivalent if motion.terms or motion.variance else _rival_covariates(forces)
+    tested = _family_wise(motion.tested, "motion"), _family_wise(forces.tested, "wrench")
+    return Trace(
+        verdict=_verdict(motion, forces),
+        kind="mean" if motion.terms else "variance" if motion.variance else None,
+        model=context.model,
+        effects=_found_effects(context, motion, forces, extension.effects),
+        terms=extension.effects,
+        equivalent=equivalent,
+        mechanisms=motion.mechanisms,
+        undecided=bool(equivalent),
+        analysis=context.evidence.table,
+        residual=context.evidence.z,
+        unexplained=evidence_of(extension.after, context.evidence.table).z,
+        held_out=_held_out(context, extension.refit, extension.after, context.held_out),
+        gain_nmse=extension.nmse,
+        gain_nlpd=extension.nlpd,
+        extended=extension.after if extension.added and extension.nlpd.high < 0.0 else None,
+        tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
+        minimum_detectable=motion.minimum_detectable,
+        remaining=motion.remaining,
+        experiment=motion.experiment,
+        alpha=context.alpha,
+        notes=notes_of(context.loaded, motion, measured, forces),
+    )
+
+
+def _extension(context: _Context, motion: MotionFinding) -> _Extension:
+    """The refit, extended by the effects that it cannot learn in its own inputs."""
+    model, evidence = context.model, context.evidence
+    refit = refit_base(model, evidence.table)
+    candidates = [term.best for term in motion.terms if not term.own]
+    after = extend(refit, evidence, candidates) if candidates else refit
+    predictor = after.predictor
+    new = predictor.effects[-len(candidates) :] if candidates and isinstance(predictor, ExtendedPredictor) else ()
+    added = iter(new)
+    # An effect in the model's own inputs is reported at its full size, but the refit learns it.
+    effects = tuple(estimated_effects(evidence, [t.best])[0][0] if t.own else next(added) for t in motion.terms)
+    if not candidates:
+        return _Extension(refit, after, effects, added=False)
+    return _Extension(refit, after, effects, True, *gain(refit, after, context.held_out, model.training_mean))
+
+
+def _verdict(motion: MotionFinding, forces: WrenchFinding) -> Verdict:
+    if motion.terms:
+        if motion.terms[0].best.mechanism is None:
+            return "driver_only"
+        return "mechanism_only" if motion.equivalent else "effect"
+    if motion.variance:
+        return "variance"
+    return "wrench_only" if forces.effects else "none"
+
+
+def _rival_covariates(forces: WrenchFinding) -> tuple[str, ...]:
+    """Rivals of the covariate that the force depends on first."""
+    first = next(iter(forces.effects), None)
+    return () if first is None else tuple(name for name in first.rivals if name != WRENCH_BIAS)
+
+
+def _found_effects(
+    context: _Context, motion: MotionFinding, forces: WrenchFinding, effects: Sequence[Effect]
+) -> tuple[FoundEffect, ...]:
+    """The effects on the channel that the verdict is about."""
+    if motion.terms:
+        return tuple(
+            FoundEffect(
+                term.best.mechanism,
+                term.best.covariate,
+                term.outputs,
+                term.best.basis.name,
+                size_of(effect, context.evidence.table),
+                _of_trace(term.p_value, "motion"),
+                term.share,
+            )
+            for term, effect in zip(motion.terms, effects, strict=True)
+        )
+    if motion.variance:
+        return tuple(
+            FoundEffect(None, s.covariate, s.outputs, s.basis.name, None, _of_trace(s.p_value, "motion"), 0.0)
+            for s in motion.variance
+        )
+    return tuple(
+        FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "wrench"), 0.0)
+        for e in forces.effects
+        for parameter in e.parameters
+    )
+
+
+# --- held-out pushes and levels ------------------------------------------------------------------------------------
+
+
+def _held_out(context: _Context, refit: PushModel, after: PushModel, held: PushTable) -> HeldOut:
+    """Held-out pushes by all three models; the last on `held`, which differs if the measurement was corrected."""
+    mean, table = context.model.training_mean, context.held_out
     return HeldOut(
-        before,
-        compared(model, before, mean),
-        compared(refit, before, mean),
+        table,
+        compared(context.model, table, mean),
+        compared(refit, table, mean),
         compared(after, held, mean),
-        digest_of(before),
+        digest_of(table),
     )
 
 
 def _family_wise(tested: Sequence[Tested], channel: str) -> tuple[Tested, ...]:
-    return tuple(replace(one, p_value=_of_all(one.p_value, channel)) for one in tested)
+    return tuple(replace(one, p_value=_of_trace(one.p_value, channel)) for one in tested)
 
 
-def _of_all(p_value: float, channel: str) -> float:
-    """A channel's p value as one of the whole trace: at most alpha where the channel, with its share, finds it."""
+def _of_trace(p_value: float, channel: str) -> float:
+    """A channel's p value as one of the whole trace: at most alpha exactly if it is at most the channel's share."""
     return min(1.0, p_value / SHARES[channel])
 
 
@@ -315,7 +347,7 @@ def _check(table: PushTable, alpha: float, covariates: Sequence[str] | None) -> 
     if not 0.0 < alpha < 1.0:
         raise RequestError("alpha", alpha, "a probability above 0 and below 1")
     if len(table.pushes) < FEWEST_PUSHES:
-        raise RequestError("pushes", len(table.pushes), f"{FEWEST_PUSHES} at the least, better hundreds")
+        raise RequestError("pushes", len(table.pushes), f"at least {FEWEST_PUSHES}, preferably hundreds")
     for name in covariates or ():
         if name not in table.covariates and name != "previous_residual":
             raise RequestError("covariate", name, f"one of {', '.join(sorted(table.covariates))}")

@@ -32,11 +32,21 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.extension.extended_model import extend, gain, refit_base
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import gain
+from push_predictor.residuals.extension.refit import refit_base
 from push_predictor_interfaces.srv import ListModels, PredictPush, PredictPushBatch
 
 WARMTH = DriverBasis("linear", ("topic:/warmth",), (0.0,), (1.0,))
 FIELDS = ("mean", "covariance", "process_covariance", "in_domain")
+
+
+def with_effects(base: PushModel, table: PushTable, terms: list[Any], deployed: PushModel | None = None) -> PushModel:
+    """The base with terms (mechanism, covariate, basis), estimated on the residuals of the deployed model."""
+    evidence = evidence_of(deployed or base, table)
+    return extend(base, evidence, [candidate(evidence, *term) for term in terms])
 
 
 @pytest.fixture(scope="module")
@@ -137,8 +147,8 @@ def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
     table = replace(table, covariates={**table.covariates, "slid_distance": slid})
     by_distance = replace(DRIFT, drivers=("slid_distance",))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "slid_distance", by_distance)]
-    both = extend(refit_base(bases["analytical"], table), table, terms)
-    one = extend(refit_base(bases["analytical"], table), table, terms[:1])
+    both = with_effects(refit_base(bases["analytical"], table), table, terms)
+    one = with_effects(refit_base(bases["analytical"], table), table, terms[:1])
     assert isinstance(both.predictor, ExtendedPredictor) and isinstance(one.predictor, ExtendedPredictor)
     push = Push(table.inputs, table.duration, table.covariates)
     unsure, alone = both.predictor.shift(push)[1], one.predictor.shift(push)[1]
@@ -150,8 +160,8 @@ def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
 def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, PushModel], tmp_path: Path) -> None:
     table = pushes(60, 4, slippery(0.2))
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
-    first = extend(refit_base(bases["gp"], table), table, terms)
-    second = extend(
+    first = with_effects(refit_base(bases["gp"], table), table, terms)
+    second = with_effects(
         first, table, [(None, "topic:/warmth", WARMTH), ("inertia", "model_inputs", DriverBasis("constant"))]
     )
     assert isinstance(first.predictor, ExtendedPredictor) and isinstance(second.predictor, ExtendedPredictor)
@@ -270,7 +280,9 @@ def test_a_table_without_what_it_needs_is_refused_by_name(bases: dict[str, PushM
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
     generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
-    trained = extend(bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN])
+    trained = with_effects(
+        bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN]
+    )
     predictor = trained.predictor
     assert isinstance(predictor, ExtendedPredictor)
     model = replace(
@@ -355,7 +367,7 @@ def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushM
     away = []
     for seed in range(10, 16):
         table = pushes(100, seed, slippery(0.15), grain(0.1))
-        predictor = extend(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
+        predictor = with_effects(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
         assert isinstance(predictor, ExtendedPredictor)
         found = np.concatenate([effect.coefficients for effect in predictor.effects])
         sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in predictor.effects])
@@ -371,7 +383,7 @@ def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushMod
     table = pushes(100, 4, slippery(0.2))
     alike = DriverBasis("quadratic", ("elapsed_time",), (500.0,), (300.0,))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
-    predictor = extend(refit_base(bases["analytical"], table), table, terms).predictor
+    predictor = with_effects(refit_base(bases["analytical"], table), table, terms).predictor
     assert isinstance(predictor, ExtendedPredictor)
     push = Push(table.inputs, table.duration, table.covariates)
     shift, _ = predictor.shift(push)
@@ -383,7 +395,7 @@ def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushMod
 def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
     refit = refit_base(bases[kind], table)
-    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
+    after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
     assert nmse.low < nmse.value < nmse.high < 0.0
     assert nlpd.low < nlpd.value < nlpd.high < 0.0
@@ -395,7 +407,7 @@ def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushM
 def test_an_effect_that_is_not_there_gains_nothing(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 7), pushes(60, 8)
     refit = refit_base(bases[kind], table)
-    after = extend(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
+    after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     _, nlpd = gain(refit, after, held_out)
     assert abs(nlpd.value) < 0.05
     assert nlpd.high > 0.0
@@ -419,7 +431,7 @@ def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushMod
     assert refit.predictor.effects == model.predictor.effects
     plain = refit_base(bases[kind], table)
     assert gain(plain, refit, held_out)[1].high < 0.0
-    more = extend(refit, table, [GRAIN])
+    more = with_effects(refit, table, [GRAIN])
     assert isinstance(more.predictor, ExtendedPredictor)
     assert [effect.mechanism for effect in more.predictor.effects] == ["contact_friction", "anisotropic_friction"]
     assert np.all(np.abs(more.predictor.effects[1].coefficients) < 0.1)
@@ -428,7 +440,7 @@ def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushMod
 def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
     table, held_out = pushes(150, 12, slippery(0.3)), pushes(60, 13, slippery(0.3))
     refit = refit_base(bases["analytical"], table)
-    after = extend(refit, table, [(None, "elapsed_time", DRIFT)])
+    after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
     assert gain(refit, after, held_out)[1].high < 0.0
     design = design_of(None, DRIFT, physics(), Push(table.inputs, table.duration, table.covariates), np.ones(3))
     assert isinstance(after.predictor, ExtendedPredictor)
@@ -479,7 +491,7 @@ def test_evaluate_names_the_column_that_a_table_lacks(
 def test_validate_takes_from_the_windows_what_it_needs_or_names_it(
     bases: dict[str, PushModel], driver: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    effect = replace(slippery(0.2), form=replace(DRIFT, drivers=(driver,)))
+    effect = replace(slippery(0.2), basis=replace(DRIFT, drivers=(driver,)))
     save_model(extended(bases["gp"], effect), tmp_path / "m")
     write_recording(tmp_path / "bag", translating_push())
     status = main(["validate", str(tmp_path / "m"), str(tmp_path / "bag"), "--json", "-"])

@@ -84,8 +84,8 @@ def model(recording: Path) -> Path:
     """A model that lacks nothing but the warmth, which changes the contact friction."""
     rig = load_rig_for([recording])
     base = train_model(load_data([recording]), rig, "analytical", name="warm")
-    form = DriverBasis("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
-    effect = Effect("contact_friction", f"topic:{WARMTH}", form, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
+    basis = DriverBasis("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
+    effect = Effect("contact_friction", f"topic:{WARMTH}", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
     assert isinstance(base.predictor, AnalyticalPredictor)
     predictor = ExtendedPredictor(base.predictor, AnalyticalPush(rig.outline, rig.pusher_radius), (effect,), np.ones(3))
     path = recording.parent / "warm.pushmodel"
@@ -131,7 +131,7 @@ def test_the_windows_have_the_values_that_reading_the_recording_gives(watched: W
 
 def test_what_a_trace_is_given_has_them_too(watched: Watched, recording: Path) -> None:
     online, offline = load_evidence([watched.output / "pushes.csv"]), load_evidence([recording])
-    assert not online.left_out and set(offline.table.covariates) <= {*online.table.covariates}
+    assert not online.dropped and set(offline.table.covariates) <= {*online.table.covariates}
     for name, column in offline.table.covariates.items():
         assert np.allclose(online.table.covariates[name], column, rtol=0.0, atol=1e-9), name
 

@@ -15,7 +15,7 @@ from push_predictor.recordings.streams import Recording, ScalarStream, WrenchStr
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
-from push_predictor.residuals.evidence.loading import cut_anew, load_evidence, previous_residual
+from push_predictor.residuals.evidence.loading import cut_again, load_evidence, previous_residual
 
 OF_A_RECORDING = {
     *("elapsed_time", "push_index", "slid_distance", "slider_x", "slider_y", "slider_heading", "push_heading"),
@@ -60,7 +60,7 @@ def test_a_recording_gives_every_covariate_of_the_contract_and_its_scalar_topics
     start = int(translating_push().slider.stamp[0])
     loaded = load_evidence([saved(tmp_path, "one", scalars=warming(start))])
     assert set(loaded.table.covariates) == OF_A_RECORDING | {"topic:/surface/temperature"}
-    assert loaded.left_out == {}
+    assert loaded.dropped == {}
     assert loaded.recordings is not None
     assert len(loaded.recordings) == 1
     columns = loaded.table.covariates
@@ -93,7 +93,7 @@ def test_a_topic_that_one_recording_lacks_is_left_out_and_named(tmp_path: Path) 
     loaded = load_evidence(paths)
     assert "topic:/surface/temperature" not in loaded.table.covariates
     half = len(loaded.table) // 2
-    assert loaded.left_out == {"topic:/surface/temperature": f"{half} of {2 * half} windows lack it"}
+    assert loaded.dropped == {"topic:/surface/temperature": f"{half} of {2 * half} windows lack it"}
 
 
 def test_a_push_table_gives_its_columns_and_counts_its_pushes_in_their_order(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_what_a_table_says_itself_is_kept(tmp_path: Path) -> None:
 def test_a_column_with_an_empty_cell_is_left_out_and_named(tmp_path: Path) -> None:
     table = rows(["a", "b", "c"], slider_x=[0.1, np.nan, 0.2], slider_y=[0.1, 0.0, 0.2])
     loaded = load_evidence([saved_table(tmp_path, "pushes", table)])
-    assert loaded.left_out == {"slider_x": "1 of 3 windows lack it"}
+    assert loaded.dropped == {"slider_x": "1 of 3 windows lack it"}
     assert "slider_y" in loaded.table.covariates
 
 
@@ -134,11 +134,11 @@ def test_pushes_of_the_same_name_in_two_tables_are_two_pushes(tmp_path: Path) ->
 def test_streams_corrected_in_memory_are_cut_anew_into_the_same_kind_of_table(tmp_path: Path) -> None:
     loaded = load_evidence([saved(tmp_path, "a"), saved(tmp_path, "b", later=LATER)])
     assert loaded.recordings is not None
-    again = cut_anew(loaded.recordings, loaded.rig)
+    again = cut_again(loaded.recordings, loaded.rig)
     assert np.array_equal(again.outcomes, loaded.table.outcomes)
     assert set(again.covariates) == set(loaded.table.covariates)
     shifted = [replace(r, pusher=replace(r.pusher, x=r.pusher.x + 0.0003)) for r in loaded.recordings]
-    moved = cut_anew(shifted, loaded.rig)
+    moved = cut_again(shifted, loaded.rig)
     assert np.any(np.abs(moved.covariates["contact_gap"].mean() - again.covariates["contact_gap"].mean()) > 1e-4)
 
 

@@ -15,12 +15,12 @@ from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.enumeration import candidates_of, entangled
+from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.forward_selection import Search, search
+from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import block_scores, screen
 
@@ -57,9 +57,9 @@ def pushes(n: int, seed: int, scatter: np.ndarray = SCATTER) -> PushTable:
     return PushTable(inputs, duration, outcomes, np.array([f"{seed} {k}" for k in push]), covariates)
 
 
-def with_effect(table: PushTable, mechanism: str | None, form: DriverBasis, *coefficients: float) -> PushTable:
+def with_effect(table: PushTable, mechanism: str | None, basis: DriverBasis, *coefficients: float) -> PushTable:
     push = evidence_of(ANALYTICAL, table, PHYSICS).push
-    design = design_of(mechanism, form, PHYSICS, push, np.ones(3))
+    design = design_of(mechanism, basis, PHYSICS, push, np.ones(3))
     return replace(table, outcomes=table.outcomes + design @ np.array(coefficients))
 
 
@@ -83,12 +83,12 @@ def a_library_of_six(monkeypatch) -> None:
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
-def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> Search:
-    evidence, basis = evidence_of(model, table, PHYSICS), inputs_basis(model, table)
-    candidates = candidates_of(evidence, drivers, basis)
+def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> SearchResult:
+    evidence, inputs = evidence_of(model, table, PHYSICS), inputs_basis(model, table)
+    candidates = candidates_of(evidence, drivers, inputs)
     if mechanisms is not None:
         candidates = [c for c in candidates if c.mechanism is None or c.mechanism in mechanisms]
-    return search(evidence, candidates, basis, alpha, baseline=baseline_of(model, PHYSICS))
+    return search(evidence, candidates, inputs, alpha, baseline=baseline_of(model, PHYSICS))
 
 
 class TestFalseAlarms:
@@ -131,7 +131,7 @@ class TestNothingThere:
         base = train_model(with_effect(pushes(150, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
         same = searched(base, with_effect(pushes(150, 3), "centre_of_friction", *shift))
         assert not same.terms
-        assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.standing)
+        assert any(same.candidates[k].label == ("centre_of_friction", "edge") for k in same.first.unchanged)
         other = searched(
             base, with_effect(pushes(150, 3), "centre_of_friction", DriverBasis("constant"), -0.003, 0.002)
         )
@@ -141,9 +141,9 @@ class TestNothingThere:
         """Pushes done in the order of their angle: time could be blamed for whatever the base gets wrong there."""
         table = pushes(150, 3)
         ordered = replace(table, covariates={**table.covariates, "elapsed_time": 100.0 * table.inputs[:, 2]})
-        evidence, basis = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
-        assert entangled(evidence, DRIVERS, basis) == ["elapsed_time"]
-        assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, basis)}
+        evidence, inputs = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
+        assert confounded(evidence, DRIVERS, inputs) == ["elapsed_time"]
+        assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, inputs)}
 
     def test_a_touch_that_is_felt_late_is_no_effect_of_the_time_since_contact(self, learnt) -> None:
         """The window that begins with the touch is then off by the way of the tip; the others are as they were."""
@@ -162,13 +162,15 @@ class TestNothingThere:
 
     def test_it_says_how_small_an_effect_would_have_been_found(self, learnt) -> None:
         table = pushes(150, 103)
-        evidence, basis, baseline = (
+        evidence, inputs, baseline = (
             evidence_of(learnt, table, PHYSICS),
             inputs_basis(learnt, table),
             baseline_of(learnt, PHYSICS),
         )
-        found = search(evidence, candidates_of(evidence, DRIVERS, basis), basis, 0.01, baseline=baseline)
-        size = detectable_json(minimum_detectable(found, evidence, basis, 0.01, baseline))["contact_friction"]["driven"]
+        found = search(evidence, candidates_of(evidence, DRIVERS, inputs), inputs, 0.01, baseline=baseline)
+        size = detectable_json(minimum_detectable(found, evidence, inputs, 0.01, baseline))["contact_friction"][
+            "driven"
+        ]
         assert size["unit"] == "1"
         small, large = (
             with_effect(table, "contact_friction", linear(table, size["covariate"]), share * size["value"])
@@ -237,14 +239,14 @@ class TestForm:
         plain = pushes(200, 300)
         place = 1200.0
         table = with_effect(plain, "contact_friction", DriverBasis("step", ("elapsed_time",), place=place), 0.25)
-        form = searched(learnt, table).terms[0].best.form
-        assert form.name == "step"
-        assert form.place == pytest.approx(place, abs=150.0)
+        basis = searched(learnt, table).terms[0].best.basis
+        assert basis.name == "step"
+        assert basis.place == pytest.approx(place, abs=150.0)
 
     def test_a_straight_line_stays_a_straight_line(self, learnt) -> None:
         plain = pushes(200, 301)
         table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)
-        assert searched(learnt, table).terms[0].best.form.name == "linear"
+        assert searched(learnt, table).terms[0].best.basis.name == "linear"
 
 
 class TestScatter:
@@ -256,7 +258,7 @@ class TestScatter:
         louder = replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
         found = searched(learnt, louder)
         evidence = evidence_of(learnt, louder, PHYSICS)
-        scatter = variance_effects(learnt, evidence, found.left, 0.01, baseline=baseline_of(learnt, PHYSICS))
+        scatter = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline_of(learnt, PHYSICS))
         assert not found.terms
         assert scatter.found[0].covariate == "topic:/temperature"
         assert scatter.found[0].ratio > 2.0

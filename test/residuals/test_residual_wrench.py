@@ -97,7 +97,7 @@ def test_a_drift_of_the_surface_friction_is_found_and_sized(drift: float, baseli
 def test_another_level_shows_against_the_training_windows_alone() -> None:
     table = made(2, level=0.15)
     effects = found(table, made(1)).effects
-    assert [(e.mechanism, e.covariate, e.form) for e in effects] == [("surface_friction", "model_inputs", "constant")]
+    assert [(e.mechanism, e.covariate, e.basis) for e in effects] == [("surface_friction", "model_inputs", "constant")]
     assert effects[0].parameters[0].low < np.expm1(0.15) < effects[0].parameters[0].high
     assert found(table, None).effects == ()
 

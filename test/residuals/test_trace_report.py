@@ -144,7 +144,7 @@ def test_windows_cut_again_may_be_others(tmp_path: Path, unpainted: None) -> Non
         covariance=after.covariance[fewer],
         observed=after.observed[fewer],
     )
-    text = written(tmp_path, replace(trace, held_out=replace(held, after=cut), left=trace.left[:90]))
+    text = written(tmp_path, replace(trace, held_out=replace(held, after=cut), unexplained=trace.unexplained[:90]))
     assert "on windows cut again" in text and "The motion was not searched" in text
 
 
@@ -244,7 +244,7 @@ def test_an_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     assert np.sqrt(np.mean(value**2)) == pytest.approx(1.0)
     shown = np.einsum("nkq,nq->nk", responses(trace, strength, rows), value)
     whole = np.einsum("nij,nj->ni", rows.whitener, shift_of(trace, trace.terms[0], trace.analysis))
-    np.testing.assert_allclose(shown, whole, atol=1e-9)  # one column of the form: the pattern is all of it
+    np.testing.assert_allclose(shown, whole, atol=1e-9)  # one column of the basis: the pattern is all of it
     assert strength.share == pytest.approx(1.0)
 
 

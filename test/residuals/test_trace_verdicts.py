@@ -14,7 +14,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
-from push_predictor.residuals.evidence.loading import Loaded, cut_anew
+from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.reporting.wording import worth_sentence
@@ -44,7 +44,7 @@ def learnt() -> PushModel:
 def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
     recording = simulate(replace(spec(2), changes=changes, faults=Faults(**faults)))
     assert recording.rig is not None
-    return trace(learnt(), Loaded(cut_anew([recording], recording.rig), (recording,), recording.rig))
+    return trace(learnt(), LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig))
 
 
 def test_nothing_is_said_of_a_second_recording_of_the_same_rig() -> None:

@@ -16,16 +16,19 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import ExtendedPredictor, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
-from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
-from push_predictor.residuals.extension.extended_model import Term, compared, extend, gain, refit_base
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import compared, gain
+from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
 DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
 JUMP = DriverBasis("step", ("elapsed_time",), place=620.0)
 PLACE = DriverBasis("map", ("slider_x", "slider_y"), (0.0, 0.0), (0.1, 0.1))
-GRAIN: Term = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
+GRAIN = ("anisotropic_friction", "push_heading", DriverBasis("constant"))
 DRIVERS = ("elapsed_time", "push_index", "slider_x", "slider_heading", "push_heading", "topic:/warmth")
 TESTED = tuple(
     Tested(mechanism, driver, float(p))
@@ -74,10 +77,10 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 
 
-def planted(mechanism: str | None, covariate: str, form: DriverBasis, *coefficients: float) -> Effect:
+def planted(mechanism: str | None, covariate: str, basis: DriverBasis, *coefficients: float) -> Effect:
     """An effect of exactly this size."""
     size = np.array(coefficients)
-    return Effect(mechanism, covariate, form, size, np.zeros((len(size), len(size))), np.ones(3))
+    return Effect(mechanism, covariate, basis, size, np.zeros((len(size), len(size))), np.ones(3))
 
 
 def slippery(size: float) -> Effect:
@@ -96,8 +99,9 @@ def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", 
 def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tuple[Effect, ...]) -> Trace:
     """What a trace that finds these effects would say."""
     refit = refit_base(model, analysis)
-    terms_of = [(e.mechanism, e.covariate, e.form) for e in effects]
-    after = extend(refit, analysis, terms_of, model) if effects else refit
+    evidence = evidence_of(model, analysis)
+    candidates = [candidate(evidence, e.mechanism, e.covariate, e.basis) for e in effects]
+    after = extend(refit, evidence, candidates) if effects else refit
     terms = after.predictor.effects if isinstance(after.predictor, ExtendedPredictor) else ()
     nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
     before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))
@@ -111,8 +115,8 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         mechanisms=(),
         undecided=False,
         analysis=analysis,
-        residual=evidence_of(model, analysis, physics_of(model)).z,
-        left=evidence_of(after, analysis, physics_of(model)).z,
+        residual=evidence.z,
+        unexplained=evidence_of(after, analysis).z,
         held_out=HeldOut(held, before, again, last, digest_of(held)),
         gain_nmse=nmse,
         gain_nlpd=nlpd,
@@ -132,7 +136,7 @@ def found(term: Effect) -> FoundEffect:
     value = float(term.coefficients[0])
     size = Sized("change per 300 s", value, value - 1.96 * sd, value + 1.96 * sd, "1")
     parameter = None if term.mechanism is None else size
-    return FoundEffect(term.mechanism, term.covariate, ("dy", "dtheta"), term.form.name, parameter, 0.001, 0.23)
+    return FoundEffect(term.mechanism, term.covariate, ("dy", "dtheta"), term.basis.name, parameter, 0.001, 0.23)
 
 
 def told(verdict: Any, mechanism: str, covariate: str, size: Sized | None, **other: Any) -> Trace:

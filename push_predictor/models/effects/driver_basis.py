@@ -12,7 +12,9 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True)
 class DriverBasis:
-    """A form of one driver: name is one of FORMS; centre and scale of the driver, and the place of a step.
+    """A basis of functions of one covariate.
+
+    name: one of BASES. centre, scale: of the covariate. place: of a step.
 
     drivers: names of the covariates it takes: one, or two for a map; none for a constant. levels: of a category, the
     first is the one that the others are compared with.
@@ -26,54 +28,54 @@ class DriverBasis:
     levels: tuple[float, ...] = ()
 
     def values(self, covariates: Mapping[str, Array], n: int) -> Array:
-        """The form's columns (n, m) at n pushes; a constant is one column of ones."""
+        """The columns (n, m) of the basis at n pushes; a constant is one column of ones."""
         columns = [np.asarray(covariates[name], dtype=np.float64) for name in self.drivers]
         return BASES[self.name](self, columns, n)
 
 
-def _scaled(form: DriverBasis, columns: list[Array]) -> list[Array]:
-    return [(column - c) / s for column, c, s in zip(columns, form.centre, form.scale, strict=True)]
+def _scaled(basis: DriverBasis, columns: list[Array]) -> list[Array]:
+    return [(column - c) / s for column, c, s in zip(columns, basis.centre, basis.scale, strict=True)]
 
 
-def _constant(form: DriverBasis, columns: list[Array], n: int) -> Array:
+def _constant(basis: DriverBasis, columns: list[Array], n: int) -> Array:
     return np.ones((n, 1))
 
 
-def _linear(form: DriverBasis, columns: list[Array], n: int) -> Array:
-    return _scaled(form, columns)[0][:, None]
+def _linear(basis: DriverBasis, columns: list[Array], n: int) -> Array:
+    return _scaled(basis, columns)[0][:, None]
 
 
-def _logarithmic(form: DriverBasis, columns: list[Array], n: int) -> Array:
+def _logarithmic(basis: DriverBasis, columns: list[Array], n: int) -> Array:
     """Logarithm of the way from the start of the driver's range, in units of its scale."""
-    return np.log1p(np.maximum((columns[0] - form.place) / form.scale[0], 0.0))[:, None]
+    return np.log1p(np.maximum((columns[0] - basis.place) / basis.scale[0], 0.0))[:, None]
 
 
-def _quadratic(form: DriverBasis, columns: list[Array], n: int) -> Array:
-    x = _scaled(form, columns)[0]
+def _quadratic(basis: DriverBasis, columns: list[Array], n: int) -> Array:
+    x = _scaled(basis, columns)[0]
     return np.column_stack([x, x**2])
 
 
-def _step(form: DriverBasis, columns: list[Array], n: int) -> Array:
-    return (columns[0] >= form.place).astype(np.float64)[:, None]
+def _step(basis: DriverBasis, columns: list[Array], n: int) -> Array:
+    return (columns[0] >= basis.place).astype(np.float64)[:, None]
 
 
-def _periodic(form: DriverBasis, columns: list[Array], n: int) -> Array:
+def _periodic(basis: DriverBasis, columns: list[Array], n: int) -> Array:
     """Once around per turn of a heading."""
     return np.column_stack([np.cos(columns[0]), np.sin(columns[0])])
 
 
-def _periodic_twice(form: DriverBasis, columns: list[Array], n: int) -> Array:
+def _periodic_twice(basis: DriverBasis, columns: list[Array], n: int) -> Array:
     """Twice around per turn of a heading: alike for opposite headings."""
     return np.column_stack([np.cos(2.0 * columns[0]), np.sin(2.0 * columns[0])])
 
 
-def _category(form: DriverBasis, columns: list[Array], n: int) -> Array:
-    return np.column_stack([(columns[0] == level).astype(np.float64) for level in form.levels[1:]])
+def _category(basis: DriverBasis, columns: list[Array], n: int) -> Array:
+    return np.column_stack([(columns[0] == level).astype(np.float64) for level in basis.levels[1:]])
 
 
-def _map(form: DriverBasis, columns: list[Array], n: int) -> Array:
+def _map(basis: DriverBasis, columns: list[Array], n: int) -> Array:
     """A second-order map over two drivers."""
-    x, y = _scaled(form, columns)
+    x, y = _scaled(basis, columns)
     return np.column_stack([x, y, x * y, x**2, y**2])
 
 
@@ -90,6 +92,6 @@ BASES: dict[str, Callable[[DriverBasis, list[Array], int], Array]] = {
 }
 
 
-def columns_of(form: DriverBasis) -> int:
-    """How many columns a form has."""
-    return form.values({name: np.zeros(1) for name in form.drivers}, 1).shape[1]
+def columns_of(basis: DriverBasis) -> int:
+    """Number of columns of a basis."""
+    return basis.values({name: np.zeros(1) for name in basis.drivers}, 1).shape[1]

@@ -17,7 +17,7 @@ GENERIC_TERMS = 6  # of the polynomial, for each output
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Shift of the mean: sum over parameters p and columns m of the form, response_p x form_m x coefficient_pm.
+    """Shift of the mean: sum over parameters p and columns m of the basis, response_p x basis_m x coefficient_pm.
 
     mechanism: a name of LIBRARY, or None for the generic one. coefficients (p * m,), p first; covariance of them
     (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's way).
@@ -25,7 +25,7 @@ class Effect:
 
     mechanism: str | None
     covariate: str
-    form: DriverBasis
+    basis: DriverBasis
     coefficients: Array
     covariance: Array
     outcome_scale: Array
@@ -34,11 +34,11 @@ class Effect:
     def needs(self) -> tuple[str, ...]:
         """Covariates that a request must bring."""
         own = () if self.mechanism is None else mechanism_named(self.mechanism).needs
-        return tuple(dict.fromkeys([*self.form.drivers, *own]))
+        return tuple(dict.fromkeys([*self.basis.drivers, *own]))
 
     def design(self, physics: AnalyticalPush, push: Push) -> Array:
         """What the coefficients multiply, (n, 3, p * m)."""
-        return design_of(self.mechanism, self.form, physics, push, self.outcome_scale)
+        return design_of(self.mechanism, self.basis, physics, push, self.outcome_scale)
 
     def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
         """Shift of the mean (n, 3) and its covariance (n, 3, 3)."""
@@ -47,7 +47,7 @@ class Effect:
 
 
 def design_of(
-    mechanism: str | None, form: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
+    mechanism: str | None, basis: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
 ) -> Array:
     """Columns (n, 3, p * m) of an effect: what its coefficients multiply."""
     n = len(push.inputs)
@@ -56,7 +56,7 @@ def design_of(
         if mechanism is None
         else mechanism_named(mechanism).response(physics, push)
     )
-    values = form.values(push.covariates, n)
+    values = basis.values(push.covariates, n)
     return (responses[:, :, :, None] * values[:, None, None, :]).reshape(n, 3, -1)
 
 

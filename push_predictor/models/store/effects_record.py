@@ -14,7 +14,7 @@ from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.predictors import Cross
 from push_predictor.types import Array
 
-DRIVERS = {"constant": 0, "map": 2}  # how many a form takes; all others one
+DRIVERS = {"constant": 0, "map": 2}  # how many a basis takes; all others one
 SCALED = ("linear", "quadratic", "map", "logarithmic")
 
 
@@ -74,29 +74,29 @@ def _record(effect: Effect) -> dict[str, Any]:
     return {
         "mechanism": effect.mechanism,
         "covariate": effect.covariate,
-        "form": {key: list(value) if isinstance(value, tuple) else value for key, value in vars(effect.form).items()},
+        "form": {key: list(value) if isinstance(value, tuple) else value for key, value in vars(effect.basis).items()},
         "coefficients": effect.coefficients.tolist(),
         "outcome_scale": effect.outcome_scale.tolist(),
     }
 
 
 def _effect(record: dict[str, Any], covariance: Array) -> Effect:
-    mechanism, form = record["mechanism"], _form(record["form"])
+    mechanism, basis = record["mechanism"], _basis(record["form"])
     if mechanism is not None and mechanism not in [known.name for known in LIBRARY]:
         raise ValueError(f"mechanism {mechanism!r} is not in the library")
     width = generic_width() if mechanism is None else len(mechanism_named(mechanism).parameters)
-    size = width * columns_of(form)
+    size = width * columns_of(basis)
     coefficients = _numbers(record, "coefficients", size)
     if covariance.shape != (size, size) or not np.all(np.isfinite(covariance)):
         raise ValueError(f"covariance of shape {covariance.shape}, {size} x {size} finite numbers are needed")
     if np.linalg.eigvalsh(covariance)[0] < -1e-9 * np.trace(covariance):
         raise ValueError("covariance is not positive semidefinite")
     return Effect(
-        mechanism, str(record["covariate"]), form, coefficients, covariance, _numbers(record, "outcome_scale", 3)
+        mechanism, str(record["covariate"]), basis, coefficients, covariance, _numbers(record, "outcome_scale", 3)
     )
 
 
-def _form(record: dict[str, Any]) -> DriverBasis:
+def _basis(record: dict[str, Any]) -> DriverBasis:
     name, drivers = record["name"], tuple(record["drivers"])
     if name not in BASES:
         raise ValueError(f"form {name!r}, known are {', '.join(BASES)}")

@@ -1,7 +1,7 @@
 """New windows against the training windows: what is there in the one and not in the other, on any recorded quantity.
 
 Rows of both tables are stacked; a column that lives on the new rows alone, beside the same column on all rows in the
-basis, has as its coefficient the new relation less that of the training windows.
+controls, has as its coefficient the new relation less that of the training windows.
 """
 
 from __future__ import annotations
@@ -24,20 +24,22 @@ GROSS = 5.0  # robust standard deviations; windows farther out are left aside
 TRIMMING_ROUNDS = 4
 FEWEST_PUSHES = 12  # of a table that is to be relied on
 MAD_TO_SD = 1.4826
-COLLINEAR = 1e-6  # share of a column's square that the basis leaves; below it the column cannot be told from the basis
+COLLINEAR = (
+    1e-6  # share of a column's square that the controls leaves; below it the column cannot be told from the controls
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class Contrast:
     """What may explain a quantity: columns (n, k, p), zero outside the new rows; shared (n, m) with training."""
 
     mechanism: str
     covariate: str
-    form: DriverBasis
+    basis: DriverBasis
     columns: Array
     shared: Array
 
-    def take(self, rows: BoolArray) -> Tried:
+    def take(self, rows: BoolArray) -> Contrast:
         """The given rows."""
         return replace(self, columns=self.columns[rows], shared=self.shared[rows])
 
@@ -71,7 +73,7 @@ def stacked(windows: PushTable, baseline: PushTable | None, needed: tuple[str, .
     return Stacked(tables, new, np.concatenate(blocks))
 
 
-def side_by_side(columns: list[Array]) -> Array:
+def block_diagonal(columns: list[Array]) -> Array:
     """Columns of each table (n_k, m), each on its own rows alone: (sum n_k, sum m)."""
     wide = np.zeros((sum(map(len, columns)), sum(c.shape[1] for c in columns)))
     row = column = 0
@@ -81,27 +83,29 @@ def side_by_side(columns: list[Array]) -> Array:
     return wide
 
 
-def inliers(z: Array, columns: Array, basis: Array) -> BoolArray:
-    """Rows (n,) of z (n, k) that lie within GROSS of their fit by the basis (n, m) and the columns (n, k, p)."""
+def inliers(z: Array, columns: Array, controls: Array) -> BoolArray:
+    """Rows (n,) of z (n, k) that lie within GROSS of their fit by the controls (n, m) and the columns (n, k, p)."""
     keep = np.ones(len(z), dtype=np.bool_)
     for _ in range(TRIMMING_ROUNDS):
         left = np.column_stack(
-            [_left(z[:, k], np.column_stack([basis, columns[:, k]]), keep) for k in range(z.shape[1])]
+            [_left(z[:, k], np.column_stack([controls, columns[:, k]]), keep) for k in range(z.shape[1])]
         )
         spread = MAD_TO_SD * np.median(np.abs(left[keep]), axis=0)
         keep = np.all(np.abs(left) <= GROSS * np.maximum(spread, np.finfo(float).tiny), axis=1)
     return keep
 
 
-def screened(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, seed: int = 0) -> Screened:
+def screen_contrasts(z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0) -> Screened:
     """Screen what is tried on z (n, k); each has taken out of it what it shares with the training windows."""
-    scores = [block_scores(z, each.columns, np.column_stack([basis, each.shared]), block) for each in tried]
+    scores = [block_scores(z, each.columns, np.column_stack([controls, each.shared]), block) for each in tried]
     return screen(scores, seed)
 
 
-def best_first(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, seed: int = 0) -> list[Tried]:
+def best_and_rivals(
+    z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0
+) -> list[Contrast]:
     """The one with the largest gain out of sample, then those that are not surely worse: 95 % of paired draws."""
-    gains = [_gains(z, each, basis, block) for each in tried]
+    gains = [_gains(z, each, controls, block) for each in tried]
     order = np.argsort([-float(gain.sum()) for gain in gains], kind="stable").tolist()
     best = gains[order[0]]
     weights = _weights(len(best), seed)
@@ -110,12 +114,12 @@ def best_first(z: Array, tried: Sequence[Tried], basis: Array, block: IntArray, 
     return [tried[k] for k in (order[0], *alike)]
 
 
-def estimated(
-    z: Array, columns: Array, basis: Array, shared: Array, block: IntArray, seed: int = 0
+def estimate_with_draws(
+    z: Array, columns: Array, controls: Array, shared: Array, block: IntArray, seed: int = 0
 ) -> tuple[Array, Array]:
     """Coefficients (p,) of columns (n, k, p) for z (n, k), and draws (DRAWS, p) of them: blocks drawn anew."""
-    without = Residualizer(np.column_stack([basis, shared]))
-    left, flat = without(z), without(columns)
+    residualizer = Residualizer(np.column_stack([controls, shared]))
+    left, flat = residualizer(z), residualizer(columns)
     p = flat.shape[2]
     square = sums_by(block, np.einsum("nkp,nkq->npq", flat, flat).reshape(len(z), -1)).reshape(-1, p, p)
     score = sums_by(block, np.einsum("nkp,nk->np", flat, left))
@@ -124,10 +128,10 @@ def estimated(
     return _solved(square.sum(axis=0)[None], score.sum(axis=0)[None])[0], draws
 
 
-def tells(each: Tried, basis: Array) -> bool:
-    """Whether every column of it holds something that the basis (n, m) and what is shared do not."""
-    without = Residualizer(np.column_stack([basis, each.shared]))
-    size, left = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, without(each.columns)))
+def is_identifiable(each: Contrast, controls: Array) -> bool:
+    """Whether every column of it holds something that the controls (n, m) and what is shared do not."""
+    residualizer = Residualizer(np.column_stack([controls, each.shared]))
+    size, left = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, residualizer(each.columns)))
     return bool(np.all(left > COLLINEAR * size) and np.all(size > 0.0))
 
 
@@ -136,10 +140,10 @@ def robust_deviation(values: Array) -> float:
     return float(MAD_TO_SD * np.median(np.abs(values - np.median(values))))
 
 
-def _gains(z: Array, each: Tried, basis: Array, block: IntArray) -> Array:
+def _gains(z: Array, each: Contrast, controls: Array, block: IntArray) -> Array:
     """Gain (b,) in nats of each block, fitted on the folds that it is not in."""
-    without = Residualizer(np.column_stack([basis, each.shared]))
-    left, flat = Residualizer(basis)(z), without(each.columns)
+    residualizer = Residualizer(np.column_stack([controls, each.shared]))
+    left, flat = Residualizer(controls)(z), residualizer(each.columns)
     gains = np.zeros((len(z), 1))
     for fold in range(FOLDS):
         test = block % FOLDS == fold

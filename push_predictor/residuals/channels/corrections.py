@@ -15,8 +15,6 @@ import numpy as np
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.recordings.streams import PoseStream, Recording
 
-NO_STREAMS = "a push table keeps no streams: the error can be told but not corrected, give the recording"
-
 
 def correct(recording: Recording, mechanism: str, values: Sequence[float]) -> Recording:
     """The recording without an error of measurement.

@@ -23,16 +23,16 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
+    Contrast,
     Stacked,
-    Tried,
-    best_first,
-    estimated,
+    best_and_rivals,
+    block_diagonal,
+    estimate_with_draws,
     inliers,
+    is_identifiable,
     robust_deviation,
-    screened,
-    side_by_side,
+    screen_contrasts,
     stacked,
-    tells,
 )
 from push_predictor.residuals.evidence.drivers import CONSTANT, SETTLED
 from push_predictor.residuals.evidence.residualizer import Residualizer
@@ -85,17 +85,17 @@ class MeasurementFinding:
 
 @dataclass(frozen=True, eq=False)
 class _Gap:
-    """The gap z (n, 1) m, its basis (n, m), blocks of pushes, what is tried, which rows are new."""
+    """The gap z (n, 1) m, its controls (n, m), blocks of pushes, what is tried, which rows are new."""
 
     z: Array
-    basis: Array
+    controls: Array
     block: IntArray
-    tried: tuple[Tried, ...]
+    tried: tuple[Contrast, ...]
     new: BoolArray
 
     def take(self, rows: BoolArray) -> _Gap:
         tried = tuple(each.take(rows) for each in self.tried)
-        return _Gap(self.z[rows], self.basis[rows], self.block[rows], tried, self.new[rows])
+        return _Gap(self.z[rows], self.controls[rows], self.block[rows], tried, self.new[rows])
 
 
 def measurement_errors(
@@ -110,9 +110,9 @@ def measurement_errors(
     base = None if baseline is None else _off_corners(baseline, rig.outline)
     both = stacked(_off_corners(windows, rig.outline), base, NEEDED)
     gap = _gap_of(both, rig.outline)
-    if len(gap.z) < FEWEST_ROWS * gap.basis.shape[1] or not gap.tried:
+    if len(gap.z) < FEWEST_ROWS * gap.controls.shape[1] or not gap.tried:
         return None
-    gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.basis))
+    gap = gap.take(inliers(gap.z, np.concatenate([each.columns for each in gap.tried], axis=2), gap.controls))
     return _searched(gap, alpha, seed, len(both.tables) > 1)
 
 
@@ -132,18 +132,18 @@ def gap_responses(table: PushTable, outline: Outline) -> dict[str, Array]:
 
 
 def _gap_of(both: Stacked, outline: Outline) -> _Gap:
-    basis = side_by_side([_geometry(table, outline) for table in both.tables])
+    controls = block_diagonal([_geometry(table, outline) for table in both.tables])
     responses = [gap_responses(table, outline) for table in both.tables]
     stack = {name: both.joined([r[name] for r in responses]) for name in PARAMETERS}
     if len(both.tables) > 1:
-        basis = np.column_stack([basis, *stack.values()])
+        controls = np.column_stack([controls, *stack.values()])
     nothing = np.zeros((len(both.new), 0))
     tried = [
-        Tried(name, CONSTANT, DriverBasis("constant"), (column * both.new[:, None])[:, None, :], nothing)
+        Contrast(name, CONSTANT, DriverBasis("constant"), (column * both.new[:, None])[:, None, :], nothing)
         for name, column in stack.items()
     ]
     z = both.joined([table.covariates["contact_gap"] for table in both.tables])[:, None]
-    return _Gap(z, basis, both.block, tuple(each for each in tried if tells(each, basis)), both.new)
+    return _Gap(z, controls, both.block, tuple(each for each in tried if is_identifiable(each, controls)), both.new)
 
 
 def _geometry(table: PushTable, outline: Outline) -> Array:
@@ -185,32 +185,32 @@ def _settled(table: PushTable) -> Array:
 class _Found:
     """What was found, its family-wise p, the names of what cannot be told from it."""
 
-    what: Tried
+    what: Contrast
     p_value: float
     rivals: tuple[str, ...]
 
 
 def _searched(gap: _Gap, alpha: float, seed: int, against_training: bool) -> MeasurementFinding:
     """Strongest first, each looked for in what those before it leave."""
-    basis, left = gap.basis, list(gap.tried)
+    controls, left = gap.controls, list(gap.tried)
     found: list[_Found] = []
     tested: tuple[Tested, ...] = ()
     while left:
-        p_values = screened(gap.z, left, basis, gap.block, seed).p_value.tolist()
+        p_values = screen_contrasts(gap.z, left, controls, gap.block, seed).p_value.tolist()
         tested = tested or tuple(Tested(t.mechanism, CONSTANT, p) for t, p in zip(left, p_values, strict=True))
         significant = {t.mechanism: p for t, p in zip(left, p_values, strict=True) if p <= alpha}
         if not significant:
             break
-        alike = best_first(gap.z, [t for t in left if t.mechanism in significant], basis, gap.block, seed)
+        alike = best_and_rivals(gap.z, [t for t in left if t.mechanism in significant], controls, gap.block, seed)
         best = alike[0]
         found.append(_Found(best, significant[best.mechanism], _names(alike)))
-        basis = np.column_stack([basis, best.columns[:, 0]])
-        left = [t for t in left if t is not best and tells(t, basis)]
+        controls = np.column_stack([controls, best.columns[:, 0]])
+        left = [t for t in left if t is not best and is_identifiable(t, controls)]
     errors, noise = _sized(gap, found, seed)
     return MeasurementFinding(errors, tested, noise, against_training)
 
 
-def _names(alike: Sequence[Tried]) -> tuple[str, ...]:
+def _names(alike: Sequence[Contrast]) -> tuple[str, ...]:
     names = [t.mechanism for t in alike]
     return tuple(name for each in names for name in (each, *ALIKE.get(each, ())) if name != names[0])
 
@@ -218,12 +218,12 @@ def _names(alike: Sequence[Tried]) -> tuple[str, ...]:
 def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementFault, ...], float]:
     """Estimates of all errors together; those that are lost in the noise of a single window are left out."""
     columns = [f.what.columns for f in found]
-    without = Residualizer(np.column_stack([gap.basis, *(c[:, 0] for c in columns)]))
-    noise = robust_deviation(without(gap.z)[:, 0])
+    residualizer = Residualizer(np.column_stack([gap.controls, *(c[:, 0] for c in columns)]))
+    noise = robust_deviation(residualizer(gap.z)[:, 0])
     if not found:
         return (), noise
     nothing = np.zeros((len(gap.z), 0))
-    values, draws = estimated(gap.z, np.concatenate(columns, axis=2), gap.basis, nothing, gap.block, seed)
+    values, draws = estimate_with_draws(gap.z, np.concatenate(columns, axis=2), gap.controls, nothing, gap.block, seed)
     errors, begin = [], 0
     for each in found:
         part = slice(begin, begin := begin + each.what.columns.shape[2])

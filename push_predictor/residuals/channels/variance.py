@@ -14,7 +14,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_forms
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -28,15 +28,15 @@ MATERIAL = 1.25  # ratio to training that counts: a base that saw few pushes is 
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class VarianceEffect:
     """A driver of the scatter. outputs: which vary with it; p_value: family-wise.
 
     ratio: deviation of the residuals where the driver makes it largest over that where it makes it smallest, by the
-    form fitted; for a constant, new data over training data.
+    basis fitted; for a constant, new data over training data.
     """
 
     covariate: str
-    form: DriverBasis
+    basis: DriverBasis
     outputs: tuple[str, ...]
     p_value: float
     ratio: float
@@ -49,15 +49,15 @@ class VarianceFinding:
     rivals: drivers that are as significant, but nothing of the first's trend is left for them.
     """
 
-    found: tuple[Scatter, ...]
-    tested: tuple[Scatter, ...]
+    found: tuple[VarianceEffect, ...]
+    tested: tuple[VarianceEffect, ...]
     rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
     covariate: str
-    form: DriverBasis
+    basis: DriverBasis
     output: str
     score: Scores
     ratio: float
@@ -87,9 +87,9 @@ def variance_effects(
     return replace(first, found=found, rivals=tuple(s.covariate for s in driven[1:] if s.covariate not in again))
 
 
-def _trend(evidence: Evidence, left: Array, scatter: Scatter) -> Array:
+def _trend(evidence: Evidence, left: Array, scatter: VarianceEffect) -> Array:
     """Relative deviation (n, 3) of the residuals as a driver has it, one in the outputs that it does not touch."""
-    values = scatter.form.values(evidence.table.covariates, len(left))
+    values = scatter.basis.values(evidence.table.covariates, len(left))
     on = np.array([name in scatter.outputs for name in OUTPUTS])
     size = _log_squares(left)[:, on].mean(axis=1)
     design = np.column_stack([np.ones(len(values)), values])
@@ -107,9 +107,9 @@ def _tested(
     names: Sequence[str] | None,
     baseline: Baseline | None,
 ) -> VarianceFinding:
-    basis = inputs_basis(model, evidence.table).columns
-    size = _log_squares(Residualizer(basis)(left))
-    trials = [t for name, form in _forms(evidence, names) for t in _along(evidence, size, basis, name, form)]
+    controls = inputs_basis(model, evidence.table).columns
+    size = _log_squares(Residualizer(controls)(left))
+    trials = [t for name, basis in _bases(evidence, names) for t in _along(evidence, size, controls, name, basis)]
     there = 0
     if baseline is not None:
         constant = _constant(model, evidence, left, baseline)
@@ -122,17 +122,17 @@ def _log_squares(residual: Array) -> Array:
     return np.asarray(np.log(residual**2 + TINY))
 
 
-def _forms(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, DriverBasis]]:
-    return [(name, form) for name, form in screening_forms(evidence.table, names) if name not in LOCAL]
+def _bases(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, DriverBasis]]:
+    return [(name, basis) for name, basis in screening_bases(evidence.table, names) if name not in LOCAL]
 
 
-def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: DriverBasis) -> list[_Trial]:
+def _along(evidence: Evidence, size: Array, controls: Array, name: str, basis: DriverBasis) -> list[_Trial]:
     """A driver against the scatter of each output, and against that of all."""
-    values = form.values(evidence.table.covariates, len(size))
+    values = basis.values(evidence.table.covariates, len(size))
     z, block = normal_scores(size), evidence.block
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
-    return [_Trial(name, form, output, block_scores(z, on[:, :, None] * values[:, None, :], basis, block),
+    return [_Trial(name, basis, output, block_scores(z, on[:, :, None] * values[:, None, :], controls, block),
                    float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum())))))
             for output, on in _outputs(len(values))]  # fmt: skip
 
@@ -140,15 +140,15 @@ def _along(evidence: Evidence, size: Array, basis: Array, name: str, form: Drive
 def _constant(model: PushModel, evidence: Evidence, left: Array, baseline: Baseline) -> list[_Trial]:
     """The scatter in the new data against that in training, at like inputs."""
     tables = (evidence.table, baseline.evidence.table)
-    basis = inputs_basis(model, _inputs_of(tables)).columns
+    controls = inputs_basis(model, _inputs_of(tables)).columns
     # As they are: what a base learnt wrongly adds to both alike, and taking it out would not take it out of both alike.
     parts = (_log_squares(left), _log_squares(baseline.evidence.z))
-    z, new = normal_scores(np.vstack(parts)), np.arange(len(basis)) < len(left)
+    z, new = normal_scores(np.vstack(parts)), np.arange(len(controls)) < len(left)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
-    for output, on in _outputs(len(basis)):
-        scores = block_scores(z, (on * new[:, None])[:, :, None], basis, block)
+    for output, on in _outputs(len(controls)):
+        scores = block_scores(z, (on * new[:, None])[:, :, None], controls, block)
         strength = float(np.prod(ratio ** (on[0] / on[0].sum())))
         trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
     return trials
@@ -176,18 +176,18 @@ def _padded(trial: _Trial, rows: int) -> _Trial:
 def _finding(trials: list[_Trial], alpha: float, seed: int) -> VarianceFinding:
     screened = screen([t.score for t in trials], seed)
     ranked = sorted(range(len(trials)), key=lambda k: -screened.statistic[k])
-    first: dict[str, Scatter] = {}
+    first: dict[str, VarianceEffect] = {}
     for k in ranked:
-        first.setdefault(trials[k].covariate, _scatter(trials, screened, k))
+        first.setdefault(trials[k].covariate, _effect(trials, screened, k))
     tested = tuple(first.values())
     return VarianceFinding(tuple(s for s in tested if s.p_value <= alpha and _counts(s)), tested)
 
 
-def _counts(scatter: Scatter) -> bool:
+def _counts(scatter: VarianceEffect) -> bool:
     return scatter.covariate != CONSTANT or abs(np.log(scatter.ratio)) > np.log(MATERIAL)
 
 
-def _scatter(trials: list[_Trial], screened: Screened, k: int) -> Scatter:
+def _effect(trials: list[_Trial], screened: Screened, k: int) -> VarianceEffect:
     trial = trials[k]
     outputs = OUTPUTS if trial.output == ALL else (trial.output,)
-    return Scatter(trial.covariate, trial.form, outputs, float(screened.p_value[k]), trial.ratio)
+    return VarianceEffect(trial.covariate, trial.basis, outputs, float(screened.p_value[k]), trial.ratio)

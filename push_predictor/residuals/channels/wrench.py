@@ -17,22 +17,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.contrast import (
+    Contrast,
     Stacked,
-    Tried,
-    best_first,
-    estimated,
+    best_and_rivals,
+    estimate_with_draws,
     inliers,
+    is_identifiable,
     robust_deviation,
-    screened,
+    screen_contrasts,
     stacked,
-    tells,
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
-from push_predictor.residuals.evidence.drivers import CONSTANT, HEADINGS, LOCAL, PLACE, screening_forms
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.types import Array, IntArray
@@ -40,7 +41,7 @@ from push_predictor.types import Array, IntArray
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
 LEAST_FORCE = 0.05  # of the median normal force; below it a window tells nothing
 MOST_TERMS = 3
-PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the basis: all windows of a push share a contact and an angle
+PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
 OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # tell nothing of the surface: inputs, or outcomes
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # differ on any table: news only against the training windows
@@ -49,13 +50,16 @@ SESSION = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_si
 
 @dataclass(frozen=True)
 class WrenchEffect:
-    """surface_friction: its driver and form, and the relative change of the force over the driver's range (5 to 95 % of
-    its windows; against the training windows where the driver is model_inputs). wrench_bias: the force (N, N) that the
-    sensor reads too much, in world axes. rivals: drivers that these data cannot tell from this one."""
+    """An effect on the force, with its family-wise p value; rivals: covariates that fit equally well.
+
+    surface_friction: the parameter is the relative change of the force from the 5th to the 95th percentile of the
+    covariate, or relative to training where it is constant. wrench_bias: the parameters are the bias (N, N) along the
+    world's axes.
+    """
 
     mechanism: str
     covariate: str
-    form: str
+    basis: str
     parameters: tuple[Sized, ...]
     p_value: float
     rivals: tuple[str, ...]
@@ -65,13 +69,13 @@ class WrenchEffect:
 class WrenchFinding:
     """effects: the strongest first, none where the force is as it was; tested: all that was tried.
 
-    against_training: whether the training windows' own relations were subtracted. scatter: robust standard deviation
+    against_training: whether the training windows' own relations were subtracted. noise: robust standard deviation
     of the logarithm of the force from window to window.
     """
 
     effects: tuple[WrenchEffect, ...]
     tested: tuple[Tested, ...]
-    scatter: float
+    noise: float
     against_training: bool
 
 
@@ -82,23 +86,23 @@ NOTHING = WrenchFinding((), (), float("nan"), False)
 class _Force:
     """z (n, 2): log load, direction less its prediction (rad), each in robust deviations (unit (2,)); see limit_load.
 
-    basis (n, m) of the model's inputs; level (n, 1) of the new windows, no column where they stand alone; block (n,)
+    controls (n, m) of the model's inputs; level (n, 1) of the new windows, no column where they stand alone; block (n,)
     of pushes; what is tried; the new windows.
     """
 
     z: Array
     unit: Array
-    basis: Array
+    controls: Array
     level: Array
     block: IntArray
-    tried: tuple[Tried, ...]
+    tried: tuple[Contrast, ...]
     table: PushTable
     against_training: bool
 
     @property
     def levelled(self) -> Array:
-        """The basis with the level."""
-        return np.column_stack([self.basis, self.level])
+        """The controls with the level."""
+        return np.column_stack([self.controls, self.level])
 
 
 def wrench_effects(
@@ -126,15 +130,15 @@ def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
     each = [loads(table, physics) for table in stack.tables]
     z = stack.joined([np.column_stack([load.size, load.direction - load.predicted]) for load in each])
     most = max(FEWEST_INPUTS, sum(len(table.pushes) for table in stack.tables) // PUSHES_PER_INPUT)
-    basis = stack.joined([inputs_of(table, physics, most) for table in stack.tables])
-    unit = np.maximum([robust_deviation(column) for column in Residualizer(basis)(z).T], 1e-12)
+    controls = stack.joined([inputs_of(table, physics, most) for table in stack.tables])
+    unit = np.maximum([robust_deviation(column) for column in Residualizer(controls)(z).T], 1e-12)
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
     tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))
-    rows = inliers(z / unit, np.zeros((len(z), 2, 0)), basis)
-    told = tuple(t.take(rows) for t in tried if tells(t, basis))
+    rows = inliers(z / unit, np.zeros((len(z), 2, 0)), controls)
+    told = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
     compared = len(stack.tables) > 1
     return _Force(
-        z[rows] / unit, unit, basis[rows], _level(stack)[rows], stack.block[rows], told, stack.tables[-1], compared
+        z[rows] / unit, unit, controls[rows], _level(stack)[rows], stack.block[rows], told, stack.tables[-1], compared
     )
 
 
@@ -149,29 +153,29 @@ def _drivers(stack: Stacked) -> list[tuple[str, DriverBasis]]:
     known = [name for name in COMPARED if all(name in t.covariates for t in before) and before]
     left_out = (*OWN, *(name for name in COMPARED if name not in known))
     kept = {name: column for name, column in table.covariates.items() if name not in left_out}
-    forms = screening_forms(replace(table, covariates=kept))
-    return [(CONSTANT, DriverBasis("constant")), *forms] if before else forms
+    bases = screening_bases(replace(table, covariates=kept))
+    return [(CONSTANT, DriverBasis("constant")), *bases] if before else bases
 
 
-def _of_friction(stack: Stacked, unit: Array, covariate: str, form: DriverBasis) -> Tried:
+def _of_friction(stack: Stacked, unit: Array, covariate: str, basis: DriverBasis) -> Contrast:
     """A change of the load, not of its direction, over the new windows; about their mean unless it is the level."""
     table = stack.tables[-1]
-    values = form.values(table.covariates, len(table))
+    values = basis.values(table.covariates, len(table))
     values = values if covariate == CONSTANT else values - values.mean(axis=0)
     columns = np.zeros((len(stack.new), 2, values.shape[1]))
     columns[stack.new, 0] = values / unit[0]
     shared = np.zeros((len(stack.new), 0)) if covariate == CONSTANT else _level(stack)
-    if covariate not in (*SESSION, CONSTANT) and all(d in t.covariates for t in stack.tables for d in form.drivers):
-        in_both = stack.joined([form.values(t.covariates, len(t)) for t in stack.tables])
+    if covariate not in (*SESSION, CONSTANT) and all(d in t.covariates for t in stack.tables for d in basis.drivers):
+        in_both = stack.joined([basis.values(t.covariates, len(t)) for t in stack.tables])
         shared = np.column_stack([shared, in_both]) if len(stack.tables) > 1 else shared
-    return Tried(SURFACE_FRICTION, covariate, form, columns, shared)
+    return Contrast(SURFACE_FRICTION, covariate, basis, columns, shared)
 
 
-def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Tried:
+def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Contrast:
     columns = bias / unit[:, None]
     in_both = columns.reshape(len(columns), -1) if len(stack.tables) > 1 else np.zeros((len(columns), 0))
     own = columns * stack.new[:, None, None]
-    return Tried(WRENCH_BIAS, CONSTANT, DriverBasis("constant"), own, np.column_stack([_level(stack), in_both]))
+    return Contrast(WRENCH_BIAS, CONSTANT, DriverBasis("constant"), own, np.column_stack([_level(stack), in_both]))
 
 
 def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
@@ -180,44 +184,44 @@ def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
     effects: list[WrenchEffect] = []
     tested: tuple[Tested, ...] = ()
     while left and len(effects) < MOST_TERMS:
-        p_values = screened(z, left, force.basis, force.block, seed).p_value.tolist()
+        p_values = screen_contrasts(z, left, force.controls, force.block, seed).p_value.tolist()
         tested = tested or tuple(Tested(t.mechanism, t.covariate, p) for t, p in zip(left, p_values, strict=True))
         significant = [t for t, p in zip(left, p_values, strict=True) if p <= alpha]
         driven = [t for t in significant if not _is_level(t)]
         if not (driven or (significant and not effects)):
             break
         best, alike = _chosen(force, z, driven or significant, seed)
-        values, draws = estimated(z, best.columns, force.basis, best.shared, force.block, seed)
+        values, draws = estimate_with_draws(z, best.columns, force.controls, best.shared, force.block, seed)
         p_value = p_values[next(k for k, t in enumerate(left) if t is best)]
         sized = _sized(force, best, values, draws)
         effects.append(
-            WrenchEffect(best.mechanism, best.covariate, best.form.name, sized, p_value, _names(best, alike))
+            WrenchEffect(best.mechanism, best.covariate, best.basis.name, sized, p_value, _names(best, alike))
         )
         z = z - best.columns @ values
         left = [t for t in left if t is not best]
-    scatter = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
-    return WrenchFinding(tuple(effects), tested, scatter, force.against_training)
+    noise = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
+    return WrenchFinding(tuple(effects), tested, noise, force.against_training)
 
 
-def _chosen(force: _Force, z: Array, significant: Sequence[Tried], seed: int) -> tuple[Tried, list[Tried]]:
-    """The best, in the simplest form of its driver that is not surely worse, and all that are not."""
-    basis = force.basis if _is_level(significant[0]) else force.levelled
-    alike = best_first(z, significant, basis, force.block, seed)
+def _chosen(force: _Force, z: Array, significant: Sequence[Contrast], seed: int) -> tuple[Contrast, list[Contrast]]:
+    """The best, in the simplest basis of its driver that is not surely worse, and all that are not."""
+    controls = force.controls if _is_level(significant[0]) else force.levelled
+    alike = best_and_rivals(z, significant, controls, force.block, seed)
     same = [t for t in alike if (t.mechanism, t.covariate) == (alike[0].mechanism, alike[0].covariate)]
     return min(same, key=lambda t: t.columns.shape[2]), alike
 
 
-def _is_level(tried: Tried) -> bool:
+def _is_level(tried: Contrast) -> bool:
     return tried.mechanism == SURFACE_FRICTION and tried.covariate == CONSTANT
 
 
-def _names(best: Tried, alike: Sequence[Tried]) -> tuple[str, ...]:
+def _names(best: Contrast, alike: Sequence[Contrast]) -> tuple[str, ...]:
     """Rivals by driver, or by mechanism where that differs."""
     names = [t.covariate if t.mechanism == SURFACE_FRICTION else WRENCH_BIAS for t in (best, *alike)]
     return tuple(name for name in dict.fromkeys(names[1:]) if name != names[0])
 
 
-def _sized(force: _Force, best: Tried, values: Array, draws: Array) -> tuple[Sized, ...]:
+def _sized(force: _Force, best: Contrast, values: Array, draws: Array) -> tuple[Sized, ...]:
     if best.mechanism == WRENCH_BIAS:
         low, high = np.quantile(draws, [0.025, 0.975], axis=0)
         names = ("force read too much along x", "force read too much along y")
@@ -230,12 +234,12 @@ def _sized(force: _Force, best: Tried, values: Array, draws: Array) -> tuple[Siz
     return (Sized(name, float(relative[0]), float(low), float(high), "1"),)
 
 
-def _over_range(force: _Force, best: Tried) -> Array:
-    """Rows (k, p) of the form over the new windows, in units of z: one difference if it is one column."""
+def _over_range(force: _Force, best: Contrast) -> Array:
+    """Rows (k, p) of the basis over the new windows, in units of z: one difference if it is one column."""
     if best.covariate == CONSTANT:
         return np.array([[1.0 / force.unit[0]]])
     table = force.table
-    values = best.form.values(table.covariates, len(table)) / force.unit[0]
+    values = best.basis.values(table.covariates, len(table)) / force.unit[0]
     if values.shape[1] > 1:
         return np.asarray(values)
     return np.asarray(np.subtract(*np.quantile(values, [0.95, 0.05], axis=0))[None])

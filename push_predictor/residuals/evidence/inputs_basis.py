@@ -1,4 +1,4 @@
-"""What a base model could have learnt in its own inputs: a rich basis of velocity, contact and angle."""
+"""A rich basis of velocity, contact and angle: what a base model could have learnt from its own inputs."""
 
 from __future__ import annotations
 
@@ -15,46 +15,50 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-Kind = Literal["driven", "speed", "constant"]  # of an effect: by something beside the inputs, by the speed, by nothing
+Kind = Literal["driven", "speed", "constant"]  # an effect depends on another covariate, on the speed, or on neither
 
 DEGREES = (5, 4, 3, 2, 1)
 PUSHES_PER_COLUMN = 5
-VARIES = 0.01  # of the logarithm of velocity; below it there is one speed
+VARIES = 0.01  # standard deviation of log velocity; below it the table has one speed
 
 
 @dataclass(frozen=True, eq=False)
 class InputsBasis:
     """The basis at n windows, the constant included.
 
-    columns (n, m): contact, angle and speed; still (n, k): contact and angle alone. learnt: the base was fitted in its
-    inputs. folds: it takes sides of the outline for one. knows_speed: it has seen different speeds.
+    columns (n, m): contact, angle and speed. without_speed (n, k): contact and angle alone. learnt: the base model was
+    fitted to its inputs. folds: it folds the outline's sides onto one. knows_speed: it was trained at several speeds.
     """
 
     columns: Array
-    still: Array
+    without_speed: Array
     learnt: bool = True
     folds: bool = False
     knows_speed: bool = False
 
 
 def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
-    """The basis of a table's inputs, as rich as its number of pushes allows; sides that a symmetry folds are one."""
+    """The basis of a table's inputs, of the highest degree that its number of pushes supports."""
     base, outline = model.base, model.rig.outline
     most = len(table.pushes) // PUSHES_PER_COLUMN
     bases = (_of_degree(outline, table.inputs, degree) for degree in DEGREES)
-    columns, still = next((b for b in bases if b[0].shape[1] <= most), _of_degree(outline, table.inputs, 1))
+    columns, without_speed = next((b for b in bases if b[0].shape[1] <= most), _of_degree(outline, table.inputs, 1))
     learnt = not isinstance(base.predictor, AnalyticalPredictor)
     speed = _log_speed(base.training.inputs)
     return InputsBasis(
-        columns, still, learnt, learnt and outline.rotational_symmetry != 1, learnt and float(speed.std()) > VARIES
+        columns,
+        without_speed,
+        learnt,
+        learnt and outline.rotational_symmetry != 1,
+        learnt and float(speed.std()) > VARIES,
     )
 
 
-def inputs_of(kind: Kind, basis: InputsBasis) -> Array:
-    """What of the inputs (n, m) is taken out of a candidate and the residual: nothing, where it lies in them itself."""
+def controls_for(kind: Kind, inputs: InputsBasis) -> Array:
+    """Controls (n, m) for a kind of effect: none for an effect that is itself a function of the inputs."""
     if kind == "constant":
-        return basis.columns[:, :0]
-    return basis.still if kind == "speed" else basis.columns
+        return inputs.columns[:, :0]
+    return inputs.without_speed if kind == "speed" else inputs.columns
 
 
 def _of_degree(outline: Outline, inputs: Array, degree: int) -> tuple[Array, Array]:
@@ -62,17 +66,17 @@ def _of_degree(outline: Outline, inputs: Array, degree: int) -> tuple[Array, Arr
     place, kinds = _place(outline, features[:, :-1])
     angle = features[:, -1]
     smooth = np.column_stack([_powers(place, angle, degree)])
-    still = np.column_stack([smooth * (kinds == kind)[:, None] for kind in np.unique(kinds)])
+    without_speed = np.column_stack([smooth * (kinds == kind)[:, None] for kind in np.unique(kinds)])
     speed = _log_speed(inputs)
     if speed.std() <= VARIES:
-        return still, still
+        return without_speed, without_speed
     speed = (speed - speed.mean()) / speed.std()
-    moving = np.column_stack([_powers(place, angle, max(degree - 2, 1)) * speed[:, None], speed**2])
-    return np.column_stack([still, moving]), still
+    with_speed = np.column_stack([_powers(place, angle, max(degree - 2, 1)) * speed[:, None], speed**2])
+    return np.column_stack([without_speed, with_speed]), without_speed
 
 
 def _place(outline: Outline, contact: Array) -> tuple[Array, Array]:
-    """Smooth coordinates (n, k) of the contact, and the number (n,) of the kind of side that it lies on."""
+    """Smooth coordinates (n, k) of the contact, and the number (n,) of its kind of side."""
     n = len(contact)
     if outline.semi_axes is not None or not contact.shape[1]:
         return contact, np.zeros(n)

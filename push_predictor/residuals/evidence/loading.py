@@ -1,4 +1,4 @@
-"""Data to judge a model on: recordings and push tables alike, with every covariate that could drive an effect."""
+"""Load recordings and push tables to judge a model on, with every covariate that an effect may depend on."""
 
 from __future__ import annotations
 
@@ -21,26 +21,28 @@ from push_predictor.recordings.windows.track import NANOSECOND
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 
-RUNNING_ON = ("elapsed_time", "push_index", "slid_distance")  # count over all recordings, not from each one's start
+CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # continue from one recording to the next
 
 
 @dataclass(frozen=True, eq=False)
-class Loaded:
-    """The windows in order of time; the recordings they were cut from (None where a table was given); the rig.
+class LoadedData:
+    """Windows in order of time, the recordings they were cut from, and the rig.
 
-    left_out: covariates that some rows lack, each with how many of how many rows.
+    recordings: None where a push table was given. dropped: covariates that some rows lack, each with the reason.
     """
 
     table: PushTable
     recordings: tuple[Recording, ...] | None
     rig: Rig
-    left_out: dict[str, str] = field(default_factory=dict)
+    dropped: dict[str, str] = field(default_factory=dict)
 
 
-def load_evidence(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> Loaded:
-    """Load recordings and push tables. rig takes the place of what they say.
+def load_evidence(
+    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()
+) -> LoadedData:
+    """Load recordings and push tables; rig overrides theirs.
 
-    Raises RecordingError (also if there is no window in any of them), TableError or RigError.
+    Raises RecordingError (also if no file contains a window), TableError or RigError.
     """
     rig = rig or load_rig_for(paths)
     bags = [path for path in paths if is_recording(Path(path))]
@@ -50,27 +52,26 @@ def load_evidence(paths: Sequence[Path], rig: Rig | None = None, options: Window
     if not any(map(len, tables)):
         raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
     names = [*(recording.name for recording in recordings), *(path.name for path in files)]
-    table, left_out = _joined(distinct_pushes(names, tables))
-    return Loaded(table, None if files else tuple(recordings), rig, left_out)
+    table, dropped = _joined(distinct_pushes(names, tables))
+    return LoadedData(table, None if files else tuple(recordings), rig, dropped)
 
 
-def cut_anew(recordings: Sequence[Recording], rig: Rig, options: WindowOptions = WindowOptions()) -> PushTable:
-    """The table of recordings in order of time, for one who has corrected their streams or the rig."""
+def cut_again(recordings: Sequence[Recording], rig: Rig, options: WindowOptions = WindowOptions()) -> PushTable:
+    """Cut the windows of recordings, in order of time, after a correction of their streams or the rig."""
     tables = _cut(recordings, rig, options)
     return _joined(distinct_pushes([recording.name for recording in recordings], tables))[0]
 
 
 def with_inputs(table: PushTable) -> PushTable:
-    """The table with the model's inputs among the covariates: they can drive what the model has constant."""
+    """The table with the model's inputs among its covariates: an effect may depend on them too."""
     inputs = dict(zip(INPUTS, table.inputs.T, strict=True))
     return replace(table, covariates={**table.covariates, **inputs})
 
 
 def previous_residual(table: PushTable, z: Array) -> Array:
-    """The covariate previous_residual (n,), from residuals z (n, 3) in units of the prediction.
+    """The covariate previous_residual (n,), from standardised residuals z (n, 3).
 
-    It is the mean of z over all windows of the push before and over the three outputs, with its sign; zero for the
-    first push of each recording.
+    It is the signed mean of z over the windows and outputs of the previous push; zero for a recording's first push.
     """
     push = push_order(table)
     mean = np.bincount(push, z.mean(axis=1)) / np.bincount(push)
@@ -87,11 +88,11 @@ def _first_stamp(recording: Recording) -> int:
 
 def _cut(recordings: Sequence[Recording], rig: Rig, options: WindowOptions) -> list[PushTable]:
     windows = [find_windows(recording, rig, options) for recording in recordings]
-    return [with_inputs(windows_to_table(found)) for found in _running_on(windows)]
+    return [with_inputs(windows_to_table(found)) for found in _continued(windows)]
 
 
-def _running_on(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
-    """Windows whose time, index and way go on from one recording to the next, by the clock of their stamps."""
+def _continued(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWindow]]:
+    """Windows whose time, push count and distance continue from one recording to the next, by their stamps."""
     begin: int | None = None
     pushes, slid = 0.0, 0.0
     moved: list[list[PushWindow]] = []
@@ -110,7 +111,7 @@ def _running_on(recordings: Sequence[Sequence[PushWindow]]) -> list[list[PushWin
 
 
 def _later(window: PushWindow, added: Array) -> PushWindow:
-    later = {name: window.covariates[name] + float(more) for name, more in zip(RUNNING_ON, added, strict=True)}
+    later = {name: window.covariates[name] + float(more) for name, more in zip(CUMULATIVE, added, strict=True)}
     return replace(window, covariates={**window.covariates, **later})
 
 
@@ -121,25 +122,25 @@ def _read(path: Path, rig: Rig) -> PushTable:
 
 
 def _joined(tables: Sequence[PushTable]) -> tuple[PushTable, dict[str, str]]:
-    """One table of all, with the number of each row's recording, and the covariates that some rows lack."""
+    """One table with the number of each row's recording, and the covariates that some rows lack."""
     full = [(number, table) for number, table in enumerate(tables) if len(table)]
     numbered = [_numbered(number, table) for number, table in full]
     table = _indexed(concatenate(numbered))
-    left_out = {}
+    dropped = {}
     names = dict.fromkeys(name for part in numbered for name in part.covariates if name != "push_index")
     for name in names:
         having = sum(int(np.isfinite(part.covariates[name]).sum()) for part in numbered if name in part.covariates)
         if having < len(table):
-            left_out[name] = f"{len(table) - having} of {len(table)} windows lack it"
-    kept = {name: column for name, column in table.covariates.items() if name not in left_out}
-    return replace(table, covariates=kept), left_out
+            dropped[name] = f"{len(table) - having} of {len(table)} windows lack it"
+    kept = {name: column for name, column in table.covariates.items() if name not in dropped}
+    return replace(table, covariates=kept), dropped
 
 
 def _indexed(table: PushTable) -> PushTable:
-    """The table with its pushes counted in the order of its rows, where they were not counted when recorded."""
+    """The table with a push index; counted in the order of the rows where none was recorded."""
     return replace(table, covariates={"push_index": push_order(table).astype(np.float64), **table.covariates})
 
 
 def _numbered(number: int, table: PushTable) -> PushTable:
-    """The table with its number, unless it says itself from which recordings its rows come."""
+    """The table with the number of its recording, unless it has that column."""
     return replace(table, covariates={"recording": np.full(len(table), float(number)), **table.covariates})

@@ -1,4 +1,4 @@
-"""Regress a basis out of residuals and candidates alike (Frisch and Waugh 1933)."""
+"""Regress control variables out of residuals and candidates alike (Frisch and Waugh 1933)."""
 
 from __future__ import annotations
 
@@ -8,51 +8,50 @@ import numpy as np
 
 from push_predictor.types import Array, IntArray
 
-SINGULAR = 0.01  # a block that alone fixes a direction of the inputs is enlarged no more than so
+SINGULAR = 0.01  # bounds the adjustment of a block that alone determines a direction of the controls
 
 
 class Residualizer:
-    """Takes a basis (n, m) out of values, by least squares."""
+    """Least-squares projection off control variables (n, m)."""
 
-    def __init__(self, basis: Array) -> None:
-        left, values, _ = np.linalg.svd(basis, full_matrices=False)
-        self.q: Array = left[:, values > 1e-9 * max(values[0], np.finfo(float).tiny)] if basis.shape[1] else basis
+    def __init__(self, controls: Array) -> None:
+        left, values, _ = np.linalg.svd(controls, full_matrices=False)
+        self.q: Array = left[:, values > 1e-9 * max(values[0], np.finfo(float).tiny)] if controls.shape[1] else controls
 
     def __call__(self, values: Array) -> Array:
-        """Values (n, ...) less their fit."""
+        """Values (n, ...) minus their fit by the controls."""
         flat = values.reshape(len(values), -1)
         return np.asarray(flat - self.q @ (self.q.T @ flat)).reshape(values.shape)
 
-    def left(self, z: Array, block: IntArray) -> ResidualBlocks:
-        """Residuals z (n, 3) without the basis."""
-        left = self(z)
-        enlarged = left.copy()
+    def blocks(self, z: Array, block: IntArray) -> ResidualBlocks:
+        """Residuals z (n, 3) minus their fit, with the small-sample adjustment of every block (n,)."""
+        residual = self(z)
+        adjusted = residual.copy()
         if self.q.shape[1]:
             for rows in _rows_of(block):
                 values, vectors = np.linalg.eigh(np.eye(len(rows)) - self.q[rows] @ self.q[rows].T)
-                enlarged[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ left[rows])
-        return ResidualBlocks(left, enlarged, block)
-
-
-def _rows_of(block: IntArray) -> list[IntArray]:
-    order = np.argsort(block, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(block[order])) + 1)
+                adjusted[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ residual[rows])
+        return ResidualBlocks(residual, adjusted, block)
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualBlocks:
-    """Residuals without the inputs: left (n, 3), and as large as before a fit made them smaller, enlarged (n, 3)."""
+    """Residuals (n, 3) after regression, and the same adjusted for the regression's degrees of freedom.
 
-    left: Array
-    enlarged: Array
+    A fit shrinks residuals, and chance would look rarer than it is. The adjustment multiplies a block's rows by
+    (1 - H)^-1/2, H the hat matrix (Bell and McCaffrey 2002). block (n,): block of pushes of every row.
+    """
+
+    residual: Array
+    adjusted: Array
     block: IntArray
 
-    def apart(self, beside: Array | None) -> ResidualBlocks:
-        """Less what orthonormal columns (3 n, q) explain of them, all outputs together."""
-        if beside is None:
+    def orthogonal_to(self, columns: Array | None) -> ResidualBlocks:
+        """Project off orthonormal columns (3 n, q), all outputs together."""
+        if columns is None:
             return self
-        parts = [flat - beside @ (beside.T @ flat) for flat in (self.left.ravel(), self.enlarged.ravel())]
-        return ResidualBlocks(parts[0].reshape(self.left.shape), parts[1].reshape(self.left.shape), self.block)
+        parts = [flat - columns @ (columns.T @ flat) for flat in (self.residual.ravel(), self.adjusted.ravel())]
+        return ResidualBlocks(parts[0].reshape(self.residual.shape), parts[1].reshape(self.residual.shape), self.block)
 
 
 def sums_by(block: IntArray, values: Array) -> Array:
@@ -61,3 +60,8 @@ def sums_by(block: IntArray, values: Array) -> Array:
     sums = np.zeros((len(numbers), values.shape[1]))
     np.add.at(sums, index, values)
     return sums
+
+
+def _rows_of(block: IntArray) -> list[IntArray]:
+    order = np.argsort(block, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(block[order])) + 1)

@@ -1,4 +1,4 @@
-"""Pushes for the analysis, and pushes held out from it: whole blocks in turn, looked at once, at the end."""
+"""The split into analysis pushes and held-out pushes, which are opened once, at the end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RULE = f"every third block of up to {BLOCK} successive pushes is held out"
 
 
 def held_out_rows(table: PushTable) -> BoolArray:
-    """Mask (n,) of the rows of held-out pushes: interleaved, so that both parts span the whole time."""
+    """Mask (n,) of the rows of held-out pushes: interleaved blocks, so that both parts span the whole session."""
     order = push_order(table)
     count = int(order.max()) + 1 if len(order) else 0
     block = max(1, min(BLOCK, count // FEWEST_BLOCKS))
@@ -25,7 +25,7 @@ def held_out_rows(table: PushTable) -> BoolArray:
 
 
 def digest_of(table: PushTable) -> str:
-    """The sha256 of a table's inputs and outcomes."""
+    """SHA-256 of a table's inputs, durations and outcomes, in hexadecimal."""
     digest = hashlib.sha256()
     for column in (table.inputs, table.duration, table.outcomes):
         digest.update(np.ascontiguousarray(column).tobytes())

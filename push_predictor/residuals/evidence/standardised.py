@@ -1,4 +1,4 @@
-"""What a deployed model leaves over: residuals in units of its own prediction, push by push."""
+"""Standardised residuals: what a deployed model fails to explain, in units of its own predicted deviation."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
-BLOCK = 4  # pushes that may share what no covariate tells
-FEWEST_BLOCKS = 100  # below that blocks are smaller: few blocks hide an effect behind its own scatter
+BLOCK = 4  # neighbouring pushes may share disturbances that no covariate records
+FEWEST_BLOCKS = 100  # with fewer, blocks are smaller: a bootstrap over few blocks has little power
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """n windows with covariates; residual (n, 3) in SI; whitener (n, 3, 3): L^-1 with L L' the predicted covariance.
+    """n windows with covariates and their residuals under one model.
 
-    physics: the analytical model of the slider, from which responses are computed.
+    residual (n, 3): m, m, rad. whitener (n, 3, 3): L^-1, L L' the predicted covariance. physics: the analytical model
+    of the slider, from which mechanisms' responses are computed.
     """
 
     table: PushTable
@@ -33,17 +34,17 @@ class Evidence:
 
     @property
     def z(self) -> Array:
-        """Residuals (n, 3) in units of the prediction."""
-        return np.einsum("nij,nj->ni", self.whitener, self.residual)
+        """Standardised residuals (n, 3)."""
+        return np.asarray(np.einsum("nij,nj->ni", self.whitener, self.residual))
 
     @property
     def push(self) -> Push:
-        """The windows as mechanisms take them."""
+        """The windows as the mechanisms' input."""
         return Push(self.table.inputs, self.table.duration, self.table.covariates)
 
     @cached_property
     def block(self) -> IntArray:
-        """Number (n,) of the block of neighbouring pushes that each window belongs to."""
+        """Block number (n,): neighbouring pushes share one; see blocks_of."""
         return blocks_of(self.table)
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
@@ -51,15 +52,16 @@ class Evidence:
         return Evidence(self.table.take(rows), self.residual[rows], self.whitener[rows], self.physics)
 
 
-def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush) -> Evidence:
+def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | None = None) -> Evidence:
     """Residuals of a table under a model that was not trained on it.
 
-    The outputs of a learnt model are judged one by one. Where its correlation leaves little scatter, small parts of the
-    residual weigh most: in the recording of the demo the second order of an effect was found before the effect.
+    physics: the analytical model of the slider, physics_of(model) if None. A learnt model's outputs are standardised
+    one by one. A strong correlation of the outputs would give the largest weight to small parts of the residual: in one
+    recording, the second order of an effect was found before the effect itself.
     """
     predictor = with_independent_outputs(model.predictor)
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
-    return Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
+    return Evidence(table, table.outcomes - mean, whitener_of(covariance), physics or physics_of(model))
 
 
 def physics_of(model: PushModel) -> AnalyticalPush:
@@ -76,7 +78,7 @@ def push_order(table: PushTable) -> IntArray:
 
 
 def blocks_of(table: PushTable) -> IntArray:
-    """Block number (n,): neighbouring pushes together, single pushes where there are few."""
+    """Block number (n,): up to BLOCK neighbouring pushes share one; single pushes where there are few."""
     order = push_order(table)
     count = int(order.max()) + 1 if len(order) else 0
     return order // max(1, min(BLOCK, count // FEWEST_BLOCKS))
@@ -88,17 +90,17 @@ def whitener_of(covariance: Array) -> Array:
 
 
 def whitened_response(evidence: Evidence, mechanism: str | None) -> Array:
-    """Outcome per unit of a mechanism's parameters (n, 3, p), in units of the predicted deviation."""
+    """Standardised outcome per unit of a mechanism's parameters (n, 3, p); None is the generic polynomial."""
     physics, push = evidence.physics, evidence.push
     response = (
         generic_responses(physics, push, evidence_scale(evidence))
         if mechanism is None
         else mechanism_named(mechanism).response(physics, push)
     )
-    return np.einsum("nij,njp->nip", evidence.whitener, response)
+    return np.asarray(np.einsum("nij,njp->nip", evidence.whitener, response))
 
 
 def evidence_scale(evidence: Evidence) -> Array:
-    """Unit of the generic responses (3,): deviation of the residuals per metre of the tip's way."""
-    way = evidence.table.inputs[:, 0] * evidence.table.duration
-    return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(way**2)))
+    """Unit of the generic responses (3,): root mean square residual per metre that the tip travels."""
+    travel = evidence.table.inputs[:, 0] * evidence.table.duration
+    return np.asarray(np.sqrt(np.mean(evidence.residual**2, axis=0)) / np.sqrt(np.mean(travel**2)))

@@ -1,4 +1,4 @@
-"""How large an effect is, in the physical unit of its mechanism."""
+"""The size of an effect in the physical unit of its mechanism."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
-ENDS = (0.05, 0.95)  # of the driver's windows: the range over which a change is told
+ENDS = (0.05, 0.95)  # quantiles of the covariate between which a change is reported
 DRAWS = 2000
 
 
 def size_of(effect: Effect, table: PushTable) -> Sized | None:
-    """The mechanism's parameter, or its change along the driver, with a 95 % interval; None for the generic effect.
+    """The mechanism's parameter, or its change along the covariate, with a 95 % interval; None if it is unknown.
 
-    Of a constant: the parameter itself. Of a form of one driver: its change from the 5th to the 95th percentile of the
-    driver's windows. Of forms that turn (headings, categories, maps): the largest difference over the windows. A
-    mechanism of two parameters is told by the length of its vector.
+    Constant: the parameter itself. One covariate: the change from its 5th to its 95th percentile. Headings, categories
+    and maps: the largest difference over the windows. The size of several parameters is the length of their vector.
     """
     if effect.mechanism is None:
         return None
@@ -29,19 +28,24 @@ def size_of(effect: Effect, table: PushTable) -> Sized | None:
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, size=DRAWS, method="svd")
     lengths = np.array([_length(row, change, len(parameters)) for row in drawn])
     low, high = np.quantile(lengths, [0.025, 0.975])
-    name = parameters[0].name if len(parameters) == 1 else f"{effect.mechanism.replace('_', ' ')}, length of its vector"
-    told = name if effect.form.name == "constant" else f"{name}, change over {effect.covariate}"
-    return Sized(told, float(estimate), float(low), float(high), parameters[0].unit)
+    return Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
+
+
+def _name(effect: Effect) -> str:
+    parameters = mechanism_named(str(effect.mechanism)).parameters
+    many = f"{str(effect.mechanism).replace('_', ' ')}, length of its vector"
+    name = parameters[0].name if len(parameters) == 1 else many
+    return name if effect.basis.name == "constant" else f"{name}, change over {effect.covariate}"
 
 
 def _change(effect: Effect, table: PushTable) -> Array:
-    """Difference (m,) of the form's columns between the two ends at which they are compared."""
-    form = effect.form
-    values = form.values(table.covariates, len(table))
-    if form.name == "constant":
+    """Difference (m,) of the basis between the two ends that are compared."""
+    basis = effect.basis
+    values = basis.values(table.covariates, len(table))
+    if basis.name == "constant":
         return np.ones(1)
-    if form.name in ("linear", "logarithmic", "quadratic", "step"):
-        driver = np.asarray(table.covariates[form.drivers[0]])
+    if basis.name in ("linear", "logarithmic", "quadratic", "step"):
+        driver = np.asarray(table.covariates[basis.drivers[0]])
         low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
         return np.asarray(values[high] - values[low])
     strength = values @ effect.coefficients.reshape(-1, values.shape[1])[0]
@@ -49,6 +53,6 @@ def _change(effect: Effect, table: PushTable) -> Array:
 
 
 def _length(coefficients: Array, change: Array, count: int) -> float:
-    """Change of the one parameter with its sign, or the length of that of several."""
+    """Change of one parameter with its sign, or the length of the change of several."""
     changes = coefficients.reshape(count, -1) @ change
     return float(changes[0]) if count == 1 else float(np.linalg.norm(changes))

@@ -1,51 +1,73 @@
-"""What a reader of a trace must know beside its verdict, in sentences."""
+"""Notes of a trace: what a reader must know in addition to the verdict, in sentences."""
 
 from __future__ import annotations
 
 from push_predictor.residuals.channels.measurement import MeasurementFinding
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.wrench import WrenchFinding
-from push_predictor.residuals.evidence.loading import Loaded
+from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
+from push_predictor.residuals.reporting.phrases import (
+    capitalised,
+    covariate_phrase,
+    effect_phrase,
+    listed,
+    mechanism_phrase,
+)
 
 CUT_AGAIN = (
-    "The streams were put right and the windows cut again: `after` is the deployed model, unchanged, on the "
-    "held-out pushes of the corrected recordings."
+    "The streams were corrected and the windows cut again. The figures after correction are of the deployed model, "
+    "unchanged, on the held-out pushes of the corrected recordings."
 )
+NO_STREAMS = "A push table contains no streams, so the error is reported but not corrected. Give the recording."
+NOT_JUDGED = "The measurement itself could not be judged: these windows contain no contact gap or no pose."
 
 
 def notes_of(
-    loaded: Loaded, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
+    loaded: LoadedData, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
 ) -> tuple[str, ...]:
-    """Notes on the data, and on what was found or not tried beside the verdict."""
-    notes = [*notes_of_data(loaded)]
+    """Notes on the data, and on what was found or not tried in addition to the verdict."""
+    return (*notes_of_data(loaded), *_of_motion(motion), *_of_other_channels(motion, measured, forces))
+
+
+def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
+    """How the pushes were split, and which covariates were dropped."""
+    dropped = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in loaded.dropped.items())
+    return (f"Split: {RULE}. Windows of one push stay together.", *dropped)
+
+
+def _of_motion(motion: MotionFinding) -> list[str]:
+    notes = []
     if motion.deviation is not None:
-        told = ", ".join(f"{value:.2f}" for value in motion.deviation)
-        notes.append(f"Standardised residuals of training pushes, by models that had not seen them: deviation {told}.")
-    if any(term.own for term in motion.terms):
-        what = ", ".join(f"{t.mechanism or 'the unknown one'} by {t.covariate}" for t in motion.terms if t.own)
-        notes.append(f"In the model's own inputs, so that a model trained anew on such pushes has it: {what}.")
-    if motion.entangled:
+        values = ", ".join(f"{value:.2f}" for value in motion.deviation)
         notes.append(
-            f"Not tried, because in these pushes they go with contact, angle and speed: {', '.join(motion.entangled)}. "
-            "Push in an order that is mixed."
+            f"On held-out training pushes the standardised residuals of dx, dy and dtheta have standard deviations "
+            f"{values}; a calibrated model has 1."
         )
-    if motion.standing:
+    if own := [effect_phrase(*term.best.label) for term in motion.terms if term.own]:
+        notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
+    if motion.confounded:
+        names = listed([covariate_phrase(name) for name in motion.confounded])
         notes.append(
-            f"The model lacks, but lacked in training as much, so that it is nothing new: {', '.join(motion.standing)}."
+            f"Not tried: {names}. In these pushes contact point, push angle and speed predict them. "
+            f"Randomise the order of the pushes."
         )
+    if motion.unchanged:
+        effects = listed([effect_phrase(*label) for label in motion.unchanged])
+        notes.append(f"Not new, because training shows as much of it: {effects}.")
+    return notes
+
+
+def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding) -> list[str]:
+    notes = []
     if measured is not None and measured.errors:
-        what = ", ".join(error.mechanism for error in measured.errors)
-        notes.append(f"The gap between tip and slider looks like {what}; but that put right, the model is as far off.")
+        errors = listed([mechanism_phrase(error.mechanism) for error in measured.errors])
+        notes.append(
+            f"The gap between pusher and slider suggests {errors}. Correcting that does not improve the predictions."
+        )
     if measured is None:
-        notes.append("The measurement itself could not be judged: these windows have no contact gap or pose.")
+        notes.append(NOT_JUDGED)
     if motion.terms and forces.effects:
-        what = ", ".join(f"{e.mechanism} by {e.covariate}" for e in forces.effects)
-        notes.append(f"On the force's channel, beside: {what}.")
-    return tuple(notes)
-
-
-def notes_of_data(loaded: Loaded) -> tuple[str, ...]:
-    """How the pushes were split, and what of the data was left out."""
-    left_out = (f"{name} was left out: {why}." for name, why in loaded.left_out.items())
-    return (f"Split: {RULE}. Windows of one push stay together.", *left_out)
+        effects = listed([effect_phrase(e.mechanism, e.covariate) for e in forces.effects])
+        notes.append(f"The force changed as well: {effects}.")
+    return notes

@@ -121,7 +121,7 @@ def _effect_row(effect: FoundEffect, scatter: bool) -> list[str]:
     return [
         "scatter" if scatter else mechanism_words(effect.mechanism),
         effect.covariate,
-        effect.form,
+        effect.basis,
         html.NOTHING if size is None else size.name,
         html.NOTHING if size is None else _interval_cell(Gain(*_scaled(size))),
         html.NOTHING if size is None else SHOWN.get(size.unit, (1.0, size.unit))[1],

@@ -1,4 +1,4 @@
-"""A trace as the JSON of the contract's section 5."""
+"""The JSON of a trace, as docs/reference describes it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from push_predictor.residuals.outcome import CHANNELS, FoundEffect, Gain, Trace
 
 
 def trace_json(trace: Trace) -> dict[str, Any]:
-    """The JSON; NaN does not occur, what is not known is null."""
+    """The JSON of a trace; unknown numbers are null, never NaN."""
     held_out = trace.held_out
     return {
         "verdict": trace.verdict,
@@ -26,7 +26,7 @@ def trace_json(trace: Trace) -> dict[str, Any]:
         "after": metrics_json(held_out.after),
         "gain": {"nmse": _gain(trace.gain_nmse), "nlpd": _gain(trace.gain_nlpd)},
         "minimum_detectable": {name: dict(size) for name, size in trace.minimum_detectable.items()},
-        "remaining": {"effect_present": trace.remaining is not None, "strongest": trace.remaining},
+        "remaining": {"effect_present": trace.remaining is not None, "strongest": _strongest(trace)},
         "experiment": [dict(push) for push in trace.experiment],
         "tested": [vars(tested) for tested in trace.tested],
         "pushes": {"analysis": len(trace.analysis.pushes), "held_out": len(held_out.table.pushes)},
@@ -39,8 +39,22 @@ def trace_json(trace: Trace) -> dict[str, Any]:
 
 
 def _effect(effect: FoundEffect) -> dict[str, Any]:
-    parameter = None if effect.parameter is None else vars(effect.parameter)
-    return {**vars(effect), "outputs": list(effect.outputs), "parameter": parameter}
+    return {
+        "mechanism": effect.mechanism,
+        "covariate": effect.covariate,
+        "outputs": list(effect.outputs),
+        "form": effect.basis,
+        "parameter": None if effect.parameter is None else vars(effect.parameter),
+        "p_value": effect.p_value,
+        "share_of_residual": effect.share_of_residual,
+    }
+
+
+def _strongest(trace: Trace) -> str | None:
+    if trace.remaining is None:
+        return None
+    mechanism, covariate = trace.remaining
+    return f"{mechanism or 'unknown mechanism'} driven by {covariate}"
 
 
 def _gain(gain: Gain) -> dict[str, float | None]:

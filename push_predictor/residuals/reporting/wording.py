@@ -69,11 +69,11 @@ def mechanism_words(mechanism: str | None) -> str:
     return UNKNOWN if mechanism is None else mechanism.replace("_", " ")
 
 
-def driver_words(covariate: str, form: str | None = None) -> str:
+def driver_words(covariate: str, basis: str | None = None) -> str:
     """What drives an effect."""
     if covariate == CONSTANT:
         return "constant, driven by nothing recorded"
-    return f"driven by {covariate}" if form is None else f"driven by {covariate} ({form})"
+    return f"driven by {covariate}" if basis is None else f"driven by {covariate} ({basis})"
 
 
 def size_words(size: Sized) -> str:
@@ -118,8 +118,8 @@ def shift_sizes(trace: Trace, effect: Effect, table: PushTable) -> tuple[Sized, 
 def _mean_square(trace: Trace, effect: Effect, push: Push) -> Array:
     """Of each output, mean over the windows of the square of the design: (3, q, q)."""
     physics = physics_of(trace.model)
-    design = design_of(effect.mechanism, effect.form, physics, push, effect.outcome_scale)
-    return np.einsum("nka,nkb->kab", design, design) / max(len(design), 1)
+    design = design_of(effect.mechanism, effect.basis, physics, push, effect.outcome_scale)
+    return np.asarray(np.einsum("nka,nkb->kab", design, design) / max(len(design), 1))
 
 
 def _none(trace: Trace) -> str:
@@ -181,7 +181,7 @@ def _effect(trace: Trace, index: int) -> str:
     elif not sizes and index < len(trace.terms):
         every = shift_sizes(trace, trace.terms[index], trace.analysis)
         sizes = [size_words(size) for size, name in zip(every, OUTPUTS, strict=True) if name in effect.outputs]
-    driver = [] if trace.verdict == "measurement" else [driver_words(effect.covariate, effect.form)]
+    driver = [] if trace.verdict == "measurement" else [driver_words(effect.covariate, effect.basis)]
     named = [] if trace.verdict == "variance" else [mechanism_words(effect.mechanism)]
     told = [*named, *driver, *sizes, *_share(effect), f"p = {p_words(effect.p_value)}"]
     return ", ".join(told)
@@ -190,13 +190,13 @@ def _effect(trace: Trace, index: int) -> str:
 def _scatter(trace: Trace, effect: FoundEffect) -> list[str]:
     """Root mean square of the residual in the highest fifth of the driver over that in the lowest."""
     values = trace.analysis.covariates.get(effect.covariate)
-    if values is None or len(trace.left) != len(values):
+    if values is None or len(trace.unexplained) != len(values):
         return []
     low, high = (values <= np.quantile(values, FIFTH)), (values >= np.quantile(values, 1.0 - FIFTH))
     weights = np.vstack([np.ones(len(values)), push_bootstrap(trace.analysis.push_id)])
     told = []
     for name in effect.outputs:
-        square = trace.left[:, OUTPUTS.index(name)] ** 2
+        square = trace.unexplained[:, OUTPUTS.index(name)] ** 2
         spread = [np.sqrt(weights @ (square * rows) / np.maximum(weights @ rows, 1.0)) for rows in (low, high)]
         ratio = spread[1] / np.maximum(spread[0], np.finfo(float).tiny)
         ends = np.quantile(ratio[1:], [0.025, 0.975])

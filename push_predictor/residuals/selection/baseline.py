@@ -1,8 +1,8 @@
-"""What a base model leaves over where it was trained: the reference for what lies in its own inputs.
+"""Cross-validated residuals of a base model on its training data: the reference for effects in its own inputs.
 
-A learnt base is wrong by a function of its inputs, because it saw few pushes; so an effect in these inputs counts only
-as its relation to the residual in the new data less that in the training data, uncertain in both. The same goes for
-covariates that share the tracker's noise with the residual.
+A learnt base saw few pushes, so its error is a function of its inputs even where nothing changed. An effect in these
+inputs therefore counts only as the relation in the new data minus the relation in training, uncertain in both. The same
+holds for covariates that share the tracker's noise with the residual.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, with_independent_outputs
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.enumeration import Candidate, usable
+from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.enumeration import usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
-from push_predictor.residuals.evidence.drivers import LOCAL, STANDING
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis, inputs_of
+from push_predictor.residuals.evidence.drivers import LOCAL, RIG_PROPERTIES
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for, inputs_basis
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, push_order, whitened_response, whitener_of
@@ -30,43 +31,44 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Evidence from the training windows, none of them judged by a model that saw its push; basis of their inputs."""
+    """Evidence of the training windows, each predicted without its push, and the basis of their inputs."""
 
     evidence: Evidence
-    basis: InputsBasis
+    inputs: InputsBasis
 
     @property
     def deviation(self) -> Array:
-        """Standard deviation (3,) of the residuals in units of the prediction: 1 for an honest model."""
+        """Standard deviation (3,) of the standardised residuals; 1 for a calibrated model."""
         return np.asarray(self.evidence.z.std(axis=0))
 
-    def applies(self, candidate: Candidate) -> bool:
-        """Whether this candidate is judged against training: one in the base's own inputs, or one local to a push."""
-        if any(name not in self.evidence.table.covariates for name in candidate.form.drivers):
+    def judges(self, candidate: Candidate) -> bool:
+        """Whether a candidate is always judged against training: it lies in the base's inputs or is local to a push."""
+        if any(name not in self.evidence.table.covariates for name in candidate.basis.drivers):
             return False
-        own = candidate.kind == "constant" or (candidate.kind == "speed" and self.basis.knows_speed)
-        return (own and self.basis.learnt) or candidate.covariate in LOCAL
+        own = candidate.kind == "constant" or (candidate.kind == "speed" and self.inputs.knows_speed)
+        return (own and self.inputs.learnt) or candidate.covariate in LOCAL
 
-    def stands(self, candidate: Candidate) -> bool:
-        """Whether what drives this candidate belongs to the rig and drove in training too, if it does at all.
+    def compares(self, candidate: Candidate) -> bool:
+        """Whether a candidate depends on a fixed property of the rig, so that it may have acted in training too.
 
-        A learnt base that folds sides or knows no place lacks it then, but lacks it since it was trained.
+        A learnt base that folds sides or does not take the position as input lacks such an effect from the start.
         """
-        recorded = all(name in self.evidence.table.covariates for name in candidate.form.drivers)
-        return self.basis.learnt and recorded and candidate.covariate in STANDING and not self.applies(candidate)
+        recorded = all(name in self.evidence.table.covariates for name in candidate.basis.drivers)
+        return self.inputs.learnt and recorded and candidate.covariate in RIG_PROPERTIES and not self.judges(candidate)
 
     def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         """Block scores and information of a candidate on the training windows."""
         evidence = self.evidence
         response = self._response(candidate.mechanism)
-        there = replace(
+        in_training = replace(
             candidate,
             response=response,
-            values=candidate.form.values(evidence.table.covariates, len(response)),
-            beside=self._nuisance.beside(*candidate.label, candidate.form, candidate.kind),
+            values=candidate.basis.values(evidence.table.covariates, len(response)),
+            nuisance=self._nuisance.of_change(*candidate.label, candidate.basis, candidate.kind),
         )
-        out = Residualizer(inputs_of(candidate.kind, self.basis))
-        return raw_scores(out.left(evidence.z, evidence.block).apart(there.beside), out(there.columns))
+        residualizer = Residualizer(controls_for(candidate.kind, self.inputs))
+        blocks = residualizer.blocks(evidence.z, evidence.block).orthogonal_to(in_training.nuisance)
+        return raw_scores(blocks, residualizer(in_training.columns))
 
     def _response(self, mechanism: str | None) -> Array:
         if mechanism not in self._responses:
@@ -76,7 +78,7 @@ class Baseline:
     @cached_property
     def _nuisance(self) -> Nuisance:
         mechanisms = [name for name in usable(self.evidence) if name is not None]
-        return Nuisance(self.evidence, self.basis, mechanisms, self._response)
+        return Nuisance(self.evidence, self.inputs, mechanisms, self._response)
 
     @cached_property
     def _responses(self) -> dict[str | None, Array]:
@@ -84,7 +86,7 @@ class Baseline:
 
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
-    """The baseline of a model, from the training windows that it keeps, each push left out of what it is judged by."""
+    """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps."""
     table, predictor = with_inputs(model.training), with_independent_outputs(model.predictor)
     push = Push(table.inputs, table.duration, table.covariates)
     base = predictor.base if isinstance(predictor, ExtendedPredictor) else predictor
@@ -97,7 +99,7 @@ def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
 
 
 def difference(new: tuple[Scores, Array], training: tuple[Scores, Array]) -> Scores:
-    """Scores of b + b' blocks of the relation in new data less that in training, as screening.screen takes them.
+    """Scores of b + b' blocks for the relation in the new data minus that in training.
 
     new, training: block scores and information of the same columns in both.
     """
@@ -107,9 +109,9 @@ def difference(new: tuple[Scores, Array], training: tuple[Scores, Array]) -> Sco
     ours, theirs = (np.linalg.inv(_lifted(keep.T @ a @ keep, information + other)) for a in (information, other))
     spread, axes = np.linalg.eigh(ours + theirs)
     root = axes / np.sqrt(spread)
-    return scores.turned(keep @ ours @ root).beside(others.turned(-keep @ theirs @ root))
+    return scores.turned(keep @ ours @ root).stacked_on(others.turned(-keep @ theirs @ root))
 
 
 def _lifted(information: Array, scale: Array) -> Array:
-    """Information that is nowhere zero: where training says nothing, no difference can be told."""
+    """Information made positive definite; without information in training the difference stays undetermined."""
     return np.asarray(information + 1e-9 * np.trace(scale) / len(scale) * np.eye(len(information)))

@@ -1,8 +1,8 @@
-"""Which of the significant candidates explains best, and which of its rivals these data cannot tell from it.
+"""Cross-validated gain of candidates: fitted on some blocks of pushes, the gain in log density on the others.
 
-Judged by push-blocked cross-validation: fitted on some blocks of pushes, the gain in log density on the others.
-Coefficients are shrunk by the factor of James and Stein 1961, with their variance robust to dependence within blocks:
-without it a candidate of many columns, as the generic ones are, would lose by its noise to a wrong one of few.
+Coefficients are shrunk by the factor of James and Stein 1961, with a variance that is robust to dependence within
+blocks. Without shrinkage, a candidate of many columns, as the generic ones, would lose by its noise to a wrong one of
+few.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.residuals.candidates.enumeration import Candidate
+from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.selection.screening import TINY
 from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5
-RIDGE = 1e-3  # share of a column's own square, for columns that nearly coincide
+RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate with its gain (blocks,) in nats, block by block, out of sample."""
+    """A candidate with its cross-validated gain (blocks,) in nats."""
 
     candidate: Candidate
     gains: Array
@@ -34,24 +34,24 @@ class Judged:
         return float(self.gains.sum())
 
 
-def judge(candidates: Sequence[Candidate], z: Array, basis: Array, block: IntArray) -> list[Judged]:
-    """Judge candidates on residuals z (n, 3), best first; the basis (n, m) of the inputs goes out of both."""
-    out = Residualizer(basis)
-    left = out(z)
-    judged = [Judged(c, gains_of(left, out(c.columns), block)) for c in candidates]
+def judge(candidates: Sequence[Candidate], z: Array, controls: Array, block: IntArray) -> list[Judged]:
+    """Candidates with their gains on residuals z (n, 3), best first; the controls (n, m) are regressed out of both."""
+    residualizer = Residualizer(controls)
+    residual = residualizer(z)
+    judged = [Judged(c, gains_of(residual, residualizer(c.columns), block)) for c in candidates]
     return sorted(judged, key=lambda j: -j.gain)
 
 
 def folds_of(block: IntArray) -> IntArray:
-    """Fold (n,) of every window; the blocks are dealt in turn, so that every fold spans the whole time."""
+    """Fold (n,) of every window; blocks take turns, so that every fold spans the whole session."""
     return block % FOLDS
 
 
-def fit(flat: Array, left: Array, block: IntArray | None = None) -> Array:
-    """Coefficients (p,) of columns (n, 3, p) for residuals (n, 3) by least squares; shrunk where blocks are given."""
-    numbers = np.arange(len(left)) if block is None else block
+def fit(flat: Array, residual: Array, block: IntArray | None = None) -> Array:
+    """Least-squares coefficients (p,) of columns (n, 3, p) for residuals (n, 3); shrunk if blocks are given."""
+    numbers = np.arange(len(residual)) if block is None else block
     x = flat.reshape(-1, flat.shape[2])
-    scores, information = sums_by(numbers, np.einsum("nkp,nk->np", flat, left)), x.T @ x
+    scores, information = sums_by(numbers, np.einsum("nkp,nk->np", flat, residual)), x.T @ x
     values, vectors = np.linalg.eigh(information)
     keep = values > TINY * max(values[-1], np.finfo(float).tiny)
     root = vectors[:, keep] / np.sqrt(values[keep])
@@ -60,26 +60,26 @@ def fit(flat: Array, left: Array, block: IntArray | None = None) -> Array:
     return np.asarray(root @ (estimate * (1.0 if block is None else _james_stein(estimate, each))))
 
 
-def gains_of(left: Array, flat: Array, block: IntArray) -> Array:
-    """Gain per block: log density of the residuals after less before, each output with its own variance."""
-    gains = np.zeros(len(left))
+def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:
+    """Gain per block: log density of the residuals after minus before, each output with its own variance."""
+    gains = np.zeros(len(residual))
     folds = folds_of(block)
     for fold in range(FOLDS):
         test = folds == fold
         if test.any() and not test.all():
-            gains[test] = _gain(left, flat, block, test)
+            gains[test] = _gain(residual, flat, block, test)
     return sums_by(block, gains[:, None])[:, 0]
 
 
-def _gain(left: Array, flat: Array, block: IntArray, test: BoolArray) -> Array:
+def _gain(residual: Array, flat: Array, block: IntArray, test: BoolArray) -> Array:
     rest = ~test
-    after = left - flat @ fit(flat[rest], left[rest], block[rest])
-    old, new = (np.mean(r[rest] ** 2, axis=0) for r in (left, after))
-    return _log_density(after[test], new) - _log_density(left[test], old)
+    after = residual - flat @ fit(flat[rest], residual[rest], block[rest])
+    old, new = (np.mean(r[rest] ** 2, axis=0) for r in (residual, after))
+    return _log_density(after[test], new) - _log_density(residual[test], old)
 
 
 def _james_stein(estimate: Array, each: Array) -> float:
-    """1 - noise / (noise + signal), with the noise from the scatter of the blocks' scores about their mean."""
+    """1 - noise / (noise + signal); the noise is the spread of the blocks' scores about their mean."""
     size = float(estimate @ estimate)
     noise = float(np.sum((each - each.mean(axis=0)) ** 2))
     return max(0.0, 1.0 - noise / size) if size > 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""By what name an effect goes: which drivers and which mechanisms these data leave open, and whether any fits.
+"""The name of an effect: which covariates and which mechanisms remain possible, and whether any mechanism fits.
 
-A rival is struck off when, taken to be the truth and taken out, it leaves something over that the best explains. A
-mechanism is named only if the generic fall-back with the same driver finds little beside it.
+A rival is rejected if the best candidate still explains something after the rival has been regressed out. A mechanism
+is named only if the generic polynomial along the same covariate explains little in addition to it.
 """
 
 from __future__ import annotations
@@ -12,96 +12,92 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.models.effects.effect import mechanism_named
-from push_predictor.residuals.candidates.enumeration import Candidate
+from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Residualizer
 from push_predictor.residuals.selection.cross_validation import Judged, fit, gains_of
 from push_predictor.residuals.selection.screening import raw_scores, screen, unit_scores
 from push_predictor.types import Array, IntArray
 
-STRUCK_OFF = 0.01  # p below which a rival is not the truth
-LEFT_OVER = 0.05  # p below which a mechanism leaves something over along its driver
-MOST_LEFT = 0.15  # share of what can be explained along the driver that a named mechanism may leave over: it is linear
+REJECTED = 0.01  # p below which a rival is rejected
+UNEXPLAINED = 0.05  # p below which a mechanism fails to explain something along its covariate
+MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain: it is linear
 
 
 @dataclass(frozen=True, eq=False)
 class Naming:
-    """What the effect may be called, the best first. known: whether its mechanism is in the library.
+    """Possible covariates and mechanisms of an effect, the best first; known: whether a mechanism of the library fits.
 
-    left_over: share of the gain along the driver that the best mechanism leaves to the generic fall-back.
+    unexplained: share of the gain along the covariate that only the generic polynomial achieves.
     """
 
     drivers: tuple[str, ...]
     mechanisms: tuple[str | None, ...]
     known: bool
-    left_over: float
+    unexplained: float
 
     @property
     def undecided(self) -> bool:
-        """Whether several drivers are left."""
+        """Whether several covariates remain possible."""
         return len(self.drivers) > 1
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Residuals z (n, 3) with the basis (n, m) that goes out of everything, and the blocks (n,)."""
+    """Residuals z (n, 3), the controls (n, m) to regress out, and the block (n,) of every window."""
 
     z: Array
-    basis: Array
+    controls: Array
     block: IntArray
 
 
 def open_rivals(best: Judged, others: Sequence[Judged], case: Case, seed: int = 0) -> list[Judged]:
-    """The best, and those of the others that could be the truth."""
-    return [best, *(other for other in others if not _struck_off(best, other, case, seed))]
+    """The best, and those of the others that these data do not reject."""
+    return [best, *(other for other in others if not _rejected(best, other, case, seed))]
 
 
 def plausible(candidate: Candidate, case: Case) -> bool:
-    """Whether the size that fits is one that a rig can have; beyond it a mechanism only mimics another."""
+    """Whether the fitted size is one that a rig can have; with a larger one a mechanism only mimics another."""
     if candidate.mechanism is None:
         return True
-    out = Residualizer(case.basis)
-    coefficients = fit(out(candidate.columns), out(case.z)).reshape(candidate.response.shape[2], -1)
+    residualizer = Residualizer(case.controls)
+    coefficients = fit(residualizer(candidate.columns), residualizer(case.z))
     values = np.ones((len(case.z), 1)) if candidate.values is None else candidate.values
-    values = values - (values.mean(axis=0) if candidate.kind == "driven" and candidate.form.drivers else 0.0)
-    size = np.quantile(np.abs(values @ coefficients.T), 0.9, axis=0)
-    return mechanism_named(candidate.mechanism).plausible(size[None])
+    values = values - (values.mean(axis=0) if candidate.kind == "driven" and candidate.basis.drivers else 0.0)
+    strength = values @ coefficients.reshape(candidate.response.shape[2], -1).T
+    return mechanism_named(candidate.mechanism).plausible(np.quantile(np.abs(strength), 0.9, axis=0)[None])
 
 
-def leaves_over(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:
-    """Share of the gain along the driver that a mechanism leaves to the fall-back; 0 where that is chance."""
-    out = Residualizer(case.basis)
-    both = _orthonormal(out(mechanism.candidate.columns))
-    left, beside = _apart(out.left(case.z, case.block), both), _apart_from(out(generic.columns), both)
-    if _p_value(left, beside, seed) > LEFT_OVER:
+def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:
+    """Share of the gain along the covariate that only the generic polynomial achieves; 0 if that may be chance."""
+    blocks, columns = _given(mechanism.candidate, generic, case)
+    if _p_value(blocks, columns, seed) > UNEXPLAINED:
         return 0.0
-    more = max(float(gains_of(left.left, beside, case.block).sum()), 0.0)
+    more = max(float(gains_of(blocks.residual, columns, case.block).sum()), 0.0)
     return more / (more + max(mechanism.gain, np.finfo(float).tiny))
 
 
-def _struck_off(best: Judged, other: Judged, case: Case, seed: int) -> bool:
-    """Whether the other, taken out with the inputs, leaves over what the best explains."""
-    out = Residualizer(case.basis)
-    taken = _orthonormal(out(other.candidate.columns))
-    left, flat = _apart(out.left(case.z, case.block), taken), _apart_from(out(best.candidate.columns), taken)
-    return _p_value(left, flat, seed) <= STRUCK_OFF and best.gain > other.gain
+def _rejected(best: Judged, other: Judged, case: Case, seed: int) -> bool:
+    """Whether the best still explains something once the other is regressed out."""
+    blocks, columns = _given(other.candidate, best.candidate, case)
+    return _p_value(blocks, columns, seed) <= REJECTED and best.gain > other.gain
 
 
-def _p_value(left: ResidualBlocks, flat: Array, seed: int) -> float:
-    scores = unit_scores(*raw_scores(left, flat))
+def _given(first: Candidate, second: Candidate, case: Case) -> tuple[ResidualBlocks, Array]:
+    """The residuals, and the columns (n, 3, p) of the second candidate, with controls and the first regressed out."""
+    residualizer = Residualizer(case.controls)
+    taken = _orthonormal(residualizer(first.columns))
+    columns = residualizer(second.columns)
+    flat = columns.reshape(len(taken), -1)
+    apart = (flat - taken @ (taken.T @ flat)).reshape(columns.shape)
+    return residualizer.blocks(case.z, case.block).orthogonal_to(taken), np.asarray(apart)
+
+
+def _p_value(blocks: ResidualBlocks, columns: Array, seed: int) -> float:
+    scores = unit_scores(*raw_scores(blocks, columns))
     return float(screen([scores], seed).p_value[0]) if scores.rows.shape[1] else 1.0
 
 
-def _orthonormal(flat: Array) -> Array:
+def _orthonormal(columns: Array) -> Array:
     """Orthonormal columns (3 n, k) that span columns (n, 3, p)."""
-    left, values, _ = np.linalg.svd(flat.reshape(-1, flat.shape[2]), full_matrices=False)
+    left, values, _ = np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False)
     return np.asarray(left[:, values > 1e-6 * max(values[0], np.finfo(float).tiny)])
-
-
-def _apart(left: ResidualBlocks, taken: Array) -> ResidualBlocks:
-    return ResidualBlocks(_apart_from(left.left, taken), _apart_from(left.enlarged, taken), left.block)
-
-
-def _apart_from(values: Array, taken: Array) -> Array:
-    """Values (n, 3, ...) less what the orthonormal columns (3 n, k) explain of them, all outputs together."""
-    flat = values.reshape(len(taken), -1)
-    return np.asarray(flat - taken @ (taken.T @ flat)).reshape(values.shape)

@@ -1,10 +1,11 @@
 """Which candidates explain more of the residual than chance: a family-wise p value for each.
 
-The model's inputs are taken out of residual and candidate alike (Frisch and Waugh 1933), so that what a base model
-could have learnt in its own inputs is not put down to a covariate. The statistic is the sum of squares that the
-candidate's columns explain; its null distribution comes from a wild bootstrap with one sign per block of pushes
-(Cameron, Gelbach and Miller 2008), the same signs for all candidates; the largest of all gives the family-wise p
-(Westfall and Young 1993). No covariance of the columns is inverted: with many columns and few blocks it would be noise.
+The model's inputs are regressed out of residual and candidate alike (Frisch and Waugh 1933), so that an error which a
+base model could have learnt from its own inputs is not attributed to a covariate. The statistic is the sum of squares
+that the candidate's columns explain. Its null distribution comes from a wild bootstrap with one sign per block of
+pushes (Cameron, Gelbach and Miller 2008), the same signs for all candidates. The largest statistic of each draw gives
+the family-wise p (Westfall and Young 1993). No covariance of the columns is inverted: with many columns and few blocks
+it would be noise.
 """
 
 from __future__ import annotations
@@ -18,52 +19,51 @@ from push_predictor.residuals.evidence.residualizer import ResidualBlocks, Resid
 from push_predictor.types import Array, IntArray
 
 DRAWS = 1999
-TINY = 1e-6  # relative; directions of a candidate that the inputs explain away are dropped
+TINY = 1e-6  # relative; directions of a candidate that the inputs explain are dropped
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """By candidate (c,): statistic on a scale common to all (standard normal by chance), family-wise p value.
+    """Statistic and family-wise p value of each candidate (c,); by chance the statistic is standard normal.
 
-    largest: of each bootstrap draw. standing: the candidates that chance does not explain, but training has as well.
+    largest: statistic of each bootstrap draw. unchanged: candidates that are significant, but as much so in training.
     """
 
     statistic: Array
     p_value: Array
     largest: Array
-    standing: tuple[int, ...] = ()
+    unchanged: tuple[int, ...] = ()
 
     def threshold(self, alpha: float) -> float:
-        """Statistic that chance exceeds anywhere with probability alpha."""
+        """Statistic that any candidate exceeds by chance with probability alpha."""
         return float(np.quantile(self.largest, 1.0 - alpha))
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """What each block adds to the score of each column, rows (b, p), for the bootstrap; their true sum, total (p,).
+    """Score of each column: contribution of each block, rows (b, p), and the observed sum, total (p,).
 
-    The rows are of residuals made as large as they were before the inputs were fitted: what is left after a rich fit is
-    too small, and chance would look rarer than it is (Bell and McCaffrey 2002: a block's rows times (1 - H)^-1/2).
+    The rows, which the bootstrap signs, come from the adjusted residuals of ResidualBlocks.
     """
 
     rows: Array
     total: Array
 
     def turned(self, by: Array) -> Scores:
-        """In other coordinates: by (p, q)."""
+        """The scores in other coordinates; by (p, q)."""
         return Scores(self.rows @ by, self.total @ by)
 
-    def beside(self, other: Scores) -> Scores:
-        """The blocks of both, for one sum."""
+    def stacked_on(self, other: Scores) -> Scores:
+        """The blocks of both scores, for one sum."""
         return Scores(np.vstack([self.rows, other.rows]), self.total + other.total)
 
     def padded(self, blocks: int) -> Scores:
-        """With more blocks, which add nothing."""
+        """The scores with further blocks that contribute zero."""
         return Scores(np.vstack([self.rows, np.zeros((blocks, self.rows.shape[1]))]), self.total)
 
 
 def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
-    """Screen candidates by their block scores, each in coordinates in which its information is one."""
+    """Screen candidates by their scores, each in coordinates in which its information is the identity."""
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, len(scores[0].rows)))
     statistic, largest = np.empty(len(scores)), np.full(DRAWS, -np.inf)
     for k, score in enumerate(scores):
@@ -73,28 +73,28 @@ def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
     return Screened(statistic, (1.0 + exceeded) / (1.0 + DRAWS), largest)
 
 
-def block_scores(z: Array, columns: Array, basis: Array, block: IntArray) -> Scores:
-    """Scores of columns (n, 3, p) for residuals z (n, 3); the basis (n, m) is taken out of both, per output."""
-    out = Residualizer(basis)
-    return unit_scores(*raw_scores(out.left(z, block), out(columns)))
+def block_scores(z: Array, columns: Array, controls: Array, block: IntArray) -> Scores:
+    """Scores of columns (n, 3, p) for residuals z (n, 3), the controls (n, m) regressed out of both."""
+    residualizer = Residualizer(controls)
+    return unit_scores(*raw_scores(residualizer.blocks(z, block), residualizer(columns)))
 
 
 def unit_scores(scores: Scores, information: Array) -> Scores:
-    """Scores in coordinates in which the information (p, p) is one."""
+    """Scores in coordinates in which the information (p, p) is the identity."""
     values, vectors = np.linalg.eigh(information)
     keep = values > TINY * max(values[-1], np.finfo(float).tiny)
     return scores.turned(vectors[:, keep] / np.sqrt(values[keep]))
 
 
-def raw_scores(left: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
-    """Scores of columns (n, 3, p) that are without the inputs, and the columns' information (p, p)."""
+def raw_scores(blocks: ResidualBlocks, flat: Array) -> tuple[Scores, Array]:
+    """Scores of residualised columns (n, 3, p), and the columns' information (p, p)."""
     x = flat.reshape(-1, flat.shape[2])
-    rows = sums_by(left.block, np.einsum("nkp,nk->np", flat, left.enlarged))
-    return Scores(rows, x.T @ left.left.ravel()), x.T @ x
+    rows = sums_by(blocks.block, np.einsum("nkp,nk->np", flat, blocks.adjusted))
+    return Scores(rows, x.T @ blocks.residual.ravel()), x.T @ x
 
 
 def _statistics(score: Scores, signs: Array) -> tuple[float, Array]:
-    """Sum of squares explained, and with the signs of each draw, as standard normal values."""
+    """Sum of squares explained as observed, and with the signs of each draw, as standard normal values."""
     scale = moments(score)
     if scale is None:
         return -np.inf, np.full(len(signs), -np.inf)
@@ -105,7 +105,7 @@ def _statistics(score: Scores, signs: Array) -> tuple[float, Array]:
 
 
 def moments(score: Scores) -> tuple[float, float] | None:
-    """Unit and freedom of the chi squared with the draws' mean and variance (Satterthwaite 1946), if they vary."""
+    """Scale and degrees of freedom of the chi-squared with the draws' mean and variance (Satterthwaite 1946)."""
     gram = score.rows.T @ score.rows
     mean = float(np.trace(gram))
     variance = 2.0 * float(np.sum(gram**2) - np.sum(np.sum(score.rows**2, axis=1) ** 2))
@@ -113,6 +113,6 @@ def moments(score: Scores) -> tuple[float, float] | None:
 
 
 def _normal(chi_squared: Array, freedom: float) -> Array:
-    """Wilson and Hilferty 1931: what is chi squared with this freedom becomes nearly standard normal."""
+    """Nearly standard normal values of a chi-squared variable (Wilson and Hilferty 1931)."""
     spread = 2.0 / (9.0 * freedom)
     return np.asarray((np.cbrt(chi_squared / freedom) - (1.0 - spread)) / np.sqrt(spread))

@@ -1,4 +1,4 @@
-"""An effect's fitted form with its band over what drives it, and the data it rests on."""
+"""An effect's fitted basis with its band over what drives it, and the data it rests on."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ BESIDE = 0.08  # of the levels of a category: so far to either side
 PERIODIC = ("periodic", "periodic, twice around")
 
 
-def paint_form(figure: Figure, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> None:
+def paint_basis(figure: Figure, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> None:
     """A panel for each parameter; of a map two: fitted, and estimated cell by cell."""
-    if len(strength.effect.form.drivers) > 1:
+    if len(strength.effect.basis.drivers) > 1:
         _paint_maps(figure, trace, strength, analysis)
         return
     axes = figure.subplots(1, len(strength.names), squeeze=False)[0]
@@ -38,13 +38,13 @@ def paint_form(figure: Figure, trace: Trace, strength: Strength, analysis: Rows,
     axes[0].legend(loc="best")
 
 
-def bins_of(form: DriverBasis, table: PushTable) -> IntArray:
+def bins_of(basis: DriverBasis, table: PushTable) -> IntArray:
     """Bin (n,) of each window: of a category by level, of a heading by width, else as many windows in each."""
-    values = table.covariates[form.drivers[0]]
-    if form.name == "category":
-        return np.asarray(np.searchsorted(np.sort(form.levels), values), dtype=np.int64)
+    values = table.covariates[basis.drivers[0]]
+    if basis.name == "category":
+        return np.asarray(np.searchsorted(np.sort(basis.levels), values), dtype=np.int64)
     count = int(np.clip(len(table.pushes) // PUSHES_PER_BIN, FEWEST_BINS, MOST_BINS))
-    if form.name in PERIODIC:
+    if basis.name in PERIODIC:
         return np.asarray(np.clip((values + np.pi) / (2.0 * np.pi) * count, 0, count - 1), dtype=np.int64)
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count + 1)[1:-1]))
     return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.int64)
@@ -52,54 +52,54 @@ def bins_of(form: DriverBasis, table: PushTable) -> IntArray:
 
 def beyond(strength: Strength, trace: Trace, rows: Rows) -> str:
     """How many pushes have no dot inside the picture."""
-    place, value = per_push(strength, rows, responses(trace, strength, rows), _axis(strength.effect.form, rows.table))
+    place, value = per_push(strength, rows, responses(trace, strength, rows), _axis(strength.effect.basis, rows.table))
     limits = [_limits(strength, trace, rows, q) for q in range(value.shape[1])]
     inside = [np.sum((value[:, q] >= low) & (value[:, q] <= high)) for q, (low, high) in enumerate(limits)]
     return ", ".join(f"{len(place) - int(n)} of {len(place)}" for n in inside)
 
 
-def driver_label(form: DriverBasis) -> str:
+def driver_label(basis: DriverBasis) -> str:
     """The driver with its unit."""
-    name = form.drivers[0]
-    unit = "deg" if form.name in PERIODIC else unit_of(name)
+    name = basis.drivers[0]
+    unit = "deg" if basis.name in PERIODIC else unit_of(name)
     return f"{name} ({unit})" if unit else name
 
 
 def _paint_panel(ax: Axes, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None, q: int) -> None:
-    form = strength.effect.form
+    basis = strength.effect.basis
     grid(ax)
     ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     _paint_curve(ax, strength, analysis.table, q)
-    aside = BESIDE if form.name == "category" else 0.0
+    aside = BESIDE if basis.name == "category" else 0.0
     response = responses(trace, strength, analysis)
-    place, value = per_push(strength, analysis, response, _axis(form, analysis.table))
+    place, value = per_push(strength, analysis, response, _axis(basis, analysis.table))
     ax.plot(place, value[:, q], "o", color="0.55", markersize=2.4, mew=0.0, alpha=0.6, label="one push", zorder=1)
     _paint_bins(ax, _bins(trace, strength, analysis), q, OBSERVED, "o", "analysis pushes, binned", -aside)
     if held_out is not None:
         _paint_bins(ax, _bins(trace, strength, held_out), q, HELD_OUT, "s", "held-out pushes, binned", aside)
     ax.set_ylim(_limits(strength, trace, analysis, q))
     unit = strength.units[q]
-    ax.set_xlabel(driver_label(form))
+    ax.set_xlabel(driver_label(basis))
     ax.set_ylabel(strength.names[q] if unit == "1" else f"{strength.names[q]} ({unit})")
-    if form.name == "category":
-        ax.set_xticks(form.levels)
+    if basis.name == "category":
+        ax.set_xticks(basis.levels)
 
 
 def _paint_curve(ax: Axes, strength: Strength, table: PushTable, q: int) -> None:
-    form = strength.effect.form
-    values = table.covariates[form.drivers[0]]
-    if form.name == "category":
-        points = np.array(form.levels)
-        mean, half = strength.curve({form.drivers[0]: points}, len(points))
+    basis = strength.effect.basis
+    values = table.covariates[basis.drivers[0]]
+    if basis.name == "category":
+        points = np.array(basis.levels)
+        mean, half = strength.curve({basis.drivers[0]: points}, len(points))
         bars: dict[str, Any] = {"fmt": "_", "color": PREDICTED, "markersize": 22.0, "elinewidth": 8.0, "alpha": 0.45}
         ax.errorbar(points, mean[:, q], half[:, q], label="fitted, 95 %", **bars)
         return
-    low, high = (-np.pi, np.pi) if form.name in PERIODIC else (float(values.min()), float(values.max()))
+    low, high = (-np.pi, np.pi) if basis.name in PERIODIC else (float(values.min()), float(values.max()))
     points = np.linspace(low, high, GRID)
-    mean, half = strength.curve({form.drivers[0]: points}, GRID)
-    x = np.degrees(points) if form.name in PERIODIC else points
+    mean, half = strength.curve({basis.drivers[0]: points}, GRID)
+    x = np.degrees(points) if basis.name in PERIODIC else points
     ax.fill_between(x, mean[:, q] - half[:, q], mean[:, q] + half[:, q], color=PREDICTED, alpha=0.22, linewidth=0.0)
-    ax.plot(x, mean[:, q], color=PREDICTED, linewidth=1.8, label=f"fitted ({form.name}), 95 % band")
+    ax.plot(x, mean[:, q], color=PREDICTED, linewidth=1.8, label=f"fitted ({basis.name}), 95 % band")
 
 
 def _paint_bins(ax: Axes, bins: Binned, q: int, colour: str, marker: str, label: str, aside: float) -> None:
@@ -111,14 +111,14 @@ def _paint_bins(ax: Axes, bins: Binned, q: int, colour: str, marker: str, label:
 
 
 def _bins(trace: Trace, strength: Strength, rows: Rows) -> Binned:
-    form = strength.effect.form
+    basis = strength.effect.basis
     response = responses(trace, strength, rows)
-    return binned(strength, rows, response, _axis(form, rows.table), bins_of(form, rows.table))
+    return binned(strength, rows, response, _axis(basis, rows.table), bins_of(basis, rows.table))
 
 
-def _axis(form: DriverBasis, table: PushTable) -> Array:
-    values = table.covariates[form.drivers[0]]
-    return np.degrees(values) if form.name in PERIODIC else values
+def _axis(basis: DriverBasis, table: PushTable) -> Array:
+    values = table.covariates[basis.drivers[0]]
+    return np.degrees(values) if basis.name in PERIODIC else values
 
 
 def _limits(strength: Strength, trace: Trace, rows: Rows, q: int) -> tuple[float, float]:
@@ -133,7 +133,7 @@ def _limits(strength: Strength, trace: Trace, rows: Rows, q: int) -> tuple[float
 
 def _paint_maps(figure: Figure, trace: Trace, strength: Strength, rows: Rows) -> None:
     """A row a parameter: the fitted map, what was estimated cell by cell, the dots are windows."""
-    first, second = strength.effect.form.drivers
+    first, second = strength.effect.basis.drivers
     x, y = rows.table.covariates[first], rows.table.covariates[second]
     edges = [np.linspace(v.min(), v.max(), MAP_BINS + 1) for v in (x, y)]
     column, line = (_in_bin(e, v) for e, v in zip(edges, (x, y), strict=True))

@@ -9,7 +9,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.channels import channel_of, paint_channel
-from push_predictor.residuals.reporting.figures.driver_basis import beyond, paint_form
+from push_predictor.residuals.reporting.figures.driver_basis import beyond, paint_basis
 from push_predictor.residuals.reporting.figures.partial import Rows, Strength, analysis_rows, held_out_rows, strength_of
 from push_predictor.residuals.reporting.figures.shifts import course_of, paint_course, paint_shifts
 from push_predictor.residuals.reporting.figures.tested import FLOOR, best_of, grid_of, paint_tested
@@ -20,13 +20,13 @@ WIDTH = 10.0  # inches
 
 
 def effect_pictures(out: Path, trace: Trace, index: int) -> list[Picture]:
-    """An effect: its form over its driver, or its response where none drives it; found against fitted shifts."""
+    """An effect: its basis over its driver, or its response where none drives it; found against fitted shifts."""
     effect = trace.terms[index]
     analysis, held_out = analysis_rows(trace), _held_out_rows(trace)
     strength = strength_of(effect, trace.analysis)
     first = (
-        _form_picture(out / f"form_{index}.png", trace, strength, analysis, held_out)
-        if effect.form.drivers
+        _basis_picture(out / f"form_{index}.png", trace, strength, analysis, held_out)
+        if effect.basis.drivers
         else _course_picture(out / f"course_{index}.png", trace, effect, analysis)
     )
     path = out / f"shifts_{index}.png"
@@ -35,7 +35,7 @@ def effect_pictures(out: Path, trace: Trace, index: int) -> list[Picture]:
         f"Is the shift there that the fit says? Windows with like fitted shift are put together (as many in each "
         f"point); upright: the mean of what they really did beyond the model and the other terms, with 95 % intervals "
         f"by drawing whole pushes anew. On the line, fitted and found agree; level points would mean that the effect "
-        f"is not there. {_basis(trace)}"
+        f"is not there. {_data_words(trace)}"
     )
     return [first, Picture(path, "Found against fitted shift of dx, dy and dtheta.", caption)]
 
@@ -66,7 +66,7 @@ def tested_picture(out: Path, trace: Trace) -> list[Picture]:
     caption = (
         f"All that was tried: {count(len(rows), 'mechanism', 'mechanisms')} and "
         f"{count(len(columns), 'driver', 'drivers')}, {len(best_of(trace.tested))} pairs, with the smallest "
-        f"family-wise p of each pair's forms (below {FLOOR:g} all look alike; the orange line in the bar is alpha = "
+        f"family-wise p of each pair's bases (below {FLOOR:g} all look alike; the orange line in the bar is alpha = "
         f"{trace.alpha:g}). Ring: what was found; dot: rival of the first; hatched or grey: not tried. That a "
         f"neighbour of the right cell is significant too is to be expected: drivers go together, and so do "
         f"responses. The first look at all candidates is shown, before anything was taken out."
@@ -91,12 +91,12 @@ def calibration_picture(out: Path, trace: Trace) -> list[Picture]:
     return [Picture(path, "Coverage curves and PIT histograms.", caption)]
 
 
-def _form_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> Picture:
+def _basis_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> Picture:
     effect = strength.effect
-    wide = len(effect.form.drivers) > 1
+    wide = len(effect.basis.drivers) > 1
     height = 3.4 * len(strength.names) if wide else 4.2
-    draw(path, (WIDTH, height), lambda figure: paint_form(figure, trace, strength, analysis, held_out))
-    what = f"{mechanism_words(effect.mechanism)}, {driver_words(' and '.join(effect.form.drivers), effect.form.name)}"
+    draw(path, (WIDTH, height), lambda figure: paint_basis(figure, trace, strength, analysis, held_out))
+    what = f"{mechanism_words(effect.mechanism)}, {driver_words(' and '.join(effect.basis.drivers), effect.basis.name)}"
     data = (
         "Right: estimated in each cell by itself."
         if wide
@@ -109,9 +109,9 @@ def _form_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows, 
         f" The mechanism is unknown: shown is the strongest pattern over contact and angle, which holds "
         f"{100.0 * strength.share:.0f} % of the fitted coefficients' sum of squares."
     )  # fmt: skip
-    fitted = "Left: the fitted map." if wide else "Line: the fitted form with its 95 % band."
-    caption = f"{what}. {fitted} {data} {_basis(trace)}{pattern}"
-    return Picture(path, f"Fitted form of {what}, and the data.", caption)
+    fitted = "Left: the fitted map." if wide else "Line: the fitted basis with its 95 % band."
+    caption = f"{what}. {fitted} {data} {_data_words(trace)}{pattern}"
+    return Picture(path, f"Fitted basis of {what}, and the data.", caption)
 
 
 def _course_picture(path: Path, trace: Trace, effect: Effect, analysis: Rows) -> Picture:
@@ -121,7 +121,8 @@ def _course_picture(path: Path, trace: Trace, effect: Effect, analysis: Rows) ->
     caption = (
         f"{mechanism_words(effect.mechanism)}, {driver_words(effect.covariate)}: what it does to the outcome over "
         f"{course.label},{groups} at the commonest speed and duration. Lines with 95 % bands: fitted, averaged over "
-        f"the windows of each point; points: found, with 95 % intervals by drawing whole pushes anew. {_basis(trace)}"
+        f"the windows of each point; points: found, with 95 % intervals by drawing whole pushes anew. "
+        f"{_data_words(trace)}"
     )
     return Picture(path, f"Shift by {mechanism_words(effect.mechanism)} over {course.label}.", caption)
 
@@ -131,7 +132,7 @@ def _held_out_rows(trace: Trace) -> Rows | None:
     return held_out_rows(trace) if len(held.table) and len(held.after.observed) == len(held.table) else None
 
 
-def _basis(trace: Trace) -> str:
+def _data_words(trace: Trace) -> str:
     whose = "the extended model" if trace.extended is not None else "the deployed model"
     pushes = count(len(trace.analysis.pushes), "analysis push", "analysis pushes")
     return f"Data: {pushes}, residuals of {whose}."

@@ -38,8 +38,8 @@ def _analysis_columns(trace: Trace) -> list[Column]:
     halves = _halves(trace, "analysis")
     after = "after" if trace.terms or trace.verdict == "measurement" else "refit"
     columns = columns_of("before", trace.analysis, trace.residual, halves)
-    if len(trace.left) == len(trace.analysis) and not np.array_equal(trace.left, trace.residual):
-        columns += columns_of(after, trace.analysis, trace.left, halves)
+    if len(trace.unexplained) == len(trace.analysis) and not np.array_equal(trace.unexplained, trace.residual):
+        columns += columns_of(after, trace.analysis, trace.unexplained, halves)
     return columns
 
 
@@ -63,7 +63,7 @@ def _map_caption(trace: Trace, title: str, columns: list[Column]) -> str:
     split = (
         f" Each is split at the median of the first effect's fitted strength: an effect of {trace.terms[0].covariate} "
         f"differs between the halves, and can cancel in one map of all."
-        if trace.terms and trace.terms[0].form.drivers
+        if trace.terms and trace.terms[0].basis.drivers
         else ""
     )
     trust = (

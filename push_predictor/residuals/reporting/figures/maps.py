@@ -43,12 +43,12 @@ class Halves:
 
 def halves_of(strength: Strength | None, table: PushTable) -> Halves:
     """The windows where the fitted effect lies below its median, and the others: its sign differs between them."""
-    if strength is None or not strength.effect.form.drivers:
+    if strength is None or not strength.effect.basis.drivers:
         return Halves((np.ones(len(table), dtype=np.bool_),), ("",))
     values = strength.curve(table.covariates, len(table))[0]
     widest = values[:, int(np.argmax(values.std(axis=0)))]
     above = widest > np.median(widest)
-    return Halves((~above, above), _names(strength.effect.form, above, table))
+    return Halves((~above, above), _names(strength.effect.basis, above, table))
 
 
 def columns_of(title: str, table: PushTable, z: Array, halves: Halves) -> list[Column]:
@@ -98,11 +98,11 @@ def _cells(outline: Outline, columns: Sequence[Column]) -> Cells:
     return Cells(cells.contact, np.linspace(angle[0], angle[-1], len(cells.angle)))
 
 
-def _names(form: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str, str]:
-    name = form.drivers[0]
+def _names(basis: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str, str]:
+    name = basis.drivers[0]
     values = table.covariates[name]
     low, high = values[~above], values[above]
-    if len(form.drivers) == 1 and high.size and low.size and (low.max() <= high.min() or high.max() <= low.min()):
+    if len(basis.drivers) == 1 and high.size and low.size and (low.max() <= high.min() or high.max() <= low.min()):
         lower, upper = f"{name}: lower", f"{name}: higher"
         return (lower, upper) if low.max() <= high.min() else (upper, lower)
     return f"effect of {name}: lower", f"effect of {name}: higher"

@@ -23,16 +23,16 @@ LEAST_PUSHES = 3  # of a bin that is shown
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """n windows with what all effects leave, left (n, 3), in units of the prediction, and the whitener (n, 3, 3)."""
+    """n windows, their standardised residuals (n, 3) after all effects, and the whitener (n, 3, 3)."""
 
     table: PushTable
-    left: Array
+    unexplained: Array
     whitener: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """An effect as q parameters that its form drives.
+    """An effect as q parameters that its basis drives.
 
     pattern (p, q): of the mechanism's p responses. coefficients (q, m) and their covariance (q, m, m). share: part of
     the fitted coefficients that the pattern holds, 1 unless the mechanism is unknown.
@@ -48,7 +48,7 @@ class Strength:
 
     def curve(self, covariates: Mapping[str, Array], n: int) -> tuple[Array, Array]:
         """Fitted parameters (n, q) and half of their 95 % band (n, q)."""
-        values = self.effect.form.values(covariates, n)
+        values = self.effect.basis.values(covariates, n)
         variance = np.einsum("nm,qmk,nk->nq", values, self.covariance, values)
         return values @ self.coefficients.T, CENTRAL * np.sqrt(np.maximum(variance, 0.0))
 
@@ -66,9 +66,9 @@ class Binned:
 def analysis_rows(trace: Trace) -> Rows:
     """The analysis pushes: by the extended model, or by the deployed one less the effects where none was kept."""
     if trace.extended is not None:
-        evidence = evidence_of(trace.extended, trace.analysis, physics_of(trace.extended))
+        evidence = evidence_of(trace.extended, trace.analysis)
         return Rows(trace.analysis, evidence.z, evidence.whitener)
-    evidence = evidence_of(trace.model, trace.analysis, physics_of(trace.model))
+    evidence = evidence_of(trace.model, trace.analysis)
     shift = sum((shift_of(trace, term, trace.analysis) for term in trace.terms), np.zeros_like(evidence.residual))
     left = replace(evidence, residual=evidence.residual - shift)
     return Rows(trace.analysis, left.z, left.whitener)
@@ -88,7 +88,7 @@ def shift_of(trace: Trace, effect: Effect, table: PushTable) -> Array:
 
 def strength_of(effect: Effect, table: PushTable) -> Strength:
     """The effect's physical parameters; of an unknown mechanism its strongest pattern, 1 at its root mean square."""
-    m = columns_of(effect.form)
+    m = columns_of(effect.basis)
     coefficients = effect.coefficients.reshape(-1, m)
     p = len(coefficients)
     blocks = effect.covariance.reshape(p, m, p, m)
@@ -100,7 +100,7 @@ def strength_of(effect: Effect, table: PushTable) -> Strength:
     left, size, _ = np.linalg.svd(coefficients, full_matrices=False)
     u = left[:, 0]
     along = u @ coefficients
-    along_values = effect.form.values(table.covariates, len(table)) @ along
+    along_values = effect.basis.values(table.covariates, len(table)) @ along
     rms = max(float(np.sqrt(np.mean(along_values**2))), np.finfo(float).tiny)
     own = np.einsum("p,pmqk,q->mk", u, blocks, u)[None] / rms**2
     share = float(size[0] ** 2 / max(float(np.sum(size**2)), np.finfo(float).tiny))
@@ -123,7 +123,7 @@ def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: 
     place (n,): where on the axis a window lies. Windows of bin -1 and bins of fewer than three pushes are left out.
     """
     fitted = strength.curve(rows.table.covariates, len(rows.table))[0]
-    target = rows.left + np.einsum("nkq,nq->nk", response, fitted)
+    target = rows.unexplained + np.einsum("nkq,nq->nk", response, fitted)
     found = [_of_bin(target, response, rows.table.push_id, place, bins == b) for b in np.unique(bins[bins >= 0])]
     kept = [each for each in found if each is not None]
     q = response.shape[2]
@@ -135,7 +135,7 @@ def per_push(strength: Strength, rows: Rows, response: Array, place: Array) -> t
     """Of each push that tells anything: its place (k,) and every parameter (k, q) with the others as fitted."""
     _, push = np.unique(rows.table.push_id, return_inverse=True)
     times = np.bincount(push)
-    square, score = (_sums(push, values) for values in (_squares(response), _scores(response, rows.left)))
+    square, score = (_sums(push, values) for values in (_squares(response), _scores(response, rows.unexplained)))
     fitted = strength.curve(rows.table.covariates, len(rows.table))[0]
     mean = _sums(push, fitted) / times[:, None]
     telling = square >= 0.1 * np.median(square, axis=0)

@@ -139,9 +139,9 @@ def _bars(ax: Axes, means: Means, colour: str, marker: str, name: str | None = N
 
 def _design(trace: Trace, effect: Effect, rows: Rows) -> Array:
     push = Push(rows.table.inputs, rows.table.duration, rows.table.covariates)
-    return design_of(effect.mechanism, effect.form, physics_of(trace.model), push, effect.outcome_scale)
+    return design_of(effect.mechanism, effect.basis, physics_of(trace.model), push, effect.outcome_scale)
 
 
 def _residual(rows: Rows) -> Array:
     """What is left, in m, m, rad (n, 3)."""
-    return np.asarray(np.linalg.solve(rows.whitener, rows.left[:, :, None])[:, :, 0])
+    return np.asarray(np.linalg.solve(rows.whitener, rows.unexplained[:, :, None])[:, :, 0])

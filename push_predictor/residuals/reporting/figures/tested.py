@@ -42,7 +42,7 @@ def paint_tested(figure: Figure, trace: Trace) -> None:
 
 
 def best_of(tested: Sequence[Tested]) -> list[Tested]:
-    """One for each mechanism and driver, of the form with the smallest p; the smallest first."""
+    """One for each mechanism and driver, of the basis with the smallest p; the smallest first."""
     best: dict[tuple[str | None, str], Tested] = {}
     for each in sorted(tested, key=lambda t: t.p_value):
         best.setdefault((each.mechanism, each.covariate), each)

@@ -1,0 +1,76 @@
+"""A candidate: one mechanism whose strength depends on one covariate, as columns of a regression."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.evidence.inputs_basis import Kind
+from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
+from push_predictor.types import Array
+
+SPEED = "velocity"
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mechanism (None: the generic polynomial) whose strength depends on a covariate through one basis.
+
+    response (n, 3, p): standardised outcome per unit of the parameters. values (n, m): the basis at the windows.
+    nuisance (3 n, q): orthonormal columns that the candidate is projected off, see nuisance.py. nuisance_growing: the
+    same without the constant effect of the candidate's own mechanism. own: whether the covariate is a function of the
+    inputs of a learnt base, as the side is where the base folds none.
+    """
+
+    mechanism: str | None
+    covariate: str
+    basis: DriverBasis
+    response: Array
+    values: Array | None = None
+    nuisance: Array | None = None
+    nuisance_growing: Array | None = None
+    own: bool = False
+
+    @cached_property
+    def columns(self) -> Array:
+        """Standardised columns (n, 3, p * m), p first, projected off the nuisance."""
+        plain = self.plain
+        if self.nuisance is None:
+            return plain
+        flat = plain.reshape(len(self.nuisance), -1)
+        return np.asarray(flat - self.nuisance @ (self.nuisance.T @ flat)).reshape(plain.shape)
+
+    @property
+    def plain(self) -> Array:
+        """Standardised columns (n, 3, p * m), p first: the effect itself."""
+        if self.values is None:
+            return self.response
+        n = len(self.response)
+        return (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
+
+    @property
+    def kind(self) -> Kind:
+        """Whether the effect depends on another covariate, on the speed, or on the inputs alone."""
+        if self.covariate == CONSTANT or self.own:
+            return "constant"
+        return "speed" if self.covariate == SPEED else "driven"
+
+    @property
+    def grows(self) -> bool:
+        """Whether the effect starts at zero and includes the constant effect of its mechanism."""
+        return self.kind == "driven" and self.nuisance_growing is not None and self.nuisance is self.nuisance_growing
+
+    @property
+    def label(self) -> tuple[str | None, str]:
+        """Mechanism and covariate, whatever the basis."""
+        return self.mechanism, self.covariate
+
+
+def candidate(evidence: Evidence, mechanism: str | None, covariate: str, basis: DriverBasis) -> Candidate:
+    """One candidate on these windows, projected off nothing."""
+    values = basis.values(evidence.table.covariates, len(evidence.table))
+    return Candidate(mechanism, covariate, basis, whitened_response(evidence, mechanism), values)

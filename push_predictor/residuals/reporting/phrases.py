@@ -1,0 +1,121 @@
+"""The plain phrase for every mechanism, covariate and unit: identifiers belong in tables and JSON, not in prose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.request import UNITS
+from push_predictor.residuals.evidence.drivers import CONSTANT
+
+SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "°"), "s": (1e3, "ms"), "1": (1.0, "")}
+
+
+@dataclass(frozen=True)
+class MechanismPhrase:
+    """How prose names a mechanism: `noun` is what changes; `onset` is a clause for a change at one point, if apt."""
+
+    noun: str
+    onset: str = ""
+
+
+MECHANISMS: dict[str | None, MechanismPhrase] = {
+    None: MechanismPhrase("the slider's motion"),
+    "contact_friction": MechanismPhrase("contact friction"),
+    "contact_asymmetry": MechanismPhrase("the difference between contact friction to the left and to the right"),
+    "pressure_spread": MechanismPhrase("the spread of the slider's pressure on the table"),
+    "centre_of_friction": MechanismPhrase("the slider's centre of friction"),
+    "pushing_height": MechanismPhrase("the pushing height"),
+    "limit_surface_power": MechanismPhrase("the shape of the limit surface"),
+    "body_anisotropy": MechanismPhrase(
+        "direction-dependent friction of the slider", "the slider's friction became direction-dependent"
+    ),
+    "anisotropic_friction": MechanismPhrase(
+        "direction-dependent friction of the table", "the table's friction became direction-dependent"
+    ),
+    "friction_gradient": MechanismPhrase("the friction gradient across the table"),
+    "tilted_surface": MechanismPhrase("the tilt of the table"),
+    "inertia": MechanismPhrase("the slider's inertia"),
+    "pusher_radius": MechanismPhrase("the pusher's radius"),
+    "pusher_travel": MechanismPhrase("the distance that the pusher travels"),
+    "surface_friction": MechanismPhrase("the force needed to push the slider"),
+    "wrench_bias": MechanismPhrase("a bias of the force sensor"),
+    "clock_offset": MechanismPhrase("a clock offset between tracker and robot"),
+    "frame_rotation": MechanismPhrase("a rotation of the tracker's frame"),
+    "frame_shift": MechanismPhrase("a shift of the tracker's frame"),
+    "tool_offset": MechanismPhrase("an offset of the tool point"),
+}
+
+COVARIATES: dict[str, str] = {
+    "elapsed_time": "elapsed time",
+    "push_index": "push count",
+    "slid_distance": "distance slid",
+    "slider_x": "the slider's x position",
+    "slider_y": "the slider's y position",
+    "slider_heading": "the slider's heading",
+    "push_heading": "the push direction in the world",
+    "velocity": "pushing speed",
+    "contact": "contact point",
+    "angle": "push angle",
+    "edge": "side pushed",
+    "dwell_time": "dwell time before the push",
+    "time_since_contact": "time since first contact",
+    "contact_gap": "measured gap at the contact",
+    "normal_force": "normal force",
+    "tangential_force": "tangential force",
+    "previous_residual": "the residual of the previous push",
+    "recording": "recording",
+    "session": "session",
+    CONSTANT: "no covariate (constant)",
+}
+
+
+def mechanism_phrase(mechanism: str | None) -> str:
+    """A mechanism as a noun phrase; "an unknown mechanism" for None."""
+    if mechanism is None:
+        return "an unknown mechanism"
+    known = MECHANISMS.get(mechanism)
+    return known.noun if known else mechanism.replace("_", " ")
+
+
+def moved_noun(mechanism: str | None) -> str:
+    """What changes if a mechanism acts: a noun phrase to begin a sentence with."""
+    return MECHANISMS[None].noun if mechanism is None else mechanism_phrase(mechanism)
+
+
+def covariate_phrase(covariate: str) -> str:
+    """A covariate in words; a recorded topic by its name."""
+    if covariate.startswith("topic:"):
+        return f"topic {covariate.removeprefix('topic:')}"
+    return COVARIATES.get(covariate, covariate.replace("_", " "))
+
+
+def effect_phrase(mechanism: str | None, covariate: str) -> str:
+    """An effect as a noun phrase: mechanism and covariate."""
+    if covariate == CONSTANT:
+        return f"{mechanism_phrase(mechanism)} (constant)"
+    return f"{mechanism_phrase(mechanism)} (depends on {covariate_phrase(covariate)})"
+
+
+def listed(phrases: Sequence[str]) -> str:
+    """Phrases as a list in a sentence."""
+    *first, last = phrases
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def capitalised(text: str) -> str:
+    """A text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]
+
+
+def unit_of(covariate: str) -> str:
+    """The unit of a covariate, empty if none is known."""
+    return UNITS.get(covariate, "")
+
+
+def with_unit(covariate: str) -> str:
+    """A covariate with its unit, for the axis of a picture or the head of a table."""
+    unit, phrase = unit_of(covariate), capitalised(covariate_phrase(covariate))
+    return f"{phrase} ({unit})" if unit else phrase

@@ -1,0 +1,194 @@
+"""Choice of one term among the significant candidates: its covariate, its basis and its mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+
+from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.evidence.drivers import LOCAL
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
+from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.basis_choice import simplest_basis
+from push_predictor.residuals.selection.cross_validation import Judged, fit, judge
+from push_predictor.residuals.selection.naming import (
+    MOST_UNEXPLAINED,
+    Case,
+    Naming,
+    open_rivals,
+    plausible,
+    unexplained_share,
+)
+from push_predictor.residuals.selection.screening import Screened
+from push_predictor.types import Array
+
+NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that is fixed to body or world does not grow with these
+MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
+MOST_REFINED = 12  # of the labels, those that are tried in every basis
+MOST_NAMED = 5  # mechanisms along the covariate, best first, that are tried as its name
+FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
+
+
+@dataclass(frozen=True, eq=False)
+class SelectedTerm:
+    """A selected candidate with its fit and its rivals.
+
+    rivals: all that these data do not reject, the best first. p_value: family-wise. share: of the sum of squares of the
+    standardised residual that the term explains. own: whether the term lies in the inputs of a learnt base, so that a
+    refit learns it.
+    """
+
+    best: Candidate
+    rivals: tuple[Judged, ...]
+    p_value: float
+    coefficients: Array
+    share: float
+    naming: Naming
+    own: bool
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that the term shifts."""
+        shift = self.best.columns @ self.coefficients
+        size = np.sqrt(np.mean((shift - shift.mean(axis=0) * (self.best.kind != "constant")) ** 2, axis=0))
+        return tuple(name for name, felt in zip(OUTPUTS, size >= FELT * size.max(), strict=True) if felt)
+
+
+@dataclass(frozen=True, eq=False)
+class TermChoice:
+    """Chooses terms among these candidates on these windows."""
+
+    evidence: Evidence
+    candidates: tuple[Candidate, ...]
+    inputs: InputsBasis
+    seed: int
+
+    @cached_property
+    def residualizers(self) -> dict[Kind, Residualizer]:
+        """Regression on the inputs, by kind of candidate."""
+        return {kind: Residualizer(controls_for(kind, self.inputs)) for kind in get_args(Kind)}
+
+    def own(self, candidate: Candidate) -> bool:
+        """Whether a candidate lies in inputs that the base model has."""
+        return candidate.kind == "constant" or (candidate.kind == "speed" and self.inputs.knows_speed)
+
+    def best_gain(self, found: Sequence[int], screened: Screened, z: Array) -> float:
+        """Largest cross-validated gain among the candidates with the largest statistics."""
+        best = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_NAMED]
+        return max(self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best)
+
+    def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> SelectedTerm:
+        """The best of the candidates found, named; covariates of earlier terms, used, are preferred if they fit."""
+        chosen = self._not_constant(sorted(found, key=lambda k: -screened.statistic[k])[:MOST_JUDGED])
+        growing = self._growing(found)
+        judged = self._refined([_if_growing(self.candidates[k], growing) for k in chosen], z)
+        rivals = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
+        driver = next((j for j in rivals if j.candidate.covariate in used), judged[0]).candidate.covariate
+        best, naming = self._named(judged, driver, z, growing)
+        drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in rivals)]))
+        labels = {j.candidate.label for j in judged}
+        along = [k for k in chosen if self.candidates[k].label in labels and self.candidates[k].covariate == driver]
+        p_value = min(float(screened.p_value[k]) for k in along)
+        return self._fitted(best, rivals, p_value, replace(naming, drivers=drivers), z)
+
+    def _growing(self, found: Sequence[int]) -> set[str]:
+        """Mechanisms found both constant, though no base can have the effect, and changing with a covariate."""
+        labels = [(self.candidates[k].mechanism, self.candidates[k]) for k in found]
+        constant = {name for name, c in labels if name is not None and _is_constant(c)}
+        return constant & {name for name, c in labels if name is not None and c.covariate not in NOT_GROWING}
+
+    def _not_constant(self, found: Sequence[int]) -> list[int]:
+        """Without the constant effects of growing mechanisms: they are part of the growing effect."""
+        growing = self._growing(found)
+        return [k for k in found if not (_is_constant(c := self.candidates[k]) and c.mechanism in growing)]
+
+    def _case(self, judged: Judged, z: Array) -> Case:
+        return Case(z, controls_for(judged.candidate.kind, self.inputs), self.evidence.block)
+
+    def _refined(self, candidates: Sequence[Candidate], z: Array) -> list[Judged]:
+        """The best candidates by gain, each label once, in their simplest adequate basis."""
+        kinds = {c.kind for c in candidates}
+        judged = [j for kind in kinds for j in self._judge([c for c in candidates if c.kind == kind], kind, z)]
+        first = _one_each(sorted(judged, key=lambda j: -j.gain), None, "label")[:MOST_REFINED]
+        return sorted((self._with_simplest_basis(j.candidate, z) for j in first), key=lambda j: -j.gain)
+
+    def _judge(self, candidates: Sequence[Candidate], kind: Kind, z: Array) -> list[Judged]:
+        return judge(candidates, z, controls_for(kind, self.inputs), self.evidence.block)
+
+    def _with_simplest_basis(self, candidate: Candidate, z: Array) -> Judged:
+        controls = controls_for(candidate.kind, self.inputs)
+        return simplest_basis(candidate, self.evidence.table, z, controls, self.evidence.block)
+
+    def _named(self, judged: Sequence[Judged], driver: str, z: Array, growing: set[str]) -> tuple[Judged, Naming]:
+        """The best mechanism along a covariate, if any fits; else the generic polynomial."""
+        by_gain = self._along(judged, driver, z, growing)
+        known = [
+            j
+            for j in by_gain
+            if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j.candidate, self._case(j, z))
+        ]
+        generics = self._generics(driver, known[0].candidate.basis if known else None, z)
+        unexplained = {id(j): self._unexplained(j, generics, z) for j in known[:MOST_NAMED]}
+        fitting = [j for j in known[:MOST_NAMED] if unexplained[id(j)] <= MOST_UNEXPLAINED]
+        if not fitting and generics:
+            best = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
+            return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0))
+        fitting = fitting or known[:1] or by_gain[:1]  # the last two if there is no generic candidate
+        best = fitting[0]
+        rivals = open_rivals(best, fitting[1:], self._case(best, z), self.seed)
+        mechanisms = tuple(j.candidate.mechanism for j in rivals)
+        return best, Naming((driver,), mechanisms, True, unexplained.get(id(best), 0.0))
+
+    def _along(self, judged: Sequence[Judged], driver: str, z: Array, growing: set[str]) -> list[Judged]:
+        """Every candidate of a covariate in its simplest adequate basis, by gain."""
+        first = {c.label: c for c in reversed(self.candidates)}
+        along = [_if_growing(c, growing) for c in first.values() if c.covariate == driver]
+        refined = {j.candidate.label: j for j in judged}
+        each = (refined.get(c.label) or self._with_simplest_basis(c, z) for c in along)
+        return sorted(each, key=lambda j: -j.gain)
+
+    def _unexplained(self, mechanism: Judged, generics: Sequence[Candidate], z: Array) -> float:
+        case = self._case(mechanism, z)
+        return max((unexplained_share(mechanism, generic, case, self.seed) for generic in generics), default=0.0)
+
+    def _generics(self, driver: str, basis: DriverBasis | None, z: Array) -> list[Candidate]:
+        """The generic polynomial along a covariate: in the mechanism's basis, or in all screening bases."""
+        same = [c for c in self.candidates if c.mechanism is None and c.covariate == driver]
+        if same and basis is not None and basis.drivers:
+            return [replace(same[0], basis=basis, values=basis.values(self.evidence.table.covariates, len(z)))]
+        return same or [c for c in self.candidates if c.mechanism is None and c.kind == "constant"]
+
+    def _fitted(self, best: Judged, rivals: Sequence[Judged], p_value: float, naming: Naming, z: Array) -> SelectedTerm:
+        chosen, residualizer = best.candidate, self.residualizers[best.candidate.kind]
+        residual, columns = residualizer(z), residualizer(chosen.columns)
+        coefficients = fit(columns, residual)
+        share = 1.0 - float(np.sum((residual - columns @ coefficients) ** 2) / np.sum(residual**2))
+        others = tuple(j for j in rivals if j.candidate.label != chosen.label)
+        own = self.inputs.learnt and self.own(chosen)
+        return SelectedTerm(chosen, (best, *others), p_value, coefficients, share, naming, own)
+
+
+def _is_constant(candidate: Candidate) -> bool:
+    return candidate.kind == "driven" and candidate.basis.name == "constant"
+
+
+def _if_growing(candidate: Candidate, growing: set[str]) -> Candidate:
+    """A candidate of a growing mechanism, with the constant effect of that mechanism included."""
+    driven = candidate.mechanism in growing and not _is_constant(candidate)
+    return replace(candidate, nuisance=candidate.nuisance_growing) if driven else candidate
+
+
+def _one_each(judged: Sequence[Judged], best: Judged | None, what: Literal["covariate", "label"]) -> list[Judged]:
+    """The first of each covariate (or label), without that of the best."""
+    first: dict[object, Judged] = {}
+    for each in judged:
+        first.setdefault(getattr(each.candidate, what), each)
+    return [j for key, j in first.items() if best is None or key != getattr(best.candidate, what)]
