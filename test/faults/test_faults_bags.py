@@ -93,7 +93,7 @@ def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused_before_it_does(bag
     held = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(messages) > 1000
-    assert any(f"at byte {chunk}: a chunk was skipped: a chunk does not hold the " in note for note in notes)
+    assert any(f"at byte {chunk}: a chunk was skipped: a chunk does not contain the " in note for note in notes)
     assert held < 1 << 21  # with the messages that this test keeps
 
 
@@ -246,7 +246,7 @@ def test_the_checksum_of_the_whole_data_is_checked_where_it_was_written(tmp_path
     path.write_bytes(data)
     messages, notes = told(path)
     assert len(messages) == 100
-    assert notes == [f"{path} at byte {end}: the checksum of all that stands before is wrong, it is damaged somewhere"]
+    assert notes == [f"{path} at byte {end}: the checksum of the data is wrong; they are damaged somewhere before it"]
 
 
 def test_one_damaged_file_of_several_leaves_the_others_in_use(tmp_path: Path) -> None:
@@ -277,7 +277,7 @@ def test_a_file_that_is_damaged_everywhere_is_read_in_time_and_does_not_fill_the
     messages, notes = told(path)
     assert messages == []
     assert len(notes) < 100
-    assert notes[-1] == f"{path}: more is damaged than is told here"
+    assert notes[-1] == f"{path}: further damage is not listed"
 
 
 def test_commands_end_with_0_or_1_and_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""MCAP files and rosbag2 folders as raw messages, also where they are damaged.
+"""MCAP files and rosbag2 folders as raw messages; damaged files are read as far as possible.
 
 Import `reader`, `writer`, `metadata`, `cdr` and `definitions`; the `mcap_*` modules are the layers below `reader`.
 """

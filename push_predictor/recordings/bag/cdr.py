@@ -1,7 +1,7 @@
 """Columns of numbers to and from CDR messages (XCDR1, either byte order), many at a time.
 
-A message here is an optional std_msgs/Header (stamp, frame_id) and then numbers of one size. Numbers stand aligned
-to their size, counted from the fourth byte; so the length of frame_id moves them.
+A message here is an optional std_msgs/Header (stamp, frame_id), followed by numbers of one size. Numbers are aligned to
+their size, counted from the fourth byte, so their position depends on the length of frame_id.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Layout:
-    """header: does a std_msgs/Header come first? count numbers of size bytes (8 or 4) follow; more are ignored."""
+    """A message type: header: starts with a std_msgs/Header; then `count` numbers of `size` bytes (8 or 4)."""
 
     header: bool
     count: int
     size: int = 8
 
     def start(self, frame_length: int) -> int:
-        """The byte where the numbers start, when frame_id takes frame_length bytes with its closing zero."""
+        """The byte at which the numbers start; frame_length: bytes of frame_id with its closing zero."""
         end = _FRAME + frame_length - _PREFIX if self.header else 0
         return _PREFIX + -(-end // self.size) * self.size
 
@@ -40,9 +40,9 @@ WRENCH_STAMPED = Layout(header=True, count=6)
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """n messages: stamp (n,) in ns, zero without a header; values (n, count); valid (n,): could it be read?
+    """n decoded messages.
 
-    frames: the frame_ids that occur.
+    stamp (n,) in ns, zero without a header; values (n, count); valid (n,): readable; frames: frame_ids found.
     """
 
     stamp: IntArray
@@ -52,7 +52,7 @@ class Columns:
 
 
 def decode(messages: Sequence[bytes], layout: Layout) -> Columns:
-    """Read messages of one type. One that is too short or not XCDR1 is not valid, its row is zero."""
+    """Decode messages of one type. A message that is too short or not XCDR1 is not valid and has a row of zeros."""
     n = len(messages)
     stamp, values, valid = np.zeros(n, np.int64), np.zeros((n, layout.count)), np.zeros(n, bool)
     frames: set[str] = set()
@@ -71,9 +71,9 @@ def decode(messages: Sequence[bytes], layout: Layout) -> Columns:
 
 
 def encode(stamp: IntArray, values: Array, layout: Layout, frame_id: str = "world") -> list[bytes]:
-    """Write one little-endian message a row of values (n, count); stamp (n,) in ns is not used without a header.
+    """Encode one little-endian message per row of values (n, count); stamp (n,) in ns is unused without a header.
 
-    Raises ValueError for a stamp outside what builtin_interfaces/Time holds.
+    Raises ValueError for a stamp outside the range of builtin_interfaces/Time.
     """
     text = frame_id.encode() + b"\0"
     start = layout.start(len(text))
@@ -98,7 +98,7 @@ def frame_of(message: bytes) -> str:
 def _header_words(stamp: IntArray, frame_length: int) -> bytes:
     seconds, nanoseconds = np.divmod(np.asarray(stamp, np.int64), _NANO)
     if np.any((seconds < -(2**31)) | (seconds >= 2**31)):
-        raise ValueError("a header stamp holds seconds of 32 bits")
+        raise ValueError("a header stamp is outside seconds of 32 bits")
     words = np.stack([seconds, nanoseconds, np.full_like(seconds, frame_length)], axis=1)
     return words.astype("<u4").tobytes()
 

@@ -1,4 +1,4 @@
-"""What rosbag2 may compress on top of MCAP: whole files or single messages, with zstd."""
+"""Decompression of what rosbag2 compresses in addition to MCAP: whole files or single messages, with zstd."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import zstandard
 from push_predictor.errors import RecordingError
 
 ENDING = ".zstd"
-LARGEST_MESSAGE = 1 << 28  # bytes: a bag from outside must not fill the memory
-_BELIEVED = 1 << 20  # bytes: a message that tells of more is unpacked piece by piece
-_PIECE, _PACKED_PIECE = 1 << 15, 1 << 10  # small: what stands before damage in one piece with it is lost
+LARGEST_MESSAGE = 1 << 28  # bytes; a foreign bag must not exhaust the memory
+_AT_ONCE = 1 << 20  # bytes; a message that claims more is decompressed in pieces
+_PIECE, _COMPRESSED_PIECE = 1 << 15, 1 << 10  # bytes; small, because data before damage in the same piece are lost
 
 
 def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
-    """NAME.mcap in the folder, unpacked from NAME.mcap.zstd; a file of another ending is used as it is.
+    """NAME.mcap in the folder, decompressed from NAME.mcap.zstd; a file with another suffix is returned unchanged.
 
-    Of a damaged one, what stands before the damage, and a note; it takes at most half of the disk that is free.
-    Raises RecordingError if nothing can be unpacked.
+    A damaged file is decompressed up to the damage, with a note. The result uses at most half of the free disk space.
+    Raises RecordingError if nothing can be decompressed.
     """
     if file.suffix != ENDING:
         return file
@@ -27,35 +27,35 @@ def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
     try:
         _unpack(file, target, notes)
     except OSError as error:
-        raise RecordingError(f"{file}: cannot be unpacked ({error})") from None
+        raise RecordingError(f"{file}: cannot be decompressed ({error})") from None
     if not target.stat().st_size:
-        raise RecordingError(f"{file}: cannot be unpacked ({notes.pop() if notes else 'it is empty'})")
+        raise RecordingError(f"{file}: cannot be decompressed ({notes.pop() if notes else 'it is empty'})")
     return target
 
 
 def unpack_message(data: bytes) -> bytes:
-    """The message in a zstd frame. Raises zstandard.ZstdError if there is none or it is too large."""
+    """The message in a zstd frame. Raises zstandard.ZstdError for another frame or a message that is too large."""
     size = zstandard.frame_content_size(data)
     if not 0 <= size <= LARGEST_MESSAGE:
         raise zstandard.ZstdError(f"a message without a size, or larger than {LARGEST_MESSAGE} bytes")
-    if size <= _BELIEVED:
+    if size <= _AT_ONCE:
         return bytes(zstandard.ZstdDecompressor().decompress(data))
     reader, found = zstandard.ZstdDecompressor().stream_reader(data), bytearray()
     while len(found) <= size and (piece := reader.read(_PIECE)):
         found += piece
     if len(found) != size:
-        raise zstandard.ZstdError(f"a message does not hold the {size} bytes it tells of")
+        raise zstandard.ZstdError(f"a message does not contain the {size} bytes that it claims")
     return bytes(found)
 
 
 def _unpack(file: Path, target: Path, notes: list[str]) -> None:
     allowed = shutil.disk_usage(target.parent).free // 2
     with file.open("rb") as packed, target.open("wb") as unpacked:
-        reader = zstandard.ZstdDecompressor().stream_reader(packed, _PACKED_PIECE, read_across_frames=True)
+        reader = zstandard.ZstdDecompressor().stream_reader(packed, _COMPRESSED_PIECE, read_across_frames=True)
         try:
             while piece := reader.read1(_PIECE):
                 if unpacked.tell() + len(piece) > allowed:
-                    raise zstandard.ZstdError(f"it unpacks to more than {allowed} bytes, half of what is free")
+                    raise zstandard.ZstdError(f"it needs more than {allowed} bytes, half of the free disk space")
                 unpacked.write(piece)
         except zstandard.ZstdError as error:
-            notes.append(f"{file} at byte {packed.tell()}, or just before: cannot be unpacked ({error})")
+            notes.append(f"{file} at byte {packed.tell()}, or just before: cannot be decompressed ({error})")

@@ -1,4 +1,4 @@
-"""The message types that a recording is made of: definition text, hash, byte layout."""
+"""The message types of a recording: definition text, hash, byte layout."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _XYZ = "float64 x\nfloat64 y\nfloat64 z\n"
 
 @dataclass(frozen=True)
 class MessageType:
-    """name: package/msg/Name; definition: ros2msg, with all that it refers to; type_hash: REP 2016."""
+    """name: package/msg/Name; definition: ros2msg text with all referenced types; type_hash: REP 2016."""
 
     name: str
     definition: str

@@ -1,4 +1,4 @@
-"""One MCAP file, raw and in file order: what can be read is given, what is damaged is noted."""
+"""One MCAP file as raw messages in file order; damage becomes notes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from mcap.records import MetadataIndex
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.bag.mcap_described import Described, Wanted
+from push_predictor.recordings.bag.mcap_descriptions import Descriptions, Wanted
 from push_predictor.recordings.bag.mcap_places import Place, data_checksum_is_wrong, places
 from push_predictor.recordings.bag.mcap_records import (
     CHUNK_HEAD_SIZE,
@@ -33,10 +33,10 @@ from push_predictor.recordings.bag.mcap_summary import (
     read_summary,
 )
 
-MOST_NOTES = 50  # a file can have a million damaged places
+MOST_NOTES = 50  # a file can have a million damaged records
 _FOREIGN = {
-    b"#ROSBAG": "a ROS 1 bag: `push_predictor import rosbag1` makes a recording of it",
-    b"SQLite format 3": "a sqlite3 bag: `ros2 bag convert` makes an MCAP bag of it",
+    b"#ROSBAG": "a ROS 1 bag: convert it with `push_predictor import rosbag1`",
+    b"SQLite format 3": "a sqlite3 bag: convert it with `ros2 bag convert`",
 }
 
 
@@ -54,23 +54,23 @@ class McapFile:
 
     topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if
     unknown}; metadata: {record name: {key: value}}; notes: damage found so far, with file and byte offset
-    (opening reads the summary, messages() the rest). unpack makes CDR of a message that was packed by itself and
-    raises one of UNREADABLE where it cannot; name is the file's in notes, if not its path.
+    (opening reads the summary, messages() the rest). unpack decompresses a single message to CDR and raises one of
+    UNREADABLE if it cannot; name: of the file in notes, by default its path.
 
     Raises RecordingError for a file that is empty or not MCAP.
     """
 
     def __init__(self, path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> None:
         self.path = path
-        self._described = described = Described(self._note)
-        self.topics, self.schemas = described.topics, described.schemas
-        self.qos, self.metadata = described.qos, described.metadata
+        self._descriptions = descriptions = Descriptions(self._note)
+        self.topics, self.schemas = descriptions.topics, descriptions.schemas
+        self.qos, self.metadata = descriptions.qos, descriptions.metadata
         self.notes: list[str] = []
         self._name = name or str(path)
         self._unpack = unpack
-        self._listed: int | None = None  # messages, as the summary counts them
-        self._chunks: list[int] = []  # where they start, if a checksum vouches for it
-        self._compared = False
+        self._listed: int | None = None  # number of messages in the summary
+        self._chunks: list[int] = []  # their offsets, if verified by a checksum
+        self._end_checked = False
         self._size = _checked_size(path, self._name)
         self._footer: Footer | None = None
         if not self._read_end():
@@ -78,23 +78,23 @@ class McapFile:
                 pass
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note.
+        """CDR messages in file order, of all topics or of the given ones; damage becomes a note.
 
         One chunk at a time is in memory.
         """
-        wanted = self._described.wanted(topics, self._described.channels.values())
+        wanted = self._descriptions.wanted(topics, self._descriptions.channels.values())
         seen = 0
         chunks: list[int] = []
         with self.path.open("rb") as stream:
             for place in places(stream, self._size, self._chunks, self._footer is not None, self._note):
                 if place.opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                    self._compare(stream, place, chunks)
+                    self._check_end(stream, place, chunks)
                     break
                 if place.opcode == Opcode.CHUNK:
                     chunks.append(place.offset)
                 seen += yield from self._decoded(self._content(stream, place), place, topics, wanted)
         if self._listed not in (None, seen):
-            self._note(self._size, f"{seen} messages were found, the summary counts {self._listed}")
+            self._note(self._size, f"{seen} messages were found, the summary lists {self._listed}")
 
     def _content(self, stream: BinaryIO, place: Place) -> Bytes:
         """The records at a place."""
@@ -113,9 +113,9 @@ class McapFile:
     def _decoded(
         self, content: Bytes, place: Place, topics: Collection[str] | None, wanted: Wanted
     ) -> Generator[RawMessage, None, int]:
-        """The wanted messages in a run of records, and how many messages there are in all.
+        """Yield the wanted messages of consecutive records and return the number of all messages.
 
-        Channels, schemas and metadata on the way are kept.
+        The channels, schemas and metadata among the records are stored.
         """
         seen = unpackable = 0
         view = memoryview(content)
@@ -134,12 +134,12 @@ class McapFile:
                             yield RawMessage(*found, log_time, data)
                     else:
                         self._check_unwanted(number, topics, place.offset)
-                elif channel := self._described.register(opcode, content, start, end, place.offset):
-                    wanted.update(self._described.wanted(topics, [channel]))
+                elif channel := self._descriptions.register(opcode, content, start, end, place.offset):
+                    wanted.update(self._descriptions.wanted(topics, [channel]))
         except UNREADABLE as error:
             self._note(place.offset, f"a record cannot be read ({error or type(error).__name__})")
         if unpackable:
-            self._note(place.offset, f"{unpackable} messages cannot be unpacked and were dropped")
+            self._note(place.offset, f"{unpackable} messages cannot be decompressed and were skipped")
         return seen
 
     def _unpacked(self, data: memoryview) -> bytes | None:
@@ -151,14 +151,14 @@ class McapFile:
             return None
 
     def _check_unwanted(self, channel: int, topics: Collection[str] | None, offset: int) -> None:
-        """Nobody asked for the message; or it cannot be given, which must not pass in silence."""
-        if (known := self._described.channels.get(channel)) is None:
-            self._note(offset, f"channel {channel} is not described, its messages were dropped")
+        """Note a message that is wanted but cannot be decoded; others are ignored."""
+        if (known := self._descriptions.channels.get(channel)) is None:
+            self._note(offset, f"channel {channel} has no description; its messages were skipped")
         elif topics and known.topic in topics:
             self._note(offset, f"{known.topic} is encoded as {known.message_encoding!r}, cdr is accepted")
 
     def _read_end(self) -> bool:
-        """Topics and metadata by the summary. False if it is absent, damaged or incomplete."""
+        """Read topics and metadata from the summary. False if it is absent, damaged or incomplete."""
         with self.path.open("rb") as stream:
             self._footer = footer = read_footer(stream, self._size)
             if footer is None:
@@ -170,55 +170,55 @@ class McapFile:
                     return False
                 return self._use(stream, read_summary(stream, footer, footer.start))
             except UNREADABLE as error:
-                self._note(footer.start or footer.offset, f"{error or type(error).__name__}, the file is read through")
+                self._note(footer.start or footer.offset, f"{error or type(error).__name__}; the whole file is read")
                 return False
 
     def _use(self, stream: BinaryIO, summary: Summary) -> bool:
-        """Keep what a summary tells. Is that all that a reader must know?"""
+        """Store a summary's descriptions; returns whether they are complete."""
         if (statistics := summary.statistics) is not None:
             self._listed = statistics.message_count
-        if statistics is None or not summary.verified:  # the descriptions before the data are as good or better
+        if statistics is None or not summary.verified:  # the descriptions before the data are at least as good
             return False
         self._chunks = summary.chunks
         for schema in summary.schemas:
-            self._described.add_schema(schema)
+            self._descriptions.add_schema(schema)
         for channel in summary.channels:
-            self._described.add_channel(channel, self._size)
+            self._descriptions.add_channel(channel, self._size)
         read = sum(self._use_metadata(stream, place) for place in summary.metadata)
-        complete = statistics.channel_count == len(self._described.channels)
+        complete = statistics.channel_count == len(self._descriptions.channels)
         return bool(complete and statistics.metadata_count == read)
 
     def _use_metadata(self, stream: BinaryIO, place: MetadataIndex) -> bool:
         try:
             record = read_metadata(stream, place, self._size)
         except UNREADABLE as error:
-            self._note(place.offset, f"{error or type(error).__name__}, a metadata record should be there")
+            self._note(place.offset, f"{error or type(error).__name__}; a metadata record is expected there")
             return False
         self.metadata[record.name] = record.metadata
         return True
 
-    def _compare(self, stream: BinaryIO, place: Place, chunks: list[int]) -> None:
-        """At the data's end: is all there that the checksum and the summary tell of?"""
-        if self._compared or place.opcode != Opcode.DATA_END:
+    def _check_end(self, stream: BinaryIO, place: Place, chunks: list[int]) -> None:
+        """At the end of the data, compare them with their checksum and with the summary."""
+        if self._end_checked or place.opcode != Opcode.DATA_END:
             return
         end = place.offset
-        self._compared = True
+        self._end_checked = True
         if data_checksum_is_wrong(stream, end):
-            self._note(end, "the checksum of all that stands before is wrong, it is damaged somewhere")
+            self._note(end, "the checksum of the data is wrong; they are damaged somewhere before it")
         if self._footer is None or self._footer.start in (0, end + DATA_END_SIZE):
             return
-        try:  # bytes were lost or came in: the summary still tells where the chunks were
+        try:  # bytes were lost or inserted; the summary still lists the offsets of the chunks
             listed = read_summary(stream, self._footer, end + DATA_END_SIZE).chunks
         except UNREADABLE:
             return
         if moved := [place for place, found in zip_longest(listed, chunks) if place != found]:
-            there = f"{len(chunks)} chunks are there, the summary lists {len(listed)}"
-            self._note(moved[0] or self._size, f"a chunk was there that is missing or has moved; {there}")
+            there = f"{len(chunks)} chunks were found, the summary lists {len(listed)}"
+            self._note(moved[0] or self._size, f"a chunk is missing or has moved; {there}")
 
     def _note(self, offset: int, what: str) -> None:
         text = f"{self._name} at byte {offset}: {what}"
         if len(self.notes) >= MOST_NOTES:
-            text = f"{self._name}: more is damaged than is told here"
+            text = f"{self._name}: further damage is not listed"
         if text not in self.notes:
             self.notes.append(text)
 

@@ -1,4 +1,4 @@
-"""Where the records of an MCAP file's data section lie: their heads are read and doubted, their contents are not."""
+"""Locate the records in an MCAP file's data section; their heads are validated, their contents are not read."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from push_predictor.recordings.bag.mcap_records import CHUNK_HEAD_SIZE, HEAD, MA
 _ENDS = {(Opcode.DATA_END, 4), (Opcode.FOOTER, 20)}
 _READ = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.METADATA})
 _SKIPPED = frozenset({Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT})
-_LARGE = 1 << 16  # bytes: a record of doubtful length is not read if it takes more
-_WITH_LENGTHS = frozenset({Opcode.CHUNK, Opcode.MESSAGE_INDEX})  # they tell their length twice, _fault compares
+_LARGE = 1 << 16  # bytes; a longer record with a doubtful length is not read
+_WITH_LENGTHS = frozenset({Opcode.CHUNK, Opcode.MESSAGE_INDEX})  # contain their length twice, _fault compares them
 _MESSAGE_INDEX = struct.Struct("<HI")
 _PIECE = 1 << 16
 
@@ -24,7 +24,7 @@ Note = Callable[[int, str], None]
 
 
 class Place(NamedTuple):
-    """A record: where its head starts, the bytes after the head; whole: False for a chunk that the file's end cuts."""
+    """A record: offset of its head, length after the head; whole: False for a chunk cut by the end of the file."""
 
     opcode: int
     offset: int
@@ -33,16 +33,16 @@ class Place(NamedTuple):
 
     @property
     def end(self) -> int:
-        """Where the next one starts."""
+        """Offset of the next record."""
         return self.offset + HEAD.size + self.length
 
 
 def places(stream: BinaryIO, size: int, chunks: Sequence[int], closed: bool, note: Note) -> Iterator[Place]:
-    """Records to read, in file order, up to and with the one that ends the data; damage is noted at its offset.
+    """Records to read, in file order, up to and including the end of the data; damage is noted at its offset.
 
-    chunks: where chunks are known to start, in order. There reading goes on after a record whose length cannot be
-    believed; where nothing is known it ends. closed: does the file end as it should? Then a chunk that goes beyond the
-    end was not cut off: bytes are missing in it, and what follows them would be read for something else.
+    chunks: known offsets of chunks, in order. After a record with an invalid length, reading continues at the next of
+    them, and ends without one. closed: whether the file has a valid end. Then a chunk that extends beyond the end is
+    not cut off; bytes within it are missing, and the data after them would be misread.
     """
     offset = len(MAGIC)
     while offset < size:
@@ -53,36 +53,36 @@ def places(stream: BinaryIO, size: int, chunks: Sequence[int], closed: bool, not
         passed = bisect_right(chunks, offset)
         following = next((place for place in chunks[passed : passed + 2] if _is_chunk(stream, place, size)), 0)
         if place.end > size and not following:
-            note(offset, f"damaged or cut off, {size - offset} bytes from there are lost in part")
+            note(offset, f"damaged or cut off; some of the {size - offset} bytes from there on are lost")
             if place.opcode == Opcode.CHUNK and not closed and not _chunk_fault(stream, place):
                 yield place._replace(whole=False)
             return
         is_chunk = passed > 0 and chunks[passed - 1] == offset
         fault = _fault(stream, place, is_chunk, following)
         sure = place.opcode in _WITH_LENGTHS or place.end in chunks[passed : passed + 1]
-        believed = not fault and (sure or _begins_record(stream, place.end))
-        if not believed:
+        valid = not fault and (sure or _begins_record(stream, place.end))
+        if not valid:
             note(offset, fault or f"the record there or the one after it, at byte {place.end}, is damaged")
-        if place.opcode in _READ and (believed or (not fault and place.length <= _LARGE)):
+        if place.opcode in _READ and (valid or (not fault and place.length <= _LARGE)):
             yield place
         fits = place.end <= (following or size) and _begins_record(stream, place.end)
-        offset = place.end if believed or fits else following
+        offset = place.end if valid or fits else following
         if not offset:
             return
-    note(size, "the file was not closed, what it holds is used")
+    note(size, "the file was not closed; its contents are used")
 
 
 def data_checksum_is_wrong(stream: BinaryIO, end: int) -> bool:
-    """Does what stands before the record that ends the data, at end, have another checksum than it tells?"""
+    """Whether the data before the data-end record, at offset `end`, have another checksum than it states."""
     stream.seek(end + HEAD.size)
-    told = int.from_bytes(stream.read(4), "little")
-    if told == 0:  # nobody computed one
+    stated = int.from_bytes(stream.read(4), "little")
+    if stated == 0:  # none was computed
         return False
     stream.seek(0)
     found = 0
     for begin in range(0, end, _PIECE):
         found = zlib.crc32(stream.read(min(_PIECE, end - begin)), found)
-    return found != told
+    return found != stated
 
 
 def _place(stream: BinaryIO, offset: int) -> Place:
@@ -92,18 +92,18 @@ def _place(stream: BinaryIO, offset: int) -> Place:
 
 
 def _fault(stream: BinaryIO, place: Place, is_chunk: bool, following: int) -> str:
-    """Why a record that ends within the file cannot be one; empty if it can."""
+    """The fault of a record that ends within the file, empty without one."""
     if following and place.end > following:
-        return f"a record of {place.length} bytes reaches beyond byte {following}, where a chunk starts: skipped"
+        return f"a record of {place.length} bytes reaches beyond byte {following}, where a chunk starts; skipped"
     if is_chunk and place.opcode != Opcode.CHUNK:
-        return "a chunk should start there, it was skipped"
+        return "a chunk is expected there, the record was skipped"
     if place.opcode == Opcode.CHUNK:
         return _chunk_fault(stream, place)
     if place.opcode == Opcode.MESSAGE_INDEX:
         return _index_fault(stream, place)
     if place.opcode in _READ | _SKIPPED or (place.opcode == Opcode.HEADER and place.offset == len(MAGIC)):
         return ""
-    return f"a record of kind {place.opcode:#04x} has no place there, it was skipped"
+    return f"a record of kind {place.opcode:#04x} is not allowed there and was skipped"
 
 
 def _is_chunk(stream: BinaryIO, offset: int, size: int) -> bool:
@@ -121,7 +121,7 @@ def _chunk_fault(stream: BinaryIO, place: Place) -> str:
 
 
 def _index_fault(stream: BinaryIO, place: Place) -> str:
-    """A message index is passed over; but a chunk, its opcode damaged, must not pass for one."""
+    """Message indexes are skipped, but a chunk with a damaged opcode must not be taken for one."""
     stream.seek(place.offset + HEAD.size)
     content = stream.read(min(_MESSAGE_INDEX.size, place.length))
     if len(content) < _MESSAGE_INDEX.size or _MESSAGE_INDEX.unpack(content)[1] + len(content) != place.length:

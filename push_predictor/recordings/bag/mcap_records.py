@@ -1,4 +1,4 @@
-"""The bytes of MCAP (https://mcap.dev/spec): records, chunks, how they are packed. No file is opened.
+"""The byte format of MCAP (https://mcap.dev/spec): records, chunks, compression. No file is opened.
 
 Little-endian records of one byte opcode, eight bytes length, content; a chunk holds compressed records.
 """
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from io import BytesIO
 from typing import BinaryIO, Final, NamedTuple, Protocol, TypeAlias, TypeVar
 
-import lz4.frame  # type: ignore[import-untyped]  # ships no types
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 MESSAGE = struct.Struct("<HIQQ")
-LARGEST_CHUNK: Final = 1 << 30  # bytes uncompressed: a file from outside must not fill the memory
+LARGEST_CHUNK: Final = 1 << 30  # bytes uncompressed; a foreign file must not exhaust the memory
 UNREADABLE = (struct.error, UnicodeDecodeError, EndOfFile, zstandard.ZstdError, RuntimeError, ValueError)
 _ALL = frozenset(Opcode)
 _CHUNK = struct.Struct("<QQQII")
@@ -47,7 +47,7 @@ class _Record(BytesIO):
 
 
 class ChunkHead(NamedTuple):
-    """What stands before a chunk's records; begin and packed: where in the record these start, and their bytes."""
+    """The fields before a chunk's records; begin: offset of the compressed records; packed: their number of bytes."""
 
     size: int
     crc: int
@@ -65,9 +65,9 @@ def parse(kind: _Readable[Record], data: Bytes, start: int, end: int) -> Record:
 
 
 def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
-    """(opcode, start, end) of each record in data. Raises ValueError for what is none.
+    """(opcode, start, end) of each record in data. Raises ValueError for invalid records.
 
-    So is an incomplete last one, unless data is known not to be whole.
+    An incomplete last record is accepted only if data are not `whole`.
     """
     position, size = 0, len(data)
     while position + HEAD.size <= size:
@@ -82,7 +82,7 @@ def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
 
 
 def is_head(head: bytes) -> bool:
-    """Could these bytes begin a record? Random ones hardly ever do, a head that the file's end cuts does."""
+    """Whether these bytes can begin a record: random bytes hardly ever do, a head cut by the end of the file does."""
     if len(head) < HEAD.size:
         return True
     opcode, length = HEAD.unpack(head)
@@ -100,24 +100,24 @@ def chunk_head(start: bytes, length: int) -> ChunkHead:
     begin = _CHUNK.size + name_length + _LENGTH.size
     (packed,) = _LENGTH.unpack_from(start, begin - _LENGTH.size)
     if begin + packed != length:
-        raise ValueError(f"a chunk of {length} bytes says that {packed} of them are records")
+        raise ValueError(f"a chunk of {length} bytes claims {packed} bytes of records")
     if size > LARGEST_CHUNK:
         raise ValueError(f"a chunk of {size} bytes, {LARGEST_CHUNK} are accepted")
     if packed > size + size // 64 + 4096:
-        raise ValueError(f"a chunk of {size} bytes takes {packed}")
+        raise ValueError(f"a chunk of {size} bytes claims {packed} compressed bytes")
     return ChunkHead(size, crc, start[_CHUNK.size : begin - _LENGTH.size].decode(), begin, packed)
 
 
 def unpack_chunk(head: ChunkHead, stream: BinaryIO) -> Bytes:
-    """The records in a chunk whose packed ones come next in the stream; of a chunk that is cut off, what can be had.
+    """Decompress the records of a chunk, which come next in the stream; of a chunk that is cut off, the first ones.
 
-    Takes no more memory than the packed bytes and what they unpack to, which may not be more than the head tells.
-    Raises one of UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
+    Memory is limited to the compressed bytes and the size that the head states. Raises one of UNREADABLE for an unknown
+    compression, a wrong size or a wrong checksum.
     """
     packed = _Packed(stream, head.packed)
     found = _unpacked(head, packed)
     if len(found) > head.size or not (packed.cut or len(found) == head.size):
-        raise ValueError(f"a chunk does not hold the {head.size} bytes it tells of")
+        raise ValueError(f"a chunk does not contain the {head.size} bytes that it claims")
     if packed.cut:
         return found
     if head.crc and zlib.crc32(found) != head.crc:
@@ -126,14 +126,14 @@ def unpack_chunk(head: ChunkHead, stream: BinaryIO) -> Bytes:
 
 
 class _Packed:
-    """The packed records of a chunk, read as they are wanted. cut: they ended too soon."""
+    """The compressed records of a chunk, read on demand. cut: they ended too early."""
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self._stream, self._left = stream, size
         self.cut = False
 
     def read(self, size: int) -> bytes:
-        """The next bytes, at most so many; none at the end."""
+        """At most `size` of the next bytes; none at the end."""
         wanted = min(size, self._left)
         data = self._stream.read(wanted)
         self._left -= len(data)
@@ -142,14 +142,14 @@ class _Packed:
 
 
 def _unpacked(head: ChunkHead, packed: _Packed) -> Bytes:
-    """At most the bytes that the head tells of, and one piece more where there are more."""
+    """The decompressed bytes, at most one piece more than the head states."""
     if head.compression == "":
         return packed.read(head.packed)
     if head.compression not in ("zstd", "lz4"):
         raise ValueError(f"chunk compression {head.compression!r}, zstd, lz4 and none are accepted")
-    if head.compression == "lz4":  # piece by piece: what does not compress would be there almost twice
+    if head.compression == "lz4":  # in pieces: incompressible data would take almost twice the memory
         return _gathered(_lz4_pieces(packed), head.size)
-    # At once, where the frame tells the same size: libzstd's decoder of pieces takes a window of twice a chunk.
+    # At once if the frame states the same size: libzstd's streaming decoder takes a window of twice a chunk.
     data = packed.read(head.packed)
     if data and not packed.cut and zstandard.frame_content_size(data) == head.size:
         return bytes(zstandard.ZstdDecompressor().decompress(data))

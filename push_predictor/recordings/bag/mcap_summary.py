@@ -1,4 +1,4 @@
-"""The summary at an MCAP file's end: what the file holds and where. Used only if it is where it belongs and whole."""
+"""The summary at the end of an MCAP file: its contents and their offsets. Used only if valid and complete."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CHUNK_INDEX = struct.Struct("<QQQ")
 
 @dataclass(frozen=True)
 class Footer:
-    """offset: where it stands; start: of the summary, 0 where there is none; crc: of the summary, 0 if not computed."""
+    """offset: of the footer; start: of the summary, 0 without one; crc: of the summary, 0 if not computed."""
 
     offset: int
     start: int
@@ -36,7 +36,7 @@ class Footer:
 
 @dataclass
 class Summary:
-    """chunks: where they start. verified: it had a checksum, which was right."""
+    """chunks: their offsets. verified: the summary had a checksum and it was correct."""
 
     verified: bool
     schemas: list[Schema] = field(default_factory=list)
@@ -47,7 +47,7 @@ class Summary:
 
 
 def read_footer(stream: BinaryIO, size: int) -> Footer | None:
-    """The last record of a file of size bytes; None where the file's end is damaged or missing."""
+    """The last record of a file of `size` bytes, None if the end of the file is damaged or missing."""
     offset = size - FOOTER_SIZE
     stream.seek(max(offset, 0))
     tail = stream.read()
@@ -60,12 +60,12 @@ def read_footer(stream: BinaryIO, size: int) -> Footer | None:
 
 
 def read_summary(stream: BinaryIO, footer: Footer, start: int) -> Summary:
-    """The summary that starts at a byte. Raises one of UNREADABLE if it is not there or damaged."""
+    """The summary that starts at a byte. Raises one of UNREADABLE if it is missing or damaged."""
     if not DATA_END_SIZE < start <= footer.offset or footer.offset - start > LARGEST_CHUNK:
-        raise ValueError("the footer says that the summary is outside the file")
+        raise ValueError("the footer places the summary outside the file")
     stream.seek(start - DATA_END_SIZE)
     if stream.read(DATA_END_SIZE)[: HEAD.size] != _DATA_END:
-        raise ValueError("the summary is not where the footer says")
+        raise ValueError("the summary is not where the footer places it")
     content = stream.read(footer.offset - start)
     footer.check(content)
     return _summary(content, bool(footer.crc))

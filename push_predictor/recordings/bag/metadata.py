@@ -19,9 +19,9 @@ _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """files: as relative_file_paths has them; custom_data: {record name: {key: value}}; notes: what was wrong.
+    """files: as in relative_file_paths; custom_data: {record name: {key: value}}; notes: faults found.
 
-    compression: what rosbag2 compressed on top of MCAP, 'file', 'message' or ''.
+    compression: what rosbag2 compressed in addition to MCAP, 'file', 'message' or ''.
     """
 
     files: tuple[str, ...] = ()
@@ -32,7 +32,7 @@ class BagMetadata:
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """A topic as metadata.yaml tells it; durability is 'volatile' or 'transient_local'."""
+    """A topic of metadata.yaml; durability is 'volatile' or 'transient_local'."""
 
     name: str
     type: str
@@ -43,9 +43,9 @@ class TopicInfo:
 
 
 def read_bag_metadata(folder: Path) -> BagMetadata:
-    """Read metadata.yaml; one that is absent or unreadable leaves a note.
+    """Read metadata.yaml; an unreadable file becomes a note.
 
-    Raises RecordingError for a bag that is not MCAP, or compressed in a way that rosbag2 does not come with.
+    Raises RecordingError for a bag that is not MCAP, or has a compression that rosbag2 does not include.
     """
     import yaml
 
@@ -57,12 +57,12 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         return BagMetadata()
     except (*_DAMAGED, yaml.YAMLError) as error:
         reason = str(error).replace("\n", " ")
-        return BagMetadata(notes=[f"{path}: cannot be read ({reason}), the .mcap files are taken by name"])
+        return BagMetadata(notes=[f"{path}: cannot be read ({reason}); the .mcap files are used in order of name"])
     return BagMetadata(files, _records(information.get("custom_data")), _compression(information, path))
 
 
 def embedded_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, object]]:
-    """The custom_data in the MCAP record `rosbag2`, where rosbag2 keeps a copy of metadata.yaml."""
+    """The custom_data in the MCAP record `rosbag2`, in which rosbag2 stores a copy of metadata.yaml."""
     import yaml
 
     try:
@@ -99,7 +99,7 @@ def bag_metadata_text(
 
 
 def qos_text(topic: TopicInfo) -> str:
-    """The offered QoS of a topic, as a channel of the MCAP file carries it."""
+    """The offered QoS of a topic, as in a channel of the MCAP file."""
     return _plain_dump(_qos(topic)).strip()
 
 
@@ -141,20 +141,20 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
 
 
 def _compression(information: Mapping[str, object], path: Path) -> str:
-    """Check that this is an MCAP bag; how rosbag2 compressed it on top of MCAP's own: 'file', 'message' or ''."""
+    """What rosbag2 compressed in addition to MCAP: 'file', 'message' or ''. Raises RecordingError if not MCAP."""
     if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", ""):
-        raise RecordingError(f"{path}: storage {storage!r}, mcap is accepted: `ros2 bag convert` makes it")
+        raise RecordingError(f"{path}: storage {storage!r}, mcap is accepted; convert it with `ros2 bag convert`")
     mode = str(information.get("compression_mode") or "none").lower()
-    form = str(information.get("compression_format") or "").lower()
+    kind = str(information.get("compression_format") or "").lower()
     if mode == "none":
         return ""
-    if mode not in ("file", "message") or form != "zstd":
-        raise RecordingError(f"{path}: compression {form!r} of each {mode}, zstd of each file or message is accepted")
+    if mode not in ("file", "message") or kind != "zstd":
+        raise RecordingError(f"{path}: compression {kind!r} of each {mode}, zstd of each file or message is accepted")
     return mode
 
 
 def _records(custom_data: object) -> dict[str, Mapping[str, object]]:
-    """Records in custom_data: a mapping or its JSON text under the record's name, or a rig's keys on their own."""
+    """The records in custom_data: a mapping or its JSON text by record name, or the keys of a rig themselves."""
     if not isinstance(custom_data, dict):
         return {}
     mappings = {str(name): _mapping(value) for name, value in custom_data.items()}

@@ -1,4 +1,4 @@
-"""A bag: one MCAP file, or a folder of them as rosbag2 writes it. Raw messages in file order."""
+"""A bag: one MCAP file, or a folder of them as written by rosbag2. Raw messages in file order."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ __all__ = ["Bag", "RawMessage", "open_bag"]
 class Bag:
     """The files of a bag as one.
 
-    path: what was opened; name: its stem. messages() goes through the files in the bag's order; notes grows
-    while messages are read.
+    path: the opened file or folder; name: its stem. messages() reads the files in the bag's order; notes grow while
+    messages are read.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Bag:
         self.name = path.name if path.is_dir() else path.stem
         self.files = files
         self._described = described
-        self._scratch = scratch  # where unpacked files lie as long as the bag lives
+        self._scratch = scratch  # contains decompressed files while the bag is in use
 
     @property
     def topics(self) -> dict[str, str]:
@@ -53,27 +53,27 @@ class Bag:
 
     @property
     def qos(self) -> dict[str, str]:
-        """{topic: the offered QoS profiles as rosbag2's YAML text, '' where unknown}."""
+        """{topic: offered QoS profiles as rosbag2's YAML text, '' if unknown}."""
         return {topic: text for file in self.files for topic, text in file.qos.items()}
 
     @property
     def metadata(self) -> dict[str, Mapping[str, object]]:
-        """{record name: {key: value}}: the files' records; the custom_data of rosbag2 fills in what they lack."""
+        """{record name: {key: value}}: the records of the files, completed by the custom_data of rosbag2."""
         records = {name: record for file in self.files for name, record in file.metadata.items()}
         return {**embedded_records(records), **self._described.custom_data, **records}
 
     @property
     def notes(self) -> list[str]:
-        """What was found damaged or out of order so far, in words."""
+        """Sentences about the damage found so far."""
         own = [*self._described.notes, *(note for file in self.files for note in file.notes)]
         return own + [
-            f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which counts"
+            f"{self.path}: {name} in {METADATA_FILE} differs from the one in the .mcap file, which is used"
             for name, record in self._described.custom_data.items()
             if any(file.metadata.get(name, record) != record for file in self.files)
         ]
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-        """Messages in file order, of all topics in CDR or of the given ones; damage becomes a note."""
+        """CDR messages in file order, of all topics or of the given ones; damage becomes a note."""
         for file in self.files:
             yield from file.messages(topics)
 
@@ -81,21 +81,21 @@ class Bag:
 def open_bag(path: Path) -> Bag:
     """Open a .mcap file, or a folder with .mcap files, with or without metadata.yaml.
 
-    Raises RecordingError if there is none, or if all files are empty or foreign; one among others becomes a note.
+    Raises RecordingError without .mcap files, or if all are empty or foreign; a single such file becomes a note.
     """
     path = Path(path)
     if not path.is_dir():
         return Bag(path, [McapFile(path)], BagMetadata())
     described = read_bag_metadata(path)
     if not (files := _listed(path, described) or _found(path)):
-        raise RecordingError(f"{path}: holds no .mcap file, give an MCAP bag")
+        raise RecordingError(f"{path}: contains no .mcap file, give an MCAP bag")
     scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
     folder = None if scratch is None else Path(scratch.name)
     return Bag(path, _opened(files, described, folder), described, scratch)
 
 
 def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[McapFile]:
-    """The files that can be read. Raises the first one's error if none can."""
+    """The readable files. Raises the error of the first file if none is readable."""
     opened: list[McapFile] = []
     refused: list[RecordingError] = []
     for file in files:
@@ -112,21 +112,21 @@ def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> 
 def _open(file: Path, described: BagMetadata, scratch: Path | None) -> McapFile:
     if scratch is not None:
         unpacked = unpack_file(file, scratch, described.notes)
-        return McapFile(unpacked, name=str(file) if unpacked == file else f"{file}, unpacked,")
+        return McapFile(unpacked, name=str(file) if unpacked == file else f"{file}, decompressed,")
     return McapFile(file, unpack=unpack_message if described.compression == "message" else None)
 
 
 def _listed(folder: Path, described: BagMetadata) -> list[Path]:
-    """The files that metadata.yaml names and that are there, in its order."""
-    # Older bags put the folder's own name before the file's.
+    """The existing files named in metadata.yaml, in its order."""
+    # Older bags have the folder's name before the file's.
     named = [folder / Path(name).name for name in described.files]
     absent = [file.name for file in named if not file.is_file()]
-    described.notes.extend(f"{folder}: {name} is in {METADATA_FILE} but not there" for name in absent)
+    described.notes.extend(f"{folder}: {name} is listed in {METADATA_FILE} but missing" for name in absent)
     return [file for file in named if file.is_file()]
 
 
 def _found(folder: Path) -> list[Path]:
-    """The folder's .mcap files, bag_2 before bag_10."""
+    """The .mcap files of the folder, bag_2 before bag_10."""
     return sorted(folder.glob("*.mcap"), key=_numbered)
 
 

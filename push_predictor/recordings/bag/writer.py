@@ -1,4 +1,4 @@
-"""Write a rosbag2 bag of any messages: it appears under its name when it is complete, not before."""
+"""Write a rosbag2 bag of any messages; it appears under its name only when it is complete."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ LARGEST_STAMP = 2**63 - 1
 class BagWriter:
     """A context manager. path: a folder (metadata.yaml and NAME_0.mcap, for `ros2 bag play`) or a bare NAME.mcap.
 
-    An earlier bag of that name is replaced; an exception inside the context leaves it as it was. The same calls
-    write the same bytes. Raises RecordingError if path holds something else, cannot be written, or for an unknown
-    compression (zstd, lz4 and none are known).
+    An earlier bag of that name is replaced; after an exception inside the context it is unchanged. The same calls
+    write the same bytes. Raises RecordingError if path is not a bag or cannot be written, and for an unknown
+    compression (zstd, lz4 and none are accepted).
     """
 
     def __init__(self, path: Path, *, compression: str = "zstd") -> None:
@@ -47,14 +47,14 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         try:
-            with self._told():
+            with self._naming_the_bag():
                 self._stream = self._create().open("wb")
         except RecordingError:
             with suppress(OSError):
                 _remove(self._unfinished)
             raise
         self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
-        self._writer.start(profile="ros2", library="push_predictor")  # a few bytes, into the stream's buffer
+        self._writer.start(profile="ros2", library="push_predictor")  # a few bytes into the stream's buffer
         return self
 
     def __exit__(
@@ -62,10 +62,10 @@ class BagWriter:
     ) -> None:
         try:
             if kind is None:
-                with self._told():
+                with self._naming_the_bag():
                     self._finish()
         finally:
-            with suppress(OSError):  # what the disk did not take is tried once more, and thrown away
+            with suppress(OSError):  # closing retries the failed write; the file is removed anyway
                 self._stream.close()
             _remove(self._unfinished)
 
@@ -79,10 +79,10 @@ class BagWriter:
         depth: int = 10,
         durability: str = "volatile",
     ) -> None:
-        """Announce a topic (reliable, keep last). schema_text: ros2msg, with all definitions it refers to."""
+        """Declare a topic (reliable, keep last). schema_text: ros2msg with all referenced definitions."""
         topic = TopicInfo(absolute(name), type, 0, type_hash, depth, durability)
         metadata = {"offered_qos_profiles": qos_text(topic), "topic_type_hash": type_hash}
-        with self._told():
+        with self._naming_the_bag():
             if type not in self._schemas:
                 self._schemas[type] = self._writer.register_schema(type, "ros2msg", schema_text.encode())
             self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[type], metadata)
@@ -90,9 +90,9 @@ class BagWriter:
         self._counts[topic.name] = 0
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
-        """Write an MCAP Metadata record; a folder's metadata.yaml carries it too."""
+        """Write an MCAP Metadata record, also to the metadata.yaml of a folder."""
         self._records[name] = dict(record)
-        with self._told():
+        with self._naming_the_bag():
             self._writer.add_metadata(name, dict(record))
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
@@ -112,8 +112,8 @@ class BagWriter:
         self._first, self._last = min(self._first, stamp), max(self._last, stamp)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """What the disk refuses is told by the name of the bag."""
+    def _naming_the_bag(self) -> Iterator[None]:
+        """Raise an OSError as a RecordingError that names the bag."""
         try:
             yield
         except OSError as error:
@@ -123,7 +123,7 @@ class BagWriter:
         return RecordingError(f"{self.path}: cannot be written ({error.strerror})")
 
     def _create(self) -> Path:
-        """A place for the unfinished file."""
+        """Create the folder of the unfinished file; returns its path."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         _remove(self._unfinished)
         if self._bare:
@@ -149,7 +149,7 @@ class BagWriter:
 
 
 def absolute(topic: str) -> str:
-    """The topic's name as rosbag2 records it."""
+    """The topic's name with a leading slash, as recorded by rosbag2."""
     return "/" + topic.lstrip("/")
 
 
@@ -163,7 +163,7 @@ def _check_target(path: Path, bare: bool) -> None:
 
 
 def _replace_folder(path: Path, new: Path) -> None:
-    """Let a folder take the place of an earlier one, which is back where that fails."""
+    """Replace an earlier folder by a new one; if that fails, the earlier one is restored."""
     earlier = new.with_suffix(".earlier")
     if path.is_dir():
         path.rename(earlier)

@@ -1,4 +1,4 @@
-"""What the records of an MCAP file say about its messages: topics, types, definitions; and its metadata."""
+"""The descriptions in an MCAP file: topics, types, definitions and metadata."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from push_predictor.recordings.bag.mcap_records import Bytes, parse
 Wanted = dict[int, tuple[str, str]]  # channel id: topic and type
 
 
-class Described:
-    """Of two descriptions of one channel that differ the first counts, and a note tells of the second.
+class Descriptions:
+    """Collects the descriptions of a file; of two different ones for a channel the first is used, with a note.
 
     topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if unknown};
-    metadata: {record name: {key: value}}; channels: by id. note takes an offset and what is wrong there.
+    metadata: {record name: {key: value}}; channels: by id. note takes an offset and a description of the damage there.
     """
 
     def __init__(self, note: Callable[[int, str], None]) -> None:
@@ -29,7 +29,7 @@ class Described:
         self._note = note
 
     def wanted(self, topics: Collection[str] | None, channels: Iterable[Channel]) -> Wanted:
-        """Those of some channels that are in CDR, of all topics or of the given ones."""
+        """The CDR channels among those given, of all topics or of the given ones."""
         return {
             channel.id: (channel.topic, self._types.get(channel.schema_id, ""))
             for channel in channels
@@ -37,7 +37,7 @@ class Described:
         }
 
     def register(self, opcode: int, content: Bytes, start: int, end: int, offset: int) -> Channel | None:
-        """Keep what a record says; the channel if it is one. Raises one of UNREADABLE."""
+        """Store a record's description; returns the channel if it is one. Raises one of UNREADABLE."""
         if opcode == Opcode.SCHEMA:
             self.add_schema(parse(Schema, content, start, end))
         elif opcode == Opcode.CHANNEL:
@@ -48,15 +48,15 @@ class Described:
         return None
 
     def add_schema(self, schema: Schema) -> None:
-        """Keep a type's name and definition."""
+        """Store a type's name and definition."""
         self._types.setdefault(schema.id, schema.name)
         self.schemas.setdefault(schema.name, schema.data.decode(errors="replace"))
 
     def add_channel(self, channel: Channel, offset: int) -> Channel:
-        """Keep a channel; answers what it was first described as."""
+        """Store a channel; returns its first description."""
         known: Channel = self.channels.setdefault(channel.id, channel)
         if known != channel:
-            self._note(offset, f"channel {channel.id} is described anew and differently, the first description counts")
+            self._note(offset, f"channel {channel.id} has a second, different description; the first one is used")
         self.topics.setdefault(known.topic, self._types.get(known.schema_id, ""))
         self.qos.setdefault(known.topic, known.metadata.get("offered_qos_profiles", ""))
         return known
