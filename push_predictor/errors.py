@@ -1,4 +1,4 @@
-"""What can go wrong, one class per thing a caller may want to treat differently.
+"""The package's exceptions, one class for each kind of failure that a caller may handle differently.
 
 Every message names the file or field, its value and what is accepted; the command line prints it as one line.
 """
@@ -11,7 +11,7 @@ class PushPredictorError(Exception):
 
 
 class RigError(PushPredictorError):
-    """The push_rig record is missing or wrong."""
+    """The push_rig record is missing or invalid."""
 
 
 class RecordingError(PushPredictorError):
@@ -23,11 +23,11 @@ class TableError(PushPredictorError):
 
 
 class ImportSourceError(PushPredictorError):
-    """A foreign file cannot be imported; the message names file and line."""
+    """A file of another format cannot be imported; the message names file and line."""
 
 
 class ModelFileError(PushPredictorError):
-    """A model file is damaged, foreign or newer than this version."""
+    """A model file is damaged, of another format or newer than this version."""
 
 
 class TrainingError(PushPredictorError):
@@ -35,12 +35,12 @@ class TrainingError(PushPredictorError):
 
 
 class RequestError(PushPredictorError):
-    """A prediction was asked for with a value that is not accepted."""
+    """A request contains a value that is not accepted."""
 
     def __init__(self, field: str, value: object, accepted: str) -> None:
         super().__init__(f"{field}: {value!r} is not accepted, give {accepted}")
         self.field, self.value, self.accepted = field, value, accepted
 
     def within(self, place: str) -> RequestError:
-        """The same of a field in a larger message: `steps[2].angle` of `angle` within `steps[2]`."""
+        """The same error for a nested field: `angle` within `steps[2]` becomes `steps[2].angle`."""
         return RequestError(f"{place}.{self.field}", self.value, self.accepted)

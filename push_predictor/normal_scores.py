@@ -1,4 +1,4 @@
-"""Numbers replaced by where they stand among each other."""
+"""Normal scores: values replaced by normal quantiles of their ranks."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from push_predictor.types import Array
 
 
 def normal_scores(values: Array) -> Array:
-    """What a normal variable has at each one's rank: ndtri((rank - 1/2) / n) down the columns of (n, ...), the same
-    shape; equal values share the mean of their ranks. NaN has no rank: the scores of its column are all NaN.
+    """Normal quantiles ndtri((rank - 1/2) / n) of the ranks in each column.
+
+    values: (n, ...); the result has the same shape. Equal values share the mean of their ranks. A column that contains
+    NaN gets NaN scores.
     """
     return np.asarray(ndtri(np.apply_along_axis(_shares, 0, values)))
 
 
 def _shares(column: Array) -> Array:
-    """(rank - 1/2) / n. scipy.stats.rankdata does it too, but takes every node 0.4 s to import."""
+    """(rank - 1/2) / n. scipy.stats.rankdata does the same, but its import takes every node 0.4 s."""
     if np.isnan(column).any():
         return np.full(len(column), np.nan)
     ordered = np.sort(column)

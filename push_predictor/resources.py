@@ -1,4 +1,4 @@
-"""Files that ship with the package: models and configuration, installed under share/push_predictor."""
+"""Files shipped with the package: models and configuration, installed under share/push_predictor."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 
 from push_predictor.errors import PushPredictorError
 
-DEFAULT_MODEL = ("resource", "simulated_square_abs.pushmodel")  # of a simulated rig: for who gives no other
+DEFAULT_MODEL = ("resource", "simulated_square_abs.pushmodel")  # of a simulated rig; used unless another model is given
 
 
 def share_path(*parts: str) -> Path:
-    """A shipped file: of the checkout, else as colcon or pip installed it.
+    """Path of a shipped file, in the checkout or where colcon or pip installed it.
 
-    Raises PushPredictorError, which names the places, if it is in none of them.
+    Raises PushPredictorError, which lists the places searched, if it is in none of them.
     """
     prefixes = filter(None, [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix])
     places = [

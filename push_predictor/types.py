@@ -1,4 +1,4 @@
-"""Array aliases, so that signatures say what they hold."""
+"""Aliases of array types for signatures."""
 
 from __future__ import annotations
 

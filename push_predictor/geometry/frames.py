@@ -8,12 +8,12 @@ from push_predictor.types import Array
 
 
 def wrap_angle(angle: Array) -> Array:
-    """Bring angles (rad, any shape) into [-pi, pi)."""
+    """Angles (rad, any shape) wrapped to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi, dtype=np.float64)
 
 
 def rotate(vectors: Array, angle: Array) -> Array:
-    """Turn vectors (..., 2) counter-clockwise by angle (..., rad)."""
+    """Vectors (..., 2) rotated counter-clockwise by angle (..., rad)."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)

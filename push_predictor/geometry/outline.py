@@ -1,8 +1,8 @@
-"""The outline of a slider: contact fraction <-> point, normals, nearest point.
+"""The outline of a slider: contact fractions and points, normals, nearest points.
 
 The body frame has its origin at the outline's area centroid (contract, section 1). A contact is a fraction of the
-perimeter, counter-clockwise from the first vertex. Circles and ellipses are polygons for the record, but their
-points and normals come from the smooth curve.
+perimeter, counter-clockwise from the first vertex. Circles and ellipses are stored as polygons, but their points and
+normals are those of the smooth curve.
 """
 
 from __future__ import annotations
@@ -15,16 +15,19 @@ import numpy as np
 from push_predictor.errors import RigError
 from push_predictor.types import Array, BoolArray, IntArray
 
-SMOOTH_TABLE = 8192  # chords that stand for the arc length of an ellipse: relative error 1e-8
+SMOOTH_TABLE = 8192  # chords that approximate the arc length of an ellipse: relative error 1e-8
 NEWTON_STEPS = 60  # enough for bisection alone
 PARAMETER_TOLERANCE = 1e-14  # rad
-SAME_LENGTH = 1e-6  # m; vertices closer than this to their image are a symmetry
+SAME_LENGTH = 1e-6  # m; tolerance of vertices and their images under a symmetry
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Nearest boundary points of n query points: contact (n,), point (n, 2), outward normal (n, 2),
-    signed distance (n,) in m (negative inside), at_vertex (n,) where a polygon's corner is nearest."""
+    """Nearest boundary points of n query points.
+
+    contact (n,), point (n, 2), outward normal (n, 2), signed distance (n,) in m (negative inside), at_vertex (n,):
+    whether a polygon's corner is nearest.
+    """
 
     contact: Array
     point: Array
@@ -69,7 +72,7 @@ class Outline:
 
     @cached_property
     def centroid(self) -> Array:
-        """Area centroid (2,), m: zero where the body frame is as the contract says."""
+        """Area centroid (2,), m: zero if the body frame follows the contract."""
         x, y = self.vertices.T
         xn, yn = np.roll(x, -1), np.roll(y, -1)
         cross = x * yn - xn * y
@@ -90,7 +93,7 @@ class Outline:
         """Contact fractions (E + 1,) at which the edges begin, the last entry 1; a smooth outline is one edge."""
         if self.semi_axes is not None:
             return np.array([0.0, 1.0])
-        # Rounded, so that the k-th side of a square begins at k / 4 and not a bit beside it.
+        # Rounded, so that the k-th side of a square begins exactly at k / 4.
         return np.asarray(np.round(self._arc / self._arc[-1], 15))
 
     def edge(self, contact: Array) -> tuple[IntArray, Array]:
@@ -101,7 +104,7 @@ class Outline:
         return index.astype(np.int64), np.clip(fraction, 0.0, 1.0)
 
     def contact_on_edge(self, edge: IntArray | int, fraction: Array | float) -> Array:
-        """The contacts at fractions of edges. An edge's end keeps to that edge, not to the next one's start."""
+        """The contacts at fractions of edges; the end of an edge belongs to it, not to the next edge."""
         start, end = self.edge_starts[edge], self.edge_starts[np.asarray(edge) + 1]
         return np.asarray(np.clip(start + fraction * (end - start), start, np.nextafter(end, 0.0)))
 
@@ -204,7 +207,7 @@ class Outline:
         return Projection(contact, nearest, normal, distance, np.zeros(len(points), dtype=np.bool_))
 
     def _nearest_parameter(self, points: Array) -> Array:
-        """Safeguarded Newton in the first quadrant, where the nearest point is the slope's only root."""
+        """Safeguarded Newton's method in the first quadrant, where the slope has a single root."""
         a, b = self.semi_axes or (1.0, 1.0)
         x, y = np.abs(points.T)
         t, low, high = np.arctan2(a * y, b * x), np.zeros_like(x), np.full_like(x, np.pi / 2.0)

@@ -1,4 +1,4 @@
-"""Poses in space, for requests whose frame need not lie flat in the world."""
+"""Poses in space, for requests in frames that are tilted in the world."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True, eq=False)
 class SpatialPose:
-    """Where a body is in a frame, or how one frame lies in another.
+    """The pose of a body in a frame, or of one frame in another.
 
-    position (3,) m; quaternion (4,: x, y, z, w) of unit length. `outer @ inner` is a pose given in the frame `outer`,
-    seen from the frame in which `outer` is given.
+    position (3,) m; quaternion (4,: x, y, z, w) of unit length. `outer @ inner` transforms a pose given in the frame
+    `outer` into the frame in which `outer` is given.
     """
 
     position: Array
@@ -27,12 +27,12 @@ class SpatialPose:
 
     @property
     def inverse(self) -> SpatialPose:
-        """The outer frame seen from the inner one."""
+        """The pose of the outer frame in the inner one."""
         return SpatialPose(-self.rotation.T @ self.position, self.quaternion * [-1.0, -1.0, -1.0, 1.0])
 
     @cached_property
     def rotation(self) -> Array:
-        """Matrix (3, 3) that brings vectors of the inner frame into the outer one."""
+        """Matrix (3, 3) that transforms vectors of the inner frame into the outer one."""
         x, y, z, w = self.quaternion
         return np.array(
             [
@@ -52,7 +52,7 @@ class SpatialPose:
         return np.asarray(self.rotation @ point + self.position)
 
     def vector(self, vector: Array) -> Array:
-        """A vector (3,) of the inner frame, in the outer one: the frames do not move against each other."""
+        """A vector (3,) of the inner frame, in the outer one, for frames that do not move relative to each other."""
         return np.asarray(self.rotation @ vector)
 
     def covariance(self, covariance: Array) -> Array:
@@ -62,7 +62,7 @@ class SpatialPose:
         return np.asarray(turn @ covariance @ turn.T)
 
     def turned(self, angle: float) -> SpatialPose:
-        """The body in the same place, turned by angle (rad) about the vertical of the frame that it is given in."""
+        """The same position, rotated by angle (rad) about the vertical of the outer frame."""
         return SpatialPose(self.position, quaternion_product(vertical_turn(angle), self.quaternion))
 
 
@@ -70,13 +70,13 @@ SAME_FRAME = SpatialPose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
 
 
 def vertical_turn(angle: float) -> Array:
-    """Quaternion (4,) of a turn by angle (rad) about z."""
+    """Quaternion (4,) of a rotation by angle (rad) about z."""
     z, w = quaternion_of_yaw(np.asarray(angle))
     return np.array([0.0, 0.0, z, w])
 
 
 def quaternion_product(second: Array, first: Array) -> Array:
-    """Quaternion (4,) of the turn `first` followed by the turn `second`."""
+    """Quaternion (4,) of the rotation `first` followed by the rotation `second`."""
     x, y, z, w = second.tolist()
     a, b, c, d = first.tolist()
     return np.array(

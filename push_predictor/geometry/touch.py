@@ -1,4 +1,4 @@
-"""A pusher at a slider: where it touches and how it pushes, and where a displacement in the push frame leads."""
+"""Pushes from poses: contact, angle and velocity of a pusher at a slider, and poses after a push."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """n pushers at n sliders: inputs (n, 3: velocity m/s, contact, angle rad in [-pi, pi)), heading (n,) of the push in
-    the world, rad; distance (n,) of the tip's centre from the outline, m, negative inside.
+    """n pushers at n sliders.
 
-    Only an angle within +-pi/2 is a push.
+    inputs (n, 3: velocity m/s, contact, angle rad in [-pi, pi)); heading (n,) of the push in the world, rad; distance
+    (n,) of the tip's centre from the outline, m, negative inside. Only an angle within +-pi/2 is a push.
     """
 
     inputs: Array
@@ -25,9 +25,9 @@ class Touch:
 
 
 def touches(outline: Outline, sliders: Array, tips: Array, velocities: Array) -> Touch:
-    """Tips at (n, 2) m that drive with velocities (n, 2) m/s at sliders (n, 3: x, y m, heading rad), in one frame.
+    """The pushes of tips (n, 2) m with velocities (n, 2) m/s at sliders (n, 3: x, y m, heading rad), in one frame.
 
-    A tip at a corner touches the edge that faces it more squarely, as in a window, unless it pushes only the other one.
+    A tip at a corner touches the edge that faces it more directly, as in a window, unless it pushes only the other one.
     """
     nearest = outline.project(to_body(tips, sliders))
     ahead = rotate(velocities, -sliders[:, 2])
@@ -42,12 +42,12 @@ def touches(outline: Outline, sliders: Array, tips: Array, velocities: Array) ->
 
 
 def displaced(sliders: Array, heading: Array, displacement: Array) -> Array:
-    """Sliders (n, 3) after displacements (n, 3: dx, dy, dtheta in the frame of pushes with headings (n,))."""
+    """Slider poses (n, 3) after displacements (n, 3: dx, dy, dtheta) in push frames with headings (n,)."""
     return sliders + np.column_stack([rotate(displacement[:, :2], heading), displacement[:, 2]])
 
 
 def covariance_in_world(covariance: Array, heading: Array) -> Array:
-    """Covariances (n, 3, 3) of displacements, along the world's axes instead of those of the push frame."""
+    """Covariances (n, 3, 3) of displacements, transformed from the push frame to the world's axes."""
     turn = np.zeros((len(heading), 3, 3))
     turn[:, :2, :2] = np.swapaxes(rotate(np.eye(2), heading[:, None]), 1, 2)
     turn[:, 2, 2] = 1.0
@@ -61,7 +61,7 @@ def _angle(inward: Array, ahead: Array) -> Array:
 
 
 def _at_corners(outline: Outline, nearest: Projection, ahead: Array) -> Array:
-    """The contacts (k,) of the k tips that are at a corner; ahead (n, 2): where all n tips drive, in the body frame."""
+    """The contacts (k,) of the k tips at a corner; ahead (n, 2): velocities of all n tips in the body frame."""
     edge, share = outline.edge(nearest.contact[nearest.at_vertex])
     vertex = edge + (share > 0.5)
     sides = np.stack([vertex - 1, vertex], axis=1) % len(outline.vertices)

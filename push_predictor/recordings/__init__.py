@@ -1,4 +1,5 @@
-"""Recorded pushes: streams, rigs and push tables, and how they are read and written.
+"""Recorded pushes: streams, rigs and push tables, read and written.
 
-Import `read`, `load`, `streams`, `rig` and `table`; `bag`, `windows` and `importers` have folders of their own.
+Import `read`, `write`, `load`, `streams`, `samples`, `rig` and `table`. The folders are `bag` (files), `windows` (push
+windows) and `importers` (other formats).
 """

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whatever happens while they are written."""
+"""Atomic writing: a file exists completely or not at all."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
-_NUMBERS = itertools.count()  # threads of one process may write the same file
+_NUMBERS = itertools.count()  # several threads of a process may write the same file
 
 
 def write_whole(path: Path, content: bytes | Iterable[bytes]) -> None:
-    """Write a file by way of a temporary one beside it, so that no reader sees half of it; folders are made.
+    """Write a file atomically, through a temporary file in the same folder; missing folders are created.
 
-    content: the bytes, or portions of them. A link stays a link, a device such as /dev/null is written to. Raises
-    OSError that names the path; then an older file is as it was, and nothing lies beside it.
+    content: the bytes, or portions of them. A link remains a link; a device such as /dev/null is written to. Raises
+    OSError that names the path; then an earlier file is unchanged and the temporary file is removed.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -35,7 +35,7 @@ def _replace(target: Path, content: bytes | Iterable[bytes]) -> None:
         with temporary.open("xb") as stream:
             _fill(stream, content)
             stream.flush()
-            os.fsync(stream.fileno())  # some file systems say only now that they are full
+            os.fsync(stream.fileno())  # some file systems report only now that they are full
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)

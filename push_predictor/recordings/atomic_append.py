@@ -1,4 +1,7 @@
-"""Lines of a text file that are there in whole or not at all, whatever ends the process or fills the disk."""
+"""Atomic appending: a line of a text file is written completely or not at all.
+
+This holds also when the process is killed or the disk is full.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,9 @@ from pathlib import Path
 
 
 def append_lines(path: Path, lines: Iterable[str]) -> None:
-    """Append lines, each by one write.
+    """Append lines, each with a single write.
 
-    Raises OSError that names the path where the disk does not take all; the file then ends with the last that it took.
+    Raises OSError that names the path, for example on a full disk; the file then ends with the last complete line.
     """
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)

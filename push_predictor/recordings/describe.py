@@ -1,4 +1,4 @@
-"""What a recording or a push table holds, in words and numbers, damage included."""
+"""Summaries of recordings and push tables, including damage."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
-from push_predictor.recordings.table_file import read_table, rig_beside
+from push_predictor.recordings.table_file import read_table, rig_of_table
 from push_predictor.recordings.windows.finder import find_windows
 
 
 def describe_recording(path: Path) -> dict[str, object]:
-    """Streams, rig, pushes and windows of a recording. Raises RecordingError where nothing can be read."""
+    """Streams, rig, pushes and windows of a recording. Raises RecordingError for an unreadable file."""
     recording = read_recording(path)
     found: dict[str, object] = {"recording": recording.name, "rig": _rig(recording), "streams": _streams(recording)}
     if recording.rig is not None:
@@ -24,7 +24,7 @@ def describe_recording(path: Path) -> dict[str, object]:
 
 def describe_table(path: Path) -> dict[str, object]:
     """Rows, pushes and ranges of a push table. Raises TableError."""
-    table, rig = read_table(path), rig_beside(path)
+    table, rig = read_table(path), rig_of_table(path)
     columns = np.column_stack([table.inputs, table.duration])
     names = ("velocity", "contact", "angle", "duration")
     ranges = {
@@ -35,7 +35,7 @@ def describe_table(path: Path) -> dict[str, object]:
         "table": path.name,
         "rows": len(table),
         "pushes": len(table.pushes),
-        "rig": "none beside it" if rig is None else f"{rig.shape} on {rig.surface}",
+        "rig": "none (no .rig.yaml file)" if rig is None else f"{rig.shape} on {rig.surface}",
         "ranges": ranges,
         "covariates": list(table.covariates),
     }

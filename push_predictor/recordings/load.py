@@ -1,4 +1,4 @@
-"""Recordings and push tables alike, as one table and one rig."""
+"""Load recordings and push tables as one table and one rig."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
 from push_predictor.recordings.table import PushTable, concatenate
-from push_predictor.recordings.table_file import is_recording, read_table, rig_beside, rig_path
+from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, rig_path
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 
@@ -21,23 +21,21 @@ from push_predictor.recordings.windows.push_window import WindowOptions, windows
 def load_data(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> PushTable:
     """The windows of all recordings and the rows of all tables, in the order given.
 
-    rig takes the place of the recorded one. A covariate is kept where all of the data have it. Where two paths
-    give one push_id to different rows, the path's name goes before it; the same rows twice stay one push. Raises
-    RecordingError (also if there is no window in any recording), TableError or RigError.
+    rig replaces the recorded one. A covariate is kept if all data have it. If two paths use the same push_id for
+    different rows, the name of the path is prefixed to it; the same rows twice remain one push. Raises RecordingError
+    (also if no recording has a window), TableError or RigError.
     """
     tables = [_load(Path(path), rig, options) for path in paths]
     if paths and not any(map(len, tables)):
-        raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
+        raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings that contain pushes")
     names = [Path(path).name for path in paths]
     return concatenate([table for table in distinct_pushes(names, tables) if len(table)])
 
 
 def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
-    """The rig of these data: rig_file if given, else what the recordings and the NAME.rig.yaml beside tables say.
+    """The rig of the data: from rig_file if given, else from the recordings and the tables' NAME.rig.yaml.
 
-    These must agree in outline and pusher.
-
-    Raises RigError that names the path, the key and how to give it.
+    These must have the same outline and pusher. Raises RigError that names the path, the key and how to give it.
     """
     if rig_file is not None:
         return load_rig(Path(rig_file))
@@ -45,13 +43,13 @@ def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
         raise RigError(f"{RECORD_NAME}: neither data nor a rig was given; {HOW_TO_GIVE}")
     first, *others = [(path, _rig_of(Path(path))) for path in paths]
     for path, rig in others:
-        if _bodies(rig) != _bodies(first[1]):
+        if _geometry(rig) != _geometry(first[1]):
             raise RigError(f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})")
     return first[1]
 
 
 def distinct_pushes(names: Sequence[str], tables: Sequence[PushTable]) -> list[PushTable]:
-    """The tables, with their names before every push_id if one means different pushes in two of them."""
+    """The tables; if a push_id occurs with different rows in two of them, all get their names as prefix."""
     seen: dict[str, bytes] = {}
     for table in tables:
         for push, rows in _rows_by_push(table).items():
@@ -68,8 +66,8 @@ def _load(path: Path, rig: Rig | None, options: WindowOptions) -> PushTable:
 
 
 def known_rig(path: Path) -> Rig | None:
-    """The rig that a recording holds or that lies beside a table, None where there is none."""
-    return recorded_rig(open_bag(path)) if is_recording(path) else rig_beside(path)
+    """The rig of a recording or of a table, None without one."""
+    return recorded_rig(open_bag(path)) if is_recording(path) else rig_of_table(path)
 
 
 def _rig_of(path: Path) -> Rig:
@@ -79,7 +77,7 @@ def _rig_of(path: Path) -> Rig:
     return rig
 
 
-def _bodies(rig: Rig) -> tuple[str | None, ...]:
+def _geometry(rig: Rig) -> tuple[str | None, ...]:
     record = rig.to_record()
     return tuple(record.get(key) for key in ("outline", "shape_parameters", "pusher_radius"))
 

@@ -1,4 +1,4 @@
-"""Read a recording: the bag's messages decoded, column by column, into streams."""
+"""Read a recording: decode the messages of a bag into streams."""
 
 from __future__ import annotations
 

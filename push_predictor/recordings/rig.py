@@ -1,4 +1,4 @@
-"""The push_rig record: on what rig a recording was made (contract, section 2)."""
+"""The rig of a recording: slider, pusher, surface; the push_rig record (contract, section 2)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Rig:
     """A slider, the pusher and the surface.
 
     pusher_radius in m, object_mass in kg. support_points: (k, 3) of x, y (m, body frame) and load share, or None.
-    contact_friction and surface_friction are Coulomb coefficients, or None where unknown.
+    contact_friction and surface_friction are Coulomb coefficients, None if unknown.
     """
 
     shape: str
@@ -37,7 +37,7 @@ class Rig:
     surface_friction: float | None = None
 
     def to_record(self) -> dict[str, str]:
-        """The record as MCAP metadata wants it: strings only."""
+        """The push_rig record, with strings only as required by MCAP metadata."""
         record = {
             "shape": self.shape,
             "outline": json.dumps(self.outline.vertices.tolist()),
@@ -56,7 +56,7 @@ class Rig:
 
 
 def rig_from_record(record: Mapping[str, object], source: str) -> Rig:
-    """Read a push_rig record (values are strings, or already parsed as YAML gives them).
+    """Read a push_rig record; values are strings, or already parsed by YAML.
 
     Raises RigError that names the source, the key and how to give it.
     """
@@ -76,7 +76,7 @@ def rig_from_record(record: Mapping[str, object], source: str) -> Rig:
 
 
 def rig_from_json(text: str, source: str) -> Rig:
-    """Read the record from JSON text, as the topic `rig` carries it. Raises RigError."""
+    """Read the record from JSON text, as on the topic `rig`. Raises RigError."""
     try:
         record = json.loads(text)
     except ValueError as error:
@@ -87,7 +87,7 @@ def rig_from_json(text: str, source: str) -> Rig:
 
 
 def load_rig(path: Path) -> Rig:
-    """Read NAME.rig.yaml. Raises RigError if the file is absent or wrong."""
+    """Read NAME.rig.yaml. Raises RigError if the file is missing or invalid."""
     import yaml
 
     try:
@@ -95,7 +95,7 @@ def load_rig(path: Path) -> Rig:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise RigError(f"{path}: the rig cannot be read ({error})") from None
     if not isinstance(record, dict):
-        raise RigError(f"{path}: holds no rig, give the keys {', '.join(REQUIRED)}")
+        raise RigError(f"{path}: contains no rig, give the keys {', '.join(REQUIRED)}")
     return rig_from_record(record, str(path))
 
 
@@ -134,7 +134,7 @@ def _semi_axes(record: Mapping[str, object], vertices: Array, source: str) -> tu
 
 
 def _half(axis: float, coordinates: Array) -> float:
-    """Writers give semi-axes or full axes; the vertices tell which."""
+    """The semi-axis: records contain semi-axes or full axes, the vertices show which."""
     reach = float(np.max(np.abs(coordinates)))
     return axis if abs(axis - reach) <= abs(axis / 2.0 - reach) else axis / 2.0
 

@@ -35,7 +35,10 @@ class SampleRules:
 
 @dataclass(frozen=True, eq=False)
 class CheckedSamples:
-    """n decoded messages: stamp (n,) in ns, values (n, k), usable (n,), rejected {fault: count}, frame_ids found."""
+    """n decoded messages.
+
+    stamp (n,) in ns, values (n, k), usable (n,), rejected {fault: count}, frames: the frame_ids found.
+    """
 
     stamp: IntArray
     values: Array
@@ -74,7 +77,7 @@ def has_orientation(values: Array) -> BoolArray:
 
 
 def slider_stream(stamp: IntArray, values: Array) -> PoseStream:
-    """The stream of poses (n, 7: x, y, z, quaternion) that have an orientation; quaternions are normalised."""
+    """The stream of poses (n, 7: x, y, z, quaternion) with orientation; quaternions are normalised."""
     quaternion = values[:, 3:] / np.abs(values[:, 3:]).max(axis=1, keepdims=True)
     unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     x, y, z = values[:, :3].T.copy()

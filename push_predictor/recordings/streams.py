@@ -1,4 +1,4 @@
-"""A recording in memory: what a tracker, a robot and a force sensor delivered, each on its own clock ticks."""
+"""A recording in memory: the streams of tracker, robot and force sensor, each with its own stamps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from push_predictor.types import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class PoseStream:
-    """n samples of a planar pose: header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured."""
+    """n samples of a planar pose.
+
+    Header stamps (n,) in ns; x, y, z (n,) in m; heading (n,) in rad, as measured.
+    """
 
     stamp: IntArray
     x: Array
@@ -24,8 +27,10 @@ class PoseStream:
 
 @dataclass(frozen=True, eq=False)
 class WrenchStream:
-    """n samples of what the slider exerts on the pusher: header stamps (n,) in ns; fx, fy (n,) in N along the world's
-    axes; torque (n,) in N m about the tip."""
+    """n samples of the wrench of the slider on the pusher.
+
+    Header stamps (n,) in ns; fx, fy (n,) in N along the world's axes; torque (n,) in N m about the tip.
+    """
 
     stamp: IntArray
     fx: Array
@@ -38,7 +43,10 @@ class WrenchStream:
 
 @dataclass(frozen=True, eq=False)
 class ScalarStream:
-    """n samples of a scalar: stamps (n,) in ns (header stamp where the type has one, else log time); value (n,)."""
+    """n samples of a scalar.
+
+    stamp (n,) in ns: header stamp if the type has one, else log time; value (n,).
+    """
 
     stamp: IntArray
     value: Array
@@ -51,8 +59,8 @@ class ScalarStream:
 class Recording:
     """All streams of one recording.
 
-    name: stem of its file or folder. wrench is None where no sensor was recorded. scalars: by topic name, the
-    possible covariates. notes: what the reader repaired, dropped or assumed, in words.
+    name: stem of its file or folder. wrench: None without a force sensor. scalars: by topic name, the possible
+    covariates. notes: sentences about what the reader discarded, repaired or assumed.
     """
 
     name: str

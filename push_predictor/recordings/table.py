@@ -1,4 +1,4 @@
-"""The push table: one row a window (or a whole push), the currency between recordings, models and metrics."""
+"""The push table: one row per window or per push; the data of models and metrics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class PushTable:
     """n windows.
 
     inputs (n, 3): velocity m/s, contact fraction of the perimeter, angle rad. duration (n,) s.
-    outcomes (n, 3): dx m, dy m, dtheta rad in the push frame. push_id (n,) text: windows of one push share it.
+    outcomes (n, 3): dx m, dy m, dtheta rad in the push frame. push_id (n,) text: the same for all windows of a push.
     covariates: by name, (n,) each.
     """
 
@@ -63,7 +63,7 @@ class PushTable:
 
 
 def concatenate(tables: Sequence[PushTable]) -> PushTable:
-    """One table after the other; a covariate is kept only if all tables hold it. Raises TableError for no table."""
+    """The rows of all tables; a covariate is kept if all tables have it. Raises TableError without a table."""
     if not tables:
         raise TableError("no push table was given, give at least one recording or table")
     names = [name for name in tables[0].covariates if all(name in table.covariates for table in tables)]

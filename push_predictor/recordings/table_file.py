@@ -29,8 +29,7 @@ ACCEPTED: dict[str, tuple[str, Callable[[Array], BoolArray]]] = {
 def read_table(path: Path) -> PushTable:
     """Read a CSV with the columns velocity, contact, angle, duration, dx, dy, dtheta, push_id.
 
-    A further column of numbers becomes a covariate (an empty cell is NaN: not known), one of words is left out.
-
+    A further column of numbers becomes a covariate (an empty cell is NaN, unknown); a column of text is ignored.
     Raises TableError that names file, line, column, value and what is accepted.
     """
     path = Path(path)
@@ -49,9 +48,10 @@ def read_table(path: Path) -> PushTable:
 
 
 def write_table(path: Path, table: PushTable) -> None:
-    """Write a CSV, gzip if path ends in .gz: it reads back to the same numbers; one table, one sequence of bytes.
+    """Write a CSV, gzip if path ends in .gz, that reads back to the same numbers.
 
-    An older file is replaced when the new one is complete. Raises OSError that names the path.
+    The same table gives the same bytes. An earlier file is replaced when the new one is complete. Raises OSError that
+    names the path.
     """
     path = Path(path)
     columns = [*table.inputs.T, table.duration, *table.outcomes.T]
@@ -66,7 +66,7 @@ def write_table(path: Path, table: PushTable) -> None:
 
 
 def is_recording(path: Path) -> bool:
-    """Tell a recording (a folder or .mcap) from a push table."""
+    """Whether a path is a recording (a folder or .mcap) and not a push table."""
     return Path(path).is_dir() or Path(path).suffix == ".mcap"
 
 
@@ -77,9 +77,9 @@ def rig_path(path: Path) -> Path:
     return Path(path).with_name(f"{stem}.rig.yaml")
 
 
-def rig_beside(path: Path) -> Rig | None:
-    """The rig in NAME.rig.yaml beside NAME.csv, None where there is none. Raises RigError if it is wrong."""
-    return load_rig(beside) if (beside := rig_path(path)).exists() else None
+def rig_of_table(path: Path) -> Rig | None:
+    """The rig in NAME.rig.yaml for NAME.csv, None without this file. Raises RigError if it is invalid."""
+    return load_rig(file) if (file := rig_path(path)).exists() else None
 
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
@@ -92,7 +92,7 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         raise TableError(f"{path}: cannot be read as CSV ({error})") from None
     if len(found) < 2:
-        raise TableError(f"{path}: holds no rows, give a header with {', '.join(COLUMNS)} and a row a push")
+        raise TableError(f"{path}: contains no rows, give a header with {', '.join(COLUMNS)} and one row per push")
     header = found[0][1]
     if len(set(header)) != len(header):
         raise TableError(f"{path} line 1: a column occurs twice in {', '.join(header)!r}")

@@ -1,4 +1,4 @@
-"""Under what names a recording holds its streams."""
+"""The topic names of a recording's streams."""
 
 from __future__ import annotations
 

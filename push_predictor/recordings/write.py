@@ -1,4 +1,4 @@
-"""Write a recording as a rosbag2 bag: `ros2 bag play`, Foxglove and the mcap tool open it."""
+"""Write a recording as a rosbag2 bag for `ros2 bag play`, Foxglove and the mcap tool."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class _Encoded(NamedTuple):
 
 
 def write_recording(path: Path, recording: Recording, *, compression: str = "zstd") -> None:
-    """Write a folder (metadata.yaml and NAME_0.mcap), or a bare file if path ends in .mcap; it replaces an earlier bag.
+    """Write a recording to a folder, or to a bare file if path ends in .mcap; an earlier bag is replaced.
 
-    compression: 'zstd', 'lz4' or 'none'. Poses get frame_id 'world' and no roll or pitch, scalars become
-    std_msgs/Float64. Messages stand in order of log time, which is the header stamp (of a stream whose stamps
-    step back: the latest so far, so that its order is kept). Raises RecordingError.
+    compression: 'zstd', 'lz4' or 'none'. A folder contains metadata.yaml and NAME_0.mcap. Poses get frame_id 'world'
+    and no roll or pitch; scalars become std_msgs/Float64. Messages are in order of log time. The log time is the header
+    stamp, or the latest stamp so far where stamps go back, so that the order is kept. Raises RecordingError.
     """
     topics = _encoded(recording)
     with BagWriter(path, compression=compression) as writer:
@@ -79,7 +79,7 @@ def _arrival(stamp: IntArray) -> IntArray:
 
 
 def _in_order(topics: list[_Encoded]) -> Iterator[tuple[str, int, bytes]]:
-    """(topic, log time, message) in order of log time; at one time in order of topics, then as given."""
+    """(topic, log time, message) in order of log time, then of topics, then as given."""
     stamp = np.concatenate([topic.log_time for topic in topics])
     source = np.repeat(np.arange(len(topics)), [len(topic.messages) for topic in topics])
     order = np.argsort(stamp, kind="stable")

@@ -23,7 +23,7 @@ from push_predictor.models.train import train_model
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.table_file import rig_beside
+from push_predictor.recordings.table_file import rig_of_table
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
 from push_predictor.simulation.changes import PLAIN, Changes, Moment
@@ -144,7 +144,7 @@ def test_the_windows_are_on_disk_with_covariates_and_rig(changed: Outcome, bench
     assert np.array_equal(table.inputs, expected.inputs) and np.array_equal(table.outcomes, expected.outcomes)
     for name in ("slider_heading", "slid_distance", "dwell_time", "normal_force"):
         assert np.array_equal(table.covariates[name], expected.covariates[name])
-    assert rig_beside(changed.output / "pushes.csv") is not None
+    assert rig_of_table(changed.output / "pushes.csv") is not None
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, -0.5])

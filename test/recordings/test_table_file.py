@@ -19,7 +19,7 @@ from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
-from push_predictor.recordings.table_file import is_recording, read_table, rig_beside, write_table
+from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, write_table
 from push_predictor.recordings.write import write_recording
 
 HEADER = "velocity,contact,angle,duration,dx,dy,dtheta,push_id"
@@ -99,8 +99,8 @@ def test_a_value_that_is_not_accepted_is_told(tmp_path: Path, column: str, value
         (f"{HEADER}\n{GOOD},5\n", "line 2: 9 cells, the header has 8"),
         (f"velocity,contact\n{GOOD}\n", "line 1: lacks column angle, duration, dx, dy, dtheta, push_id"),
         (f"{HEADER},dx\n{GOOD},1\n", "line 1: a column occurs twice"),
-        (f"{HEADER}\n", "holds no rows"),
-        ("", "holds no rows"),
+        (f"{HEADER}\n", "contains no rows"),
+        ("", "contains no rows"),
         (f"{HEADER},warmth\n{GOOD},1.5\n{GOOD},warm\n", "line 3: column warmth is 'warm', give a number"),
         (b"\xff\xfe\x00", "cannot be read as CSV"),
         (b"\x1f\x8b\x08\x00cut", "cannot be read as CSV"),
@@ -138,7 +138,7 @@ def test_a_recording_is_told_from_a_table_by_its_path(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a.b.csv", "a.b.csv.gz"])
 def test_the_rig_stands_beside_the_table(tmp_path: Path, rig: Rig, name: str) -> None:
-    assert rig_beside(tmp_path / name) is None
+    assert rig_of_table(tmp_path / name) is None
     with pytest.raises(RigError, match=r"a\.b\.csv.*: no push_rig in .*a\.b\.rig\.yaml; give it with --rig"):
         load_rig_for([tmp_path / name])
     save_rig(rig, tmp_path / "a.b.rig.yaml")
