@@ -1,7 +1,7 @@
-"""ROS messages <-> the library's own types. Nothing else converts, and nothing here holds state or a node.
+"""Conversion between ROS messages and the library's own types: pure functions, without state or node.
 
-Reading takes rclpy messages and any object with the same fields (rosbags and mcap decoders give such);
-writing makes rclpy messages.
+Reading accepts rclpy messages and any object with the same fields, such as rosbags and mcap decoders return;
+writing returns rclpy messages.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from push_predictor.errors import PushPredictorError
 
 
 class MessageError(PushPredictorError):
-    """A message holds a value that cannot be taken; the text names the field, the value and what is accepted."""
+    """A message contains a value that is not accepted; the text names the field, the value and what is accepted."""
 
     def __init__(self, field: str, value: object, accepted: str) -> None:
         super().__init__(f"{field}: {value!r} is not accepted, give {accepted}")

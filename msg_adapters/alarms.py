@@ -1,4 +1,4 @@
-"""An alarm that has fired -> push_predictor_interfaces/PushAlarm."""
+"""The state of an alarm that has fired -> push_predictor_interfaces/PushAlarm."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from push_predictor_interfaces.msg import PushAlarm
 
 
 def alarm_to_message(state: AlarmState, stamp_ns: int, frame_id: str = "world") -> PushAlarm:
-    """The message of an alarm; stamp_ns: end of the push at which it fired, ns. Raises MessageError if it has not."""
+    """The message of an alarm. stamp_ns: end of the push at which it fired. Raises MessageError if it has not fired."""
     if state.fired_at is None or state.fired_after is None or state.fired_evidence is None:
         raise MessageError("alarm", state, "an alarm that has fired")
     message = PushAlarm(push_id=state.fired_at, pushes=state.fired_after)

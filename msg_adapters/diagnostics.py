@@ -1,4 +1,4 @@
-"""Diagnostics: a level, a sentence and named values -> diagnostic_msgs."""
+"""A level, a message and named values -> diagnostic_msgs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from msg_adapters.stamps import ns_to_stamp
 
 
 class Level(Enum):
-    """How a node does."""
+    """The health of a node."""
 
     OK = DiagnosticStatus.OK
     WARN = DiagnosticStatus.WARN
@@ -22,13 +22,13 @@ class Level(Enum):
 def diagnostic_status(
     name: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str = ""
 ) -> DiagnosticStatus:
-    """The status of one component. Floats are written with six digits, lists with commas, None as '-'."""
+    """The status of one component. Floats get six digits, lists commas; None becomes '-'."""
     pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
     return DiagnosticStatus(level=level.value, name=name, message=message, hardware_id=hardware_id, values=pairs)
 
 
 def diagnostic_array(stamp_ns: int, *statuses: DiagnosticStatus) -> DiagnosticArray:
-    """What goes out on /diagnostics; stamp_ns in ns."""
+    """The message for /diagnostics; stamp_ns in ns."""
     array = DiagnosticArray(status=list(statuses))
     array.header.stamp = ns_to_stamp(stamp_ns)
     return array

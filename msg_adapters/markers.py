@@ -1,7 +1,7 @@
 """One window as visualization_msgs/MarkerArray: predicted next to observed (docs/how_to/visualisation.md).
 
-A window moves a slider of 90 mm by some millimetres and the model is unsure of tenths of one, which at the scale of
-the slider nobody sees. So what concerns the error is drawn twice: as large as it is, and MAGNIFICATION times larger.
+A window moves a slider of 90 mm by some millimetres, and the model's uncertainty is tenths of one: invisible at the
+scale of the slider. So the error is drawn twice: at true scale, and magnified MAGNIFICATION times.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from push_predictor.geometry.frames import to_world, wrap_angle
 from push_predictor.types import Array
 
 CHI2_95_OF_TWO = 5.991464547107979  # -2 log(0.05): the 95 % quantile of chi-squared with two degrees of freedom
-NORMAL_95 = 1.959963984540054  # a normal variable lies within so many standard deviations in 95 % of all cases
+NORMAL_95 = 1.959963984540054  # half-width of the 95 % interval of a normal variable, in standard deviations
 MAGNIFICATION = 20.0
 ELLIPSE_POINTS = 49
 LINE_WIDTH, FINE_WIDTH = 0.0008, 0.0001  # m
-CENTRE_DIAMETER = 0.0003  # m; of the dot that shows it magnified: MAGNIFIED_DIAMETER
-MAGNIFIED_DIAMETER = 0.004  # m
+CENTRE_DIAMETER, MAGNIFIED_DIAMETER = 0.0003, 0.004  # m; of the dots for the observed centre, true and magnified
 DISC_HEIGHT = 0.001  # m
 ARROW_LENGTH, ARROW_WIDTHS = 0.02, (0.002, 0.006, 0.008)  # m; widths of shaft and head, length of the head
 DIAL = (1.06, 1.14, 1.02, 1.18)  # radii of the band, then of the observed stroke, in units of the outline's reach
@@ -34,7 +33,7 @@ WHITE, RED = (0.9, 0.9, 0.9, 0.8), (1.0, 0.35, 0.3, 1.0)
 
 @dataclass(frozen=True)
 class _Sheet:
-    """Where and when the markers of one window lie."""
+    """Frame and stamp of the markers of one window, and the kinds of marker."""
 
     frame_id: str
     stamp_ns: int
@@ -86,7 +85,7 @@ def prediction_markers(
     frame_id: str,
     stamp: int,
 ) -> MarkerArray:
-    """The 95 % ellipse around the predicted centre, the outlines at start, predicted and observed, the observed centre.
+    """Outlines at the start, predicted and observed; 95 % ellipse of the predicted centre; observed centre.
 
     rig_outline_vertices: (V, 2), m, body frame. slider_start, predicted_pose, observed_pose: (3,) x, y (m), heading
     (rad) in `frame_id`. covariance_world_xy: (2, 2) of the predicted centre along that frame's axes, m^2. stamp: ns.
@@ -108,10 +107,10 @@ def prediction_markers(
 
 
 def push_markers(tip: Array, radius: float, heading: float, frame_id: str, stamp: int) -> MarkerArray:
-    """The pusher as a disc, and an arrow that ends at its back and points to where it pushes.
+    """The pusher as a disc, and an arrow that ends at its back and points in the push direction.
 
     tip: (2,) centre of the disc, m; radius m; heading of the push in `frame_id`, rad; stamp: ns. The arrow's length
-    says nothing.
+    has no meaning.
     """
     sheet, ahead = _Sheet(frame_id, stamp), np.array([np.cos(heading), np.sin(heading)])
     back = tip - radius * ahead
@@ -132,11 +131,11 @@ def magnified_markers(
     frame_id: str,
     stamp: int,
 ) -> MarkerArray:
-    """Where the outcome fell in the prediction, all MAGNIFICATION times larger than it is.
+    """The outcome relative to the prediction, MAGNIFICATION times enlarged.
 
     Around the predicted centre its 95 % ellipse, and a dot for the observed centre. Outside the outline a dial: its
-    middle, in the direction `ahead` (rad), stands for the predicted heading, its band for 95 % of the headings, a
-    stroke for the observed one. predicted_pose, observed_pose (3,): x, y m, heading rad; covariance_world (3, 3) of
+    middle, in the direction `ahead` (rad), is the predicted heading, its band the 95 % interval of the heading, a
+    stroke the observed heading. predicted_pose, observed_pose (3,): x, y m, heading rad; covariance_world (3, 3) of
     x, y, heading along the axes of `frame_id`; reach: the outline's largest distance from its centre, m; stamp: ns.
     """
     sheet, centre = _Sheet(frame_id, stamp), predicted_pose[:2]
@@ -157,13 +156,13 @@ def magnified_markers(
 
 
 def label_marker(text: str, centre: Array, reach: float, outside: bool, frame_id: str, stamp: int) -> MarkerArray:
-    """Text above a slider at centre (2,), m, whose outline reaches that far; red if the outcome lies outside."""
+    """Text above a slider at centre (2,) whose outline has this reach (m); red if the outcome lies outside."""
     place = centre + np.array([0.0, LABEL_PLACE * reach])
     return MarkerArray(markers=[_Sheet(frame_id, stamp).text("label", place, text, RED if outside else WHITE)])
 
 
 def confidence_ellipse(centre: Array, covariance: Array) -> Array:
-    """Points (ELLIPSE_POINTS, 2) of the closed curve that holds 95 % of N(centre (2,), covariance (2, 2))."""
+    """Points (ELLIPSE_POINTS, 2) of the closed curve that contains 95 % of N(centre (2,), covariance (2, 2))."""
     angle = np.linspace(0.0, 2.0 * np.pi, ELLIPSE_POINTS)
     variance, axes = np.linalg.eigh(covariance)
     radius = np.sqrt(CHI2_95_OF_TWO * np.maximum(variance, 0.0))

@@ -22,8 +22,10 @@ class RefusedError(PushPredictorError):
 
 @dataclass(frozen=True, eq=False)
 class PushQuery:
-    """n pushes asked of one model: inputs (n, 3: velocity m/s, contact, angle rad), one duration (s) for all,
-    covariates (n,) by name. model: a name, empty for the default one.
+    """n pushes to predict by one model.
+
+    inputs (n, 3): velocity m/s, contact, angle rad. duration: s, of all. covariates: (n,) by name. model: a name, empty
+    for the default one.
     """
 
     model: str
@@ -86,7 +88,7 @@ def extend_batch_response(response: PredictPushBatch.Response, prediction: Predi
 
 
 def refuse(response: Any, reason: str) -> Any:
-    """A fresh response of the same kind: no number in it, success false, and the reason."""
+    """A new response of the same kind without numbers: success false, and the reason."""
     return type(response)(success=False, message=reason)
 
 
@@ -125,7 +127,7 @@ def _covariates(request: Any, count: int) -> dict[str, Array]:
 
 
 def _doubles(values: Array) -> array[float]:
-    """The values, row-major, as messages keep them: from a list they would be taken one by one."""
+    """The values, row-major, as messages store them: a list would be converted one by one."""
     return array("d", np.asarray(values, dtype=np.float64).tobytes())
 
 

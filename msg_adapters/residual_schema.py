@@ -1,4 +1,4 @@
-"""The definition of PushResidual as a bag stores it, so that a recording of residuals explains itself."""
+"""The definition of PushResidual that a bag of residuals contains, so that any tool can read it."""
 
 from __future__ import annotations
 

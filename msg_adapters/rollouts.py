@@ -1,4 +1,4 @@
-"""RolloutPushes <-> a rollout in the world: the plane out of a pose in space, poses and samples back into its frame."""
+"""RolloutPushes <-> a rollout in the plane of the world: a pose in space is projected, results are lifted again."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True, eq=False)
 class RolloutQuery:
-    """A request as it was asked, in its own frame: slider with covariance (6, 6), steps (k, 4: velocity m/s, contact,
-    angle rad, duration s), how many samples are wanted, seed. model: a name, empty for the default one.
+    """A request in its own frame. model: a name, empty for the default one.
+
+    slider with covariance (6, 6); steps (k, 4): velocity m/s, contact, angle rad, duration s; number of samples; seed.
     """
 
     model: str
@@ -40,7 +41,7 @@ class WorldSlider:
 
 
 def query_from_rollout_request(request: Any) -> RolloutQuery:
-    """What a RolloutPushes request asks; its steps are checked by the rollout.
+    """The query of a RolloutPushes request; the rollout checks its steps.
 
     Raises RequestError for a pose that is not finite, a quaternion not of unit length, and too many particles.
     """
@@ -58,10 +59,10 @@ def query_from_rollout_request(request: Any) -> RolloutQuery:
 
 
 def world_slider(query: RolloutQuery, frame: SpatialPose) -> WorldSlider:
-    """The slider of a query whose frame lies in the world as `frame`.
+    """The slider of a query whose frame has the pose `frame` in the world.
 
-    Of the covariance x, y and the rotation about z count, in the world's plane. Raises RequestError where the slider
-    does not lie flat or these three have no covariance.
+    Of the covariance only x, y and the rotation about z in the world's plane are used. Raises RequestError if the
+    slider does not lie flat, or these three have no valid covariance.
     """
     slider = frame @ query.slider
     if slider.tilt > FLAT:
@@ -81,9 +82,9 @@ def world_slider(query: RolloutQuery, frame: SpatialPose) -> WorldSlider:
 def fill_rollout_response(
     response: Any, frame: SpatialPose, slider: WorldSlider, rolled: Rollout, samples: int
 ) -> None:
-    """Write a rollout in the frame of the request: height and small tilt of the slider stay as they were.
+    """Write a rollout in the frame of the request; height and small tilt of the slider do not change.
 
-    Covariances are those of x, y and the heading in the world's plane, zero in all else.
+    Covariances are those of x, y and the heading in the world's plane, and zero elsewhere.
     """
     to_request = frame.inverse
     response.poses = [
@@ -96,7 +97,7 @@ def fill_rollout_response(
 
 
 def seen_from(to_request: SpatialPose, slider: WorldSlider, poses: Array) -> Array:
-    """x, y and heading (p, 3) in the request's frame of the slider at planar poses (p, 3) in the world."""
+    """Planar poses (p, 3) of the slider in the world as x, y and heading (p, 3) in the request's frame."""
     height = np.full(len(poses), slider.pose.position[2])
     place = np.column_stack([poses[:, :2], height]) @ to_request.rotation.T + to_request.position
     ahead = slider.pose.rotation[:, 0]
@@ -113,18 +114,17 @@ def seen_from(to_request: SpatialPose, slider: WorldSlider, poses: Array) -> Arr
 
 
 def remarks(rolled: Rollout) -> str:
-    """In words, what a planner should know of a rollout; empty where all went by what the model has learnt."""
-    known, held = rolled.in_domain, rolled.in_contact
-    said = []
-    if beyond := [k for k, share in enumerate(known) if share < 1.0]:
-        first, share = beyond[0], 100.0 * (1.0 - known[-1])
-        said.append(f"{share:.3g} % of the samples leave the domain of the training data, from steps[{first}] on")
-    said += [
-        f"{100.0 * (1.0 - share):.3g} % of them have lost contact when steps[{k}] ends"
-        for k, share in enumerate(held)
-        if share < 1.0
-    ]
-    return "; ".join(said)
+    """In words, what a planner should know of a rollout; empty if every sample stays in the domain and in contact."""
+    found = []
+    if outside := [k for k, share in enumerate(rolled.in_domain) if share < 1.0]:
+        percent = 100.0 * (1.0 - rolled.in_domain[-1])
+        found.append(
+            f"{percent:.3g} % of the samples leave the domain of the training data, from steps[{outside[0]}] on"
+        )
+    for k, share in enumerate(rolled.in_contact):
+        if share < 1.0:
+            found.append(f"{100.0 * (1.0 - share):.3g} % of the samples have lost contact at the end of steps[{k}]")
+    return "; ".join(found)
 
 
 def _moved(slider: WorldSlider, planar: Array) -> SpatialPose:

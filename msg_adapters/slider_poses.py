@@ -1,4 +1,4 @@
-"""PredictSliderPose <-> a push in the world: the plane out of poses in space, and back into them."""
+"""PredictSliderPose <-> a push in the plane of the world: poses in space are projected, and lifted again."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PLANAR = np.ix_([0, 1, 5], [0, 1, 5])  # x, y and the rotation about z among x, 
 
 @dataclass(frozen=True, eq=False)
 class SliderPoseQuery:
-    """A request as it was asked, in its own frame: slider; pusher (3,) m; velocity (3,) m/s; duration s; covariates.
+    """A request in its own frame: slider; pusher (3,) m; velocity (3,) m/s; duration s; covariates.
 
     model: a name, empty for the default one.
     """
@@ -39,7 +39,7 @@ class SliderPoseQuery:
 
 
 def query_from_slider_request(request: Any) -> SliderPoseQuery:
-    """What a PredictSliderPose request asks.
+    """The query of a PredictSliderPose request.
 
     Raises RequestError for a number that is not finite, a quaternion that is not of unit length, and covariates whose
     values do not match their names.
@@ -55,9 +55,9 @@ def query_from_slider_request(request: Any) -> SliderPoseQuery:
 
 
 def world_push(query: SliderPoseQuery, frame: SpatialPose) -> WorldPush:
-    """The push in the world of a query whose frame lies there as `frame`.
+    """The push in the world of a query whose frame has the pose `frame` there.
 
-    Raises RequestError where the slider does not lie flat, the tip is lifted off it or its motion leaves the plane.
+    Raises RequestError if the slider does not lie flat, the tip is lifted off it or its motion leaves the plane.
     """
     slider, pusher, velocity = frame @ query.slider, frame.point(query.pusher), frame.vector(query.velocity)
     if slider.tilt > FLAT:
@@ -75,10 +75,10 @@ def world_push(query: SliderPoseQuery, frame: SpatialPose) -> WorldPush:
 def fill_slider_response(
     response: Any, header: Any, query: SliderPoseQuery, frame: SpatialPose, push: WorldPush, after: SliderAfter
 ) -> None:
-    """Write the slider after the push, in the frame of the request: height and small tilt stay as they were.
+    """Write the slider's pose after the push, in the frame of the request; height and small tilt do not change.
 
-    The covariance is that of x, y and the heading in the world's plane, zero in all else. The stamp is the request's
-    plus the duration; a zero stamp, no time known, stays zero. Raises MessageError for a time beyond 32-bit seconds.
+    The covariance is that of x, y and the heading in the world's plane, and zero elsewhere. The stamp is the request's
+    plus the duration; a zero stamp (unknown time) stays zero. Raises MessageError for a time beyond 32-bit seconds.
     """
     before = frame @ query.slider
     moved = SpatialPose(np.array([*after.pose[:2], before.position[2]]), before.quaternion)
@@ -91,7 +91,7 @@ def fill_slider_response(
         answer.header.stamp = ns_to_stamp(stamp + round(push.duration * 1e9))
     _fill_pose(answer, to_request @ moved.turned(float(after.pose[2] - push.slider[2])))
     spread = to_request.covariance(covariance)
-    answer.pose.covariance = (0.5 * (spread + spread.T)).reshape(36)  # exactly symmetric, which rounding was not
+    answer.pose.covariance = (0.5 * (spread + spread.T)).reshape(36)  # exactly symmetric, in spite of rounding
     response.in_domain = after.in_domain
     response.success = True
 

@@ -1,6 +1,6 @@
-"""What `push_predictor doctor` asks of ROS, in a process of its own: a line of JSON a finding, on stdout.
+"""The ROS checks of `push_predictor doctor`, in a process of their own: one line of JSON on stdout for each finding.
 
-Every finding is {"name", "state", "found", "why", "remedy"}; {"name"} alone says what is being tried.
+A finding is {"name", "state", "found", "why", "remedy"}; {"name"} alone announces the check that runs next.
 """
 
 from __future__ import annotations
@@ -31,97 +31,107 @@ INTERFACES = {
     "msg.PushAlarm": ("push_id", "log10_evidence", "false_alarm_rate"),
     "action.TraceResidual.Result": ("verdict", "extended_model"),
 }
-WHEELS = "pip install 'ros-jazzy-rclpy[fastrtps]', or . /opt/ros/jazzy/setup.sh"
-BUILD = "pip install ./push_predictor_interfaces, or colcon build && . install/setup.sh"
-PATIENCE = 20.0  # s for predict_server to start, and to answer
-AGAIN = 4.0  # s until it is asked again
+INSTALL_ROS = "pip install 'ros-jazzy-rclpy[fastrtps]', or . /opt/ros/jazzy/setup.sh"
+BUILD_INTERFACES = "pip install ./push_predictor_interfaces, or colcon build && . install/setup.sh"
+PATIENCE = 20.0  # s that predict_server may take to start, and to answer
+AGAIN = 4.0  # s after which the request is sent again
 PUSH = {"velocity": 0.02, "contact": 0.1, "angle": 0.1, "duration": 0.2}
+TRANSPORT_REMEDY = (
+    "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4, or another ROS_DOMAIN_ID; a firewall must let UDP on lo pass"
+)
 
 
 def main() -> int:
-    """Check one thing after the other; what cannot be checked without the one before it is left out."""
+    """Run the checks in order, without those that need one that failed; returns the exit status."""
     for name, check in (("rclpy", rclpy_works), ("messages", messages), ("interfaces", interfaces)):
-        if not _said(name, check):
+        if not _report(name, check):
             return 1
-    well = [_said("middleware", middleware), _said("shared memory", shared_memory), _said("security", security)]
-    return 0 if all(well) and _said("loop-back call", loop_back) else 1
+    passed = [_report("middleware", middleware), _report("shared memory", shared_memory), _report("security", security)]
+    return 0 if all(passed) and _report("loop-back call", loop_back) else 1
 
 
 def rclpy_works() -> dict[str, str]:
-    """The client library imports, with what lies below it."""
+    """Check that the client library imports, with the middleware below it."""
     try:
         import rclpy
         from rclpy.impl.implementation_singleton import rclpy_implementation
     except Exception as error:  # a library that does not load raises many kinds
-        why = "the nodes need it; learning, prediction and reports do not"
-        return _missing(f"not usable ({error})", why, WHEELS)
+        why = "the nodes need it; training, prediction and reports do not"
+        return _missing(f"not usable ({error})", why, INSTALL_ROS)
     assert rclpy_implementation
     distribution = os.environ.get("ROS_DISTRO", "")
     return _ok(f"{Path(rclpy.__file__).parent}{distribution and f', ROS {distribution}'}")
 
 
 def messages() -> dict[str, str]:
-    """The standard messages that the nodes use."""
-    lost = [package for package in PACKAGES if not _imports(f"{package}.{_kind(package)}")]
-    if lost:
-        return _missing(f"not found: {', '.join(lost)}", "the nodes publish and serve these", WHEELS)
+    """Check that the standard messages are installed which the nodes use."""
+    missing = [package for package in PACKAGES if not _imports(f"{package}.{_kind(package)}")]
+    if missing:
+        return _missing(f"not found: {', '.join(missing)}", "the nodes publish and subscribe to them", INSTALL_ROS)
     return _ok(f"{len(PACKAGES)} packages")
 
 
 def interfaces() -> dict[str, str]:
-    """push_predictor_interfaces is there and has the fields that this version fills."""
+    """Check that push_predictor_interfaces is installed, with the fields that this version fills."""
     try:
         package = importlib.import_module("push_predictor_interfaces")
         lacking = [
             f"{name}.{field}" for name, fields in INTERFACES.items() for field in fields if not _has(name, field)
         ]
     except Exception as error:  # as above
-        return _missing(f"push_predictor_interfaces is not usable ({error})", "the nodes speak it", BUILD)
+        return _missing(
+            f"push_predictor_interfaces is not usable ({error})",
+            "the nodes communicate by these interfaces",
+            BUILD_INTERFACES,
+        )
     if lacking:
         found = f"push_predictor_interfaces has no {', '.join(lacking)}"
-        return _missing(found, "it is of another version than push_predictor", BUILD)
+        return _missing(found, "its version differs from that of push_predictor", BUILD_INTERFACES)
     return _ok(str(Path(package.__file__ or "").parent))
 
 
 def middleware() -> dict[str, str]:
-    """Which RMW, which domain, and how far it looks for others."""
+    """Report the middleware, the domain and the range of discovery."""
     from rclpy.utilities import get_rmw_implementation_identifier
 
     from push_predictor.nodes.network_security import DISCOVERY, limit_discovery
 
-    told = ", ".join(f"{name}={os.environ[name]}" for name in DISCOVERY if os.environ.get(name))
-    far = "this machine alone, the default of these nodes" if limit_discovery() else told
+    given = ", ".join(f"{name}={os.environ[name]}" for name in DISCOVERY if os.environ.get(name))
+    reach = "only on this machine, the default of these nodes" if limit_discovery() else given
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
-    return _ok(f"{get_rmw_implementation_identifier()}, domain {domain}, discovery: {far}")
+    return _ok(f"{get_rmw_implementation_identifier()}, domain {domain}, discovery: {reach}")
 
 
 def shared_memory() -> dict[str, str]:
-    """Fast DDS delivers on one machine through /dev/shm."""
+    """Check that /dev/shm is writable: Fast DDS delivers messages on one machine through it."""
     place = Path("/dev/shm")
     if os.access(place, os.W_OK) or "UDP" in os.environ.get("FASTDDS_BUILTIN_TRANSPORTS", ""):
-        return _ok(f"{place} may be written to" if os.access(place, os.W_OK) else "not used")
+        return _ok(f"{place} is writable" if os.access(place, os.W_OK) else "not used")
     remedy = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4"
-    return _finding("note", f"{place} may not be written to", "Fast DDS prints errors, or loses messages", remedy)
+    return _finding("note", f"{place} is not writable", "Fast DDS prints errors, or loses messages", remedy)
 
 
 def security() -> dict[str, str]:
-    """Whether the security that was asked for can be had."""
+    """Check that the security is available that the environment requests."""
     from push_predictor.nodes.network_security import ENABLE, SecurityError, require_security, security_compiled_in
 
     try:
         require_security()
     except SecurityError as error:
-        return _missing(str(error), "the nodes refuse to start", f"unset {ENABLE}, or a middleware with security")
+        return _missing(
+            str(error), "the nodes refuse to start", f"unset {ENABLE}, or install a middleware with security"
+        )
     if os.environ.get(ENABLE) != "true":
-        return _ok(f"not asked for; the middleware {'has' if security_compiled_in() else 'was built without'} it")
+        support = "supports" if security_compiled_in() else "was built without"
+        return _ok(f"not requested; the middleware {support} it")
     if os.environ.get("ROS_SECURITY_STRATEGY") != "Enforce":
-        why = "a node without keys goes on unprotected, without a word"
-        return _finding("note", "asked for, not enforced", why, "export ROS_SECURITY_STRATEGY=Enforce")
-    return _ok("asked for and enforced")
+        why = "a node without keys starts unprotected, without a warning"
+        return _finding("note", "requested, not enforced", why, "export ROS_SECURITY_STRATEGY=Enforce")
+    return _ok("requested and enforced")
 
 
 def loop_back() -> dict[str, str]:
-    """A predict_server with the shipped model starts and answers predict_push, out of everybody's way."""
+    """Check that a predict_server with the shipped model starts and answers, in a namespace of its own."""
     namespace = f"/push_predictor_doctor_{os.getpid()}"
     command = [sys.executable, "-m", "push_predictor.nodes.predict_server", "--ros-args", "-r", f"__ns:={namespace}"]
     with tempfile.TemporaryFile("w+") as log:
@@ -134,17 +144,14 @@ def loop_back() -> dict[str, str]:
             server.kill()
             server.wait()
         if not problem:
-            return _ok(f"predict_push was answered {took:.1f} s after predict_server was started")
+            return _ok(f"predict_push answered {took:.1f} s after the start of predict_server")
         log.seek(0)
         last = log.read().strip().splitlines()[-1:]
-        return _missing("; ".join([problem, *last]), "nodes cannot talk to each other here", _OF_A_CALL)
-
-
-_OF_A_CALL = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4, another ROS_DOMAIN_ID; a firewall must let UDP on lo pass"
+        return _missing("; ".join([problem, *last]), "nodes cannot communicate on this machine", TRANSPORT_REMEDY)
 
 
 def _call(namespace: str, alive: Callable[[], bool]) -> str:
-    """Ask for one prediction; answers what went wrong, empty if nothing did."""
+    """Request one prediction; returns what went wrong, empty if nothing did."""
     import rclpy
     from rclpy.node import Node
 
@@ -160,7 +167,9 @@ def _call(namespace: str, alive: Callable[[], bool]) -> str:
             if time.monotonic() > deadline:
                 return f"predict_server was not found within {PATIENCE:.0f} s"
         response, deadline = None, time.monotonic() + PATIENCE
-        while response is None and time.monotonic() < deadline:  # an answer is lost while the two still get acquainted
+        while (
+            response is None and time.monotonic() < deadline
+        ):  # an answer is lost while client and server discover each other
             future = client.call_async(PredictPush.Request(**PUSH))
             rclpy.spin_until_future_complete(node, future, timeout_sec=AGAIN)
             response = future.result() if future.done() else None
@@ -171,8 +180,8 @@ def _call(namespace: str, alive: Callable[[], bool]) -> str:
         rclpy.try_shutdown()
 
 
-def _said(name: str, check: Callable[[], dict[str, str]]) -> bool:
-    """Run a check and print; answers whether the next one makes sense."""
+def _report(name: str, check: Callable[[], dict[str, str]]) -> bool:
+    """Run a check and print its finding; returns whether it passed."""
     print(json.dumps({"name": name}), flush=True)
     found = {"name": name, **check()}
     print(json.dumps(found), flush=True)
@@ -192,7 +201,7 @@ def _imports(module: str) -> bool:
 
 
 def _has(name: str, field: str) -> bool:
-    """Has an interface such as srv.PredictPush.Response this field?"""
+    """Whether an interface such as srv.PredictPush.Response has this field."""
     kind, *path = name.split(".")
     found: Any = importlib.import_module(f"push_predictor_interfaces.{kind}")
     for part in path:

@@ -1,4 +1,4 @@
-"""Who on the network may meet a node: discovery, and whether the security that was asked for is there."""
+"""Which machines can discover a node, and whether the security that the environment requests is available."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from push_predictor.errors import PushPredictorError
 
 RANGE, ENABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_SECURITY_ENABLE"
-DISCOVERY = (RANGE, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY")  # one that is set tells how far
-LIMITED = (
-    f"other machines cannot find this node, {RANGE} is not set: export {RANGE}=SUBNET on all of them if they should"
-)
+DISCOVERY = (RANGE, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY")  # any of them sets the range
+LIMITED = f"Other machines cannot discover this node. To allow it, export {RANGE}=SUBNET on all machines."
+SECURITY_PAGE = "docs/how_to/security.md"
 
 
 class SecurityError(PushPredictorError):
-    """Security was asked for and cannot be had."""
+    """The environment requests security that is not available."""
 
 
 def limit_discovery() -> bool:
-    """Keep to this machine unless the environment tells how far to look; before rclpy.init. Answers if it was limited.
+    """Limit discovery to this machine unless the environment sets a range; returns whether it was limited.
 
-    Nodes on this machine find each other all the same, also those with the wider range that ROS has by default.
+    Call it before rclpy.init. Nodes on this machine still discover each other, also those with ROS's wider default.
     """
     if any(os.environ.get(name) for name in DISCOVERY):
         return False
@@ -40,49 +39,53 @@ def limit_discovery() -> bool:
 
 
 def require_security() -> None:
-    """Raise SecurityError if the environment asks for security that the middleware was not built with.
+    """Raise SecurityError if the environment requests security that the middleware was built without.
 
-    rcl would go on without a word where ROS_SECURITY_STRATEGY is not Enforce: the node would be open to everybody.
+    Unless ROS_SECURITY_STRATEGY is Enforce, rcl would start an unprotected node without a warning.
     """
-    asked = os.environ.get(ENABLE, "")
-    if asked.lower() in ("", "false", "0", "no", "off"):
+    requested = os.environ.get(ENABLE, "")
+    if requested.lower() in ("", "false", "0", "no", "off"):
         return
-    if asked != "true":
-        raise SecurityError(f"{ENABLE}={asked} secures nothing, ROS knows the word true alone: write that, or unset it")
+    if requested != "true":
+        raise SecurityError(
+            f"{ENABLE}={requested} does not enable security: ROS accepts only true. Set that, or unset it"
+        )
     if not security_compiled_in():
         raise SecurityError(
-            f"{ENABLE}=true, but {get_rmw_implementation_identifier()} was built without DDS security: take one "
-            f"with it, as in the Debian packages of ROS, or unset {ENABLE}; docs/how_to/security.md"
+            f"{ENABLE}=true, but {get_rmw_implementation_identifier()} was built without DDS security. Install a "
+            f"middleware with security, such as ROS's Debian packages, or unset {ENABLE}; see {SECURITY_PAGE}"
         )
 
 
 def security_hint() -> str:
-    """What to look at when a node that should be secured cannot be made; empty if none should be."""
+    """What to check when a node that requests security cannot be created; empty if it does not."""
     if os.environ.get(ENABLE) != "true":
         return ""
     names = (ENABLE, "ROS_SECURITY_STRATEGY", "ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENCLAVE_OVERRIDE")
     given = ", ".join(f"{name}={os.environ.get(name, '')}" for name in names)
-    return f"; security was asked for ({given}): is there an enclave for the node? docs/how_to/security.md"
+    return (
+        f"; security is requested ({given}). Check that the keystore has an enclave for the node; see {SECURITY_PAGE}"
+    )
 
 
 def security_compiled_in() -> bool:
-    """Whether the middleware could protect a node: it is asked for one with an enclave that holds no key.
+    """Whether the middleware supports security, tried out with an enclave without a key.
 
-    The refusal tells: Fast DDS and Cyclone DDS name the switch SECURITY=ON that they were built without. No node
-    comes into being either way.
+    No node is created either way: Fast DDS and Cyclone DDS built without security name the switch SECURITY=ON in their
+    error.
     """
     with tempfile.TemporaryDirectory(prefix="push_predictor_enclave_") as keystore:
         Path(keystore, "enclaves", "none").mkdir(parents=True)
         wanted = {ENABLE: "true", "ROS_SECURITY_STRATEGY": "Enforce", "ROS_SECURITY_KEYSTORE": keystore}
         with _environment({**wanted, "ROS_SECURITY_ENCLAVE_OVERRIDE": "/none"}), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a node that half exists
-            return "SECURITY=ON" not in _refusal()
+            warnings.simplefilter("ignore")  # about the half-created node
+            return "SECURITY=ON" not in _creation_error()
 
 
-def _refusal() -> str:
-    """Why no node can be made."""
+def _creation_error() -> str:
+    """The error of creating a node, empty if there is none."""
     context = Context()
-    set_logger_level("rcl", LoggingSeverity.WARN)  # it would tell where the keystore lies
+    set_logger_level("rcl", LoggingSeverity.WARN)  # otherwise it logs where the keystore lies
     try:
         context.init(args=[])
         Node("probe", context=context).destroy_node()

@@ -1,4 +1,4 @@
-"""Validation while pushes happen, without ROS: windows on disk, running scores, completed pushes, the alarm's process.
+"""Validation while pushes happen, without ROS: session, buffers, stream sync, running scores, files, alarm process.
 
 `nodes.validator` adds topics and services; import anything from here.
 """

@@ -1,4 +1,4 @@
-"""Validation while windows arrive: which were predicted by whom, and what that says so far. No ROS in here."""
+"""The windows and predictions of a validation run, and the files written about them."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _NUMBER = struct.Struct("<q")
 
 
 class LiveValidation:
-    """Windows in the order they were found, and the predictions of each model as they come in.
+    """Windows in the order they were found, and the predictions of each model in any order.
 
-    models: by the name they are asked for; the first is the main one, and a model's number is its place. All of it is
-    kept in temporary files: a window takes some twenty bytes of memory until the result is written.
+    models: by the name to request; the first is the main one, and a model's number is its position. All windows and
+    predictions are stored in temporary files: a window takes some twenty bytes of memory until the result is written.
     """
 
     def __init__(self, models: Mapping[str, PushModel]) -> None:
@@ -40,41 +40,41 @@ class LiveValidation:
         self._refused = tuple(RowFile() for _ in self.models)
 
     def add(self, window: PushWindow) -> int:
-        """Take a window; returns its number."""
+        """Add a window; returns its number."""
         self.windows.append(window)
         return len(self.windows) - 1
 
     def record(self, model: int, number: int, prediction: Prediction) -> None:
-        """Take what a model predicted for a window (n = 1), once."""
+        """Record a model's prediction (n = 1) of a window; once for each."""
         window, mean, covariance = self.windows[number], prediction.mean[0], prediction.covariance[0]
         self._answers[model].add(number, mean, covariance)
         self.scores[model].add(window.push_id, mean, covariance, window.displacement)
 
     def refuse(self, model: int, number: int, reason: str) -> None:
-        """Take note that a model has no prediction for a window, and why."""
+        """Record that a model was refused a window, and why."""
         self._refused[model].append(_NUMBER.pack(number) + reason.encode())
 
     def predicted(self, model: int = 0) -> WindowRows:
-        """The windows that a model has answered, in order."""
+        """The windows that a model has predicted, in order."""
         return self.windows.take(self._answers[model].sorted()[0])
 
     def refused(self, model: int = 0) -> list[Refusal]:
-        """The windows that it has refused, in order."""
+        """The windows that a model was refused, in order."""
         pairs = sorted((*_NUMBER.unpack_from(row), row[_NUMBER.size :].decode()) for row in self._refused[model])
         return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
 
     def unanswered(self, model: int = 0) -> int:
-        """How many windows it has neither answered nor refused."""
+        """How many windows were neither predicted nor refused."""
         return len(self.windows) - len(self._answers[model]) - len(self._refused[model])
 
     def comparison(self, model: int = 0) -> Comparison:
-        """What a model predicted beside what was observed, for the windows it has answered."""
+        """Predicted and observed outcomes of the windows that a model has predicted."""
         numbers, mean, covariance = self._answers[model].sorted()
         table = windows_to_table(self.windows.take(numbers))
         return comparison_of(self.models[model], table, mean, covariance)
 
     def residuals(self) -> Iterator[tuple[str, PushWindow, Array, Array]]:
-        """Name of the model, window, mean (3,) and covariance (3, 3) of every answer, in the order of the windows."""
+        """Model name, window, mean (3,) and covariance (3, 3) of every prediction, in the order of the windows."""
         answers = [zip(*stored.sorted(), strict=True) for stored in self._answers]
         rows = [(number, k, mean, covariance) for k, each in enumerate(answers) for number, mean, covariance in each]
         for number, k, mean, covariance in sorted(rows, key=lambda row: row[:2]):
@@ -118,5 +118,5 @@ class _Answers:
 
 
 def _file_name(name: str) -> str:
-    """A model's name as part of a file's: a server may call its models anything."""
+    """A model's name as part of a file name: a server may give its models any name."""
     return re.sub(r"[^\w.-]", "_", name)

@@ -1,4 +1,4 @@
-"""The HTML report of a validation, made by a process of its own: pictures take seconds, samples come meanwhile."""
+"""The HTML report of a validation, written by a process of its own: figures take seconds while samples arrive."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class ReportWriter:
 
     @property
     def busy(self) -> bool:
-        """Is a report being written?"""
+        """Whether a report is being written."""
         return self._process is not None and self._process.is_alive()
 
     @property
     def failed(self) -> bool:
-        """Did the last report come to nothing?"""
+        """Whether the last report failed."""
         return self._process is not None and self._process.exitcode not in (None, 0)
 
     def start(self, validation: LiveValidation, folder: Path) -> None:
-        """Write FOLDER/report.html about the models that answered for the windows of the main one."""
+        """Write FOLDER/report.html about the models that have predicted the same windows as the main one."""
         self.stop()
         comparisons = [validation.comparison(k) for k in range(len(validation.models))]
         whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
@@ -48,7 +48,7 @@ class ReportWriter:
         self._process.start()
 
     def stop(self) -> None:
-        """End a report that is being written; it is not left in halves."""
+        """End a report that is being written; its unfinished files are removed."""
         if self._process is not None and self._process.is_alive():
             self._process.terminate()
             self._process.join()

@@ -1,4 +1,4 @@
-"""Rows of bytes on disk, eight bytes of memory each: what lets a validator run for days."""
+"""Rows of bytes on disk, eight bytes of memory each, so that a validator can run for days."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import overload
 
 
 class RowFile(Sequence[bytes]):
-    """Rows in a file without a name, in the folder for temporary files: gone with the process, however that ends.
+    """Rows in a file without a name, in the folder for temporary files; it disappears with the process.
 
     A row that the disk does not take stays in memory. A negative number counts from the end.
     """
@@ -22,7 +22,7 @@ class RowFile(Sequence[bytes]):
         self._file: int | None = None
 
     def append(self, row: bytes) -> None:
-        """Take a row."""
+        """Append a row."""
         begin = self._ends[-1]
         if not self._written(row, begin):
             self._kept[len(self)] = row

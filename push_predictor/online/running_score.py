@@ -1,4 +1,4 @@
-"""NMSE, NLPD and coverage while windows come in, at the same cost for each: what a diagnostic can show every second."""
+"""Running NMSE, NLPD and coverage, at constant cost per window: the scores that diagnostics show every second."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor.types import Array
 
 
 class RunningScore:
-    """Sums over the windows of one model. training_mean (3,): the reference of the NMSE."""
+    """Running sums over the windows of one model. training_mean (3,): the reference of the NMSE."""
 
     def __init__(self, training_mean: Array) -> None:
         self.windows = 0
@@ -25,11 +25,11 @@ class RunningScore:
 
     @property
     def pushes(self) -> int:
-        """Of how many pushes the windows are."""
+        """The number of pushes that the windows belong to."""
         return len(self._pushes)
 
     def add(self, push_id: str, mean: Array, covariance: Array, observed: Array) -> None:
-        """Count a window: mean (3,), covariance (3, 3), observed (3,)."""
+        """Add a window: predicted mean (3,) and covariance (3, 3), observed outcome (3,)."""
         predicted, variance, outcome = mean[None], np.diagonal(covariance)[None], observed[None]
         self.windows += 1
         self._count_push(push_id)
@@ -45,7 +45,7 @@ class RunningScore:
             self._pushes.insert(place, digest)
 
     def values(self) -> dict[str, int | float | None]:
-        """The totals of `metrics_json` and the coverage of each output, by name; None where no window tells."""
+        """The totals of `metrics_json` and the coverage of each output, by name; None where undefined."""
         found: dict[str, int | float | None] = {"windows": self.windows, "pushes": self.pushes}
         known = self.windows > 0 and bool(np.all(self._spread > 0.0))
         found["nmse"] = float(np.sum(self._error / self._spread)) if known else None

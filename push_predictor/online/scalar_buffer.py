@@ -28,7 +28,7 @@ class SentTimes:
         self._clock: list[int] = []
 
     def put(self, data: bytes, sent: int) -> None:
-        """Take a message of /clock."""
+        """Add a message of /clock."""
         seconds, rest = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
         self._sent.append(max(sent, self.newest or 0))
         self._clock.append(seconds * 1_000_000_000 + rest)
@@ -69,7 +69,7 @@ class ScalarBuffer:
         return self._rules.layout.header
 
     def put(self, data: bytes, sent: int) -> None:
-        """Take a message and the time (ns) at which it was sent; any thread may."""
+        """Add a message and the time (ns) at which it was sent, from any thread."""
         with self._lock:
             self.received += 1
             self._waiting.append((data, sent))

@@ -1,4 +1,4 @@
-"""The windows of a validation one by one, as JSON: what was predicted, what was observed, what was left out and why."""
+"""The windows of a validation one by one, as JSON: predicted, observed, refused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from push_predictor.recordings.windows.push_window import PushWindow
 
 @dataclass(frozen=True)
 class Refusal:
-    """A window that the server would not predict, and what it said."""
+    """A window that the server refused to predict, and its reason."""
 
     push_id: str
     window: int
@@ -31,7 +31,7 @@ def write_window_log(
 ) -> None:
     """Write {"model", "windows", "refused", "unanswered"}; an older file is replaced when the new one is complete.
 
-    windows: those of the comparison, one a row. refused: windows beside these. unanswered: how many more there were.
+    windows: one for each row of the comparison. refused: further windows. unanswered: how many more there were.
     Raises OSError that names the path.
     """
     write_whole(path, (line.encode() for line in _lines(windows, comparison, refused, unanswered)))
@@ -40,7 +40,7 @@ def write_window_log(
 def _lines(
     windows: Sequence[PushWindow], comparison: Comparison, refused: Sequence[Refusal], unanswered: int
 ) -> Iterator[str]:
-    """Entry by entry: a day's windows as one text would take a gigabyte."""
+    """The text entry by entry: as one string a day's windows would take a gigabyte."""
     yield f'{{"model": {json.dumps(comparison.model)}, "windows": ['
     for k, entry in enumerate(window_log(windows, comparison)):
         yield ("," if k else "") + "\n" + json.dumps(entry, allow_nan=False)
@@ -49,7 +49,7 @@ def _lines(
 
 
 def window_log(windows: Sequence[PushWindow], comparison: Comparison) -> Iterator[dict[str, object]]:
-    """One entry a window, in the fields and units of PushResidual; stamps in ns."""
+    """One entry for each window, in the fields and units of PushResidual; stamps in ns."""
     z = standardised(comparison.mean, comparison.covariance, comparison.observed)
     for k, window in enumerate(windows):
         yield {

@@ -1,4 +1,4 @@
-"""Many windows, on disk: a validator that runs for a day keeps all it has seen."""
+"""A sequence of windows stored on disk: all windows of a day do not fit into memory."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ _FIXED = struct.Struct("<3q14d2H")  # the last two: number of the covariates' na
 
 
 class WindowRows(Sequence[PushWindow]):
-    """Windows packed into rows of a file; the objects are made anew when asked for."""
+    """Windows packed into rows of a file; indexing creates the objects again."""
 
     def __init__(self) -> None:
         self._rows: RowFile | list[bytes] = RowFile()
         self._names: list[tuple[str, ...]] = []  # of the covariates, as sets of them occurred
 
     def append(self, window: PushWindow) -> None:
-        """Take a window."""
+        """Append a window."""
         names = tuple(window.covariates)
         if names not in self._names:
             self._names.append(names)
         self._rows.append(_packed(window, self._names.index(names)))
 
     def take(self, numbers: Iterable[int]) -> WindowRows:
-        """Some of the windows, in the order of the numbers; in memory, and so as something to send to a process."""
+        """Some of the windows, in the order of the numbers; in memory, so that a process can receive them."""
         chosen = WindowRows()
         chosen._rows, chosen._names = [self._rows[number] for number in numbers], self._names.copy()
         return chosen

@@ -118,8 +118,8 @@ def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_mis
     assert "Requests sent again:" in logged and "given up: 0" in logged
     assert_same_as_offline(tmp_path, model)
     said = capfd.readouterr().err
-    assert "predict_push_batch: no answer within 0.5 s, asking again" in said
-    assert "predict_push_batch: answers again after" in said and "requests went unanswered" in said
+    assert "predict_push_batch: no response within 0.5 s, sending the request again" in said
+    assert "predict_push_batch: responds again after" in said and "requests had no response" in said
     assert any(taken > TIMEOUT for taken, _ in planner.answers[5:])  # a request bridged the gap
     assert all(np.array_equal(mean, planner.answers[0][1]) for _, mean in planner.answers)
 
@@ -127,7 +127,7 @@ def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_mis
 def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
     with ros_context(domain) as node, PlannerClient(0.2, timeout=0.2, patience=0.5) as client:
         with pytest.raises(
-            SystemExit, match=r"predict_push_batch is not offered within 0.5 s: does predict_server run"
+            SystemExit, match=r"predict_push_batch: no such service within 0.5 s. Is predict_server running"
         ):
             client.predict(np.array([[0.02, 0.1, 0.0]]))
         node.create_service(
@@ -135,7 +135,7 @@ def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
         )
         assert wait_until(client._batch.service_is_ready)
         client._patience = 1.0
-        with pytest.raises(SystemExit, match=r"did not answer \d requests within 1 s"):
+        with pytest.raises(SystemExit, match=r"no response to \d requests within 1 s"):
             client.predict(np.array([[0.02, 0.1, 0.0]]))
 
 

@@ -75,7 +75,7 @@ def test_a_node_that_should_be_secured_and_cannot_be_refuses_to_start(executable
 
 def test_a_word_that_ros_takes_for_no_is_refused_too():
     """To rcl `True` is not `true`: it would not even look for security."""
-    assert "ROS_SECURITY_ENABLE=True secures nothing" in refused("push_validator", ROS_SECURITY_ENABLE="True")
+    assert "ROS_SECURITY_ENABLE=True does not enable security" in refused("push_validator", ROS_SECURITY_ENABLE="True")
 
 
 # --- discovery -------------------------------------------------------------------------------------------------------
@@ -157,13 +157,13 @@ def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[
         command = (sys.executable, "-m", "push_predictor.nodes.push_validator")
         node = on(here, asked, *command, stdout=output, stderr=output)
         try:
-            assert wait_until(lambda: "waiting for" in log.read_text()), log.read_text()
+            assert wait_until(lambda: "Waiting for" in log.read_text()), log.read_text()
             assert asked or finds(here, 25.0)  # who looks far on the same machine finds it in any case
             assert finds(there, 25.0 if asked else 3.0) == bool(asked)
         finally:
             node.terminate()
             node.wait(30.0)
-    assert ("other machines cannot find this node" in log.read_text()) == (not asked)
+    assert ("Other machines cannot discover this node" in log.read_text()) == (not asked)
 
 
 # --- health and policy: three nodes, /clock standing still ------------------------------------------------------------

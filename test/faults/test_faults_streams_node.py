@@ -157,7 +157,7 @@ def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) 
         assert values["slider rejected not finite"] == "1"
         assert values["streams resets"] == "8"  # one in mid push, and between the pushes
         assert int(values["slider dropouts"]) >= 1 + 7  # and between the pushes, which lie 10 s apart
-        assert "1 ahead (samples whose stamp is ahead" in status.message
+        assert "1 ahead (samples with a stamp ahead" in status.message
         sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor is gone, the others go on
         status.wait_for_message("No sample from the wrench for 2 s")
         assert process.stop() == 0, process.text()

@@ -3,35 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
-from push_predictor.nodes.polling import DeferredTrigger
+from push_predictor.nodes.polling import PolledGroup
 from push_predictor.nodes.validator.result_writer import ResultWriter
 from push_predictor.online.session import Session, State
 
 
 class FinishService:
-    """Offers ~/finish. hindrance: returns in words why no run can begin, empty if one can."""
+    """Offers ~/finish; callers wait while the executor does other work.
+
+    hindrance: returns in words why no run can begin, empty if one can.
+    """
 
     def __init__(self, node: Node, session: Session, writer: ResultWriter, hindrance: Callable[[], str]) -> None:
-        self._service = DeferredTrigger(node, "~/finish")
+        self._service = node.create_service(Trigger, "~/finish", _not_called, callback_group=PolledGroup())
+        self._callers: list[Any] = []
         self._session, self._writer, self._hindrance = session, writer, hindrance
 
     def requested(self) -> bool:
         """Whether a caller waits for the answer."""
-        return self._service.asked()
+        with self._service.handle:
+            while (taken := self._service.handle.service_take_request(Trigger.Request))[1] is not None:
+                self._callers.append(taken[1])
+        return bool(self._callers)
 
     def answer(self) -> None:
         """Answer all callers if nothing is left to be done."""
         if self._session.state is State.DRAINING or self._writer.report.busy or not self.requested():
             return
+        response = self._response()
+        while self._callers:
+            self._service.send_response(response, self._callers.pop())
+
+    def _response(self) -> Trigger.Response:
         output = self._writer.folder
         if problem := self._session.failure or self._hindrance():
-            self._service.answer(False, problem)
-        elif self._writer.report.failed:
-            self._service.answer(False, f"The result is in {output}. The report failed: see the log of the node.")
-        elif self._session.state is State.WAITING:
-            self._service.answer(False, "No sample was received yet.")
-        else:
-            self._service.answer(True, str(output or "The parameter output is empty: nothing was written."))
+            return Trigger.Response(success=False, message=problem)
+        if self._writer.report.failed:
+            text = f"The result is in {output}. The report failed: see the log of the node."
+            return Trigger.Response(success=False, message=text)
+        if self._session.state is State.WAITING:
+            return Trigger.Response(success=False, message="No sample was received yet.")
+        text = str(output or "The parameter output is empty: nothing was written.")
+        return Trigger.Response(success=True, message=text)
+
+
+def _not_called(request: Any, response: Any) -> Any:
+    """The callback that a service must have: `requested` takes the requests instead."""
+    return response
