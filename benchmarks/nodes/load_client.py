@@ -6,7 +6,7 @@ requests never change, so neither may the answers. `--deaf` asks and, once the s
 
 The middleware hands every answer of a service to all its clients; each takes those of the others too, to drop them. So
 fifty clients take fifty times what they asked for: rclpy's executor has not the time for that on two cores, and here
-they are taken from a wait set, as DirectService takes requests.
+they are taken from a wait set, as ThreadedService takes requests.
 """
 
 from __future__ import annotations

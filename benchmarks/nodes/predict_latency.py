@@ -44,7 +44,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.nodes.server.direct_service import DirectService
+from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor_interfaces.srv import PredictPush
 
 BLOCK = 20
@@ -68,8 +68,8 @@ class DirectEmptyServer(Node):
 
     def __init__(self, stop: Stop) -> None:
         super().__init__("direct_empty_server")
-        self._service = DirectService(self, Trigger, "direct", lambda request, response: response, DEPTH)
-        self._service.begin()
+        self._service = ThreadedService(self, Trigger, "direct", lambda request, response: response, DEPTH)
+        self._service.start()
 
     def close(self) -> None:
         """End the thread."""

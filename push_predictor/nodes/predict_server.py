@@ -1,4 +1,4 @@
-"""The node that serves push models: six services and the action trace_residual (docs/reference/predict_server.md)."""
+"""The node predict_server: six services and the action trace_residual (docs/reference/predict_server.md)."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import SHIPPED, ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.runtime import Stop, run
-from push_predictor.nodes.server.answers import answer_batch, answer_list, answer_load, answer_push
-from push_predictor.nodes.server.direct_service import DirectService
-from push_predictor.nodes.server.heartbeat import Heartbeat
+from push_predictor.nodes.server.model_services import handle_list_models, handle_load_model
 from push_predictor.nodes.server.parameters import INTROSPECTION, PARAMETERS
-from push_predictor.nodes.server.pose_answers import answer_slider_pose
+from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.server.request_frames import RequestFrames
-from push_predictor.nodes.server.request_log import RequestLog
-from push_predictor.nodes.server.residual_tracer import ResidualTracer
-from push_predictor.nodes.server.rollout_answers import answer_rollout
+from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
+from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
 from push_predictor.nodes.server.status import NO_MODEL, server_status
+from push_predictor.nodes.server.threaded_service import ThreadedService
+from push_predictor.nodes.server.trace_action import TraceAction
+from push_predictor.online.periodic_thread import PeriodicThread
+from push_predictor.online.request_statistics import RequestStatistics
 from push_predictor_interfaces.srv import (
     ListModels,
     LoadModel,
@@ -44,98 +45,108 @@ from push_predictor_interfaces.srv import (
     RolloutPushes,
 )
 
-SERVICE_QOS = QoSProfile(depth=1000)  # ten, the default, loses requests of a client with more in flight
-Answer: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
+SERVICE_QOS = QoSProfile(depth=1000)  # the default, 10, loses requests of a client with more in flight
+SIMULATED = "the shipped model is of a simulated square on ABS; set the parameter 'models' for your rig"
+Handler: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
 
 
 class InactiveError(PushPredictorError):
-    """A prediction was asked of a node that is not active."""
+    """The node received a request that it answers only while it is active."""
 
 
 class PredictServer(LifecycleNode):
-    """Serves the models of the parameter `models`, and those that load_model brings, while it is active."""
+    """Predicts with the models of the parameter `models` and those loaded by load_model, while it is active."""
 
     def __init__(self) -> None:
         super().__init__("push_predictor")
         declare(self, PARAMETERS)
-        self._shelf, self._log = ModelRegistry(), RequestLog()
+        self._registry, self._statistics = ModelRegistry(), RequestStatistics()
         self._problems: list[str] = []
-        self._direct: DirectService | None = None
-        self._ending = Event()  # long answers stop
+        self._predict_push: ThreadedService | None = None
+        self._other_services: list[Service] = []
+        self._closing = Event()
         self._starting = False
-        self._offered: list[Service] = []
         self._state = "unconfigured"
         self._frames = RequestFrames(self, self.value("world_frame"))
-        self._tracer = ResidualTracer(self, self._deployed, lambda: float(self.value("trace_alpha")))
+        self._trace = TraceAction(self, self._deployed, lambda: float(self.value("trace_alpha")))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._heartbeat = Heartbeat(self.value("diagnostics_period"), self._publish_diagnostics, self._silent)
+        self._diagnostics_thread = PeriodicThread(
+            self.value("diagnostics_period"), self._publish_diagnostics, self._log_diagnostics_error
+        )
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
 
     def start(self) -> None:
         """Configure and activate, as a lifecycle manager would; without a model the node stays inactive.
 
-        Whoever sees the services may ask: none is answered before the node is active, or stays inactive.
+        predict_push queues requests until the activation is over, so that no early client gets a refusal.
         """
         self._starting = True
         if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             self.trigger_activate()
         self._starting = False
-        if self._direct is not None:
-            self._direct.begin()
+        if self._predict_push is not None:
+            self._predict_push.start()
 
     def close(self) -> None:
-        """End a trace and long answers, publish the last counts."""
-        self._ending.set()
-        self._tracer.close()
-        self._heartbeat.end()
+        """End a trace and long requests, publish the last diagnostics."""
+        self._closing.set()
+        self._trace.close()
+        self._diagnostics_thread.stop()
         self._publish_diagnostics()
 
     def destroy_node(self) -> None:
-        """End the threads, and the node."""
-        self._heartbeat.end()
-        self._withdraw()
+        """End the threads, destroy the services and the node."""
+        self._diagnostics_thread.stop()
+        self._destroy_services()
         super().destroy_node()
 
     # --- transitions ----------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Load the models and offer the services. A bad model file is reported, the others are loaded."""
+        """Load the models and create the services. A bad model file is reported, the others are loaded."""
         try:
             self._configure()
-        except Exception:  # rclpy would drop it without a word
+        except Exception:  # rclpy would ignore it silently
             self.get_logger().error(traceback.format_exc())
-            self._withdraw()
+            self._destroy_services()
             return TransitionCallbackReturn.ERROR
         return super().on_configure(state)
 
     def _configure(self) -> None:
-        self._problems = self._shelf.load_all(self.value("models"))
+        self._problems = self._registry.load_all(self.value("models"))
         for problem in self._problems:
             self.get_logger().error(problem)
         if SHIPPED in self.value("models"):
-            self.get_logger().warning("the shipped model is of a simulated square on ABS: give 'models' for your rig")
-        self._shelf.choose_default(self.value("default_model"))
-        self._direct = DirectService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
-        self._offered = [
-            self.create_service(PredictPushBatch, "predict_push_batch", self._on_batch, qos_profile=SERVICE_QOS),
-            self.create_service(PredictSliderPose, "predict_slider_pose", self._on_pose, qos_profile=SERVICE_QOS),
-            self.create_service(RolloutPushes, "rollout_pushes", self._on_rollout, qos_profile=SERVICE_QOS),
-            self.create_service(ListModels, "list_models", self._on_list, qos_profile=SERVICE_QOS),
-            self.create_service(LoadModel, "load_model", self._on_load, qos_profile=SERVICE_QOS),
+            self.get_logger().warning(SIMULATED)
+        self._registry.choose_default(self.value("default_model"))
+        self._state = "inactive"
+        self._create_services()
+
+    def _create_services(self) -> None:
+        self._predict_push = ThreadedService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
+        self._other_services = [
+            self.create_service(kind, name, callback, qos_profile=SERVICE_QOS)
+            for kind, name, callback in (
+                (PredictPushBatch, "predict_push_batch", self._on_batch),
+                (PredictSliderPose, "predict_slider_pose", self._on_pose),
+                (RolloutPushes, "rollout_pushes", self._on_rollout),
+                (ListModels, "list_models", self._on_list),
+                (LoadModel, "load_model", self._on_load),
+            )
         ]
         self._introspect(self.value("introspection"))
-        self._state = "inactive"
         if not self._starting:
-            self._direct.begin()
+            self._predict_push.start()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer predictions from now on. Fails while no model is loaded: the node stays inactive."""
-        if not self._shelf.names:
+        """Answer predictions from now on. Fails while no model is loaded; the node then stays inactive."""
+        if not self._registry.names:
             self.get_logger().error(f"{NO_MODEL}; the node stays inactive")
             return TransitionCallbackReturn.FAILURE
         self._state = "active"
-        self.get_logger().info(f"serving {', '.join(self._shelf.names)}; default {self._shelf.default!r}")
+        models = ", ".join(self._registry.names)
+        self.get_logger().info(f"active with the models {models}; default {self._registry.default!r}")
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -144,88 +155,88 @@ class PredictServer(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give up models and services."""
-        self._give_up("unconfigured")
+        """Unload the models and destroy the services."""
+        self._unload("unconfigured")
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give up models and services for good."""
-        self._give_up("finalized")
+        """Unload the models and destroy the services for good."""
+        self._unload("finalized")
         return super().on_shutdown(state)
 
-    def _give_up(self, state: str) -> None:
+    def _unload(self, state: str) -> None:
         self._state = state
-        self._tracer.end(f"the node is {state} now")
-        self._withdraw()
-        self._shelf, self._problems = ModelRegistry(), []
-        gc.collect()  # models sit in cycles, of many MB each
+        self._trace.abort(f"the node is {state} now")
+        self._destroy_services()
+        self._registry, self._problems = ModelRegistry(), []
+        gc.collect()  # models contain reference cycles and take many MB each
 
-    def _withdraw(self) -> None:
-        if self._direct is not None:
-            self._direct.close()
-            self._direct = None
-        while self._offered:
-            self.destroy_service(self._offered.pop())
+    def _destroy_services(self) -> None:
+        if self._predict_push is not None:
+            self._predict_push.close()
+            self._predict_push = None
+        while self._other_services:
+            self.destroy_service(self._other_services.pop())
 
     # --- services -------------------------------------------------------------------------------------------
 
     def _on_push(self, request: PredictPush.Request, response: PredictPush.Response) -> PredictPush.Response:
-        return self._prediction(answer_push, request, response)
+        return self._prediction(handle_predict_push, request, response)
 
     def _on_batch(
         self, request: PredictPushBatch.Request, response: PredictPushBatch.Response
     ) -> PredictPushBatch.Response:
-        return self._prediction(partial(answer_batch, self._go_on), request, response)
+        return self._prediction(partial(handle_predict_push_batch, self._check_cancelled), request, response)
 
     def _on_pose(
         self, request: PredictSliderPose.Request, response: PredictSliderPose.Response
     ) -> PredictSliderPose.Response:
-        return self._prediction(partial(answer_slider_pose, self._frames), request, response)
+        return self._prediction(partial(handle_predict_slider_pose, self._frames), request, response)
 
     def _on_rollout(self, request: RolloutPushes.Request, response: RolloutPushes.Response) -> RolloutPushes.Response:
-        return self._prediction(partial(answer_rollout, self._go_on, self._frames), request, response)
+        return self._prediction(partial(handle_rollout_pushes, self._check_cancelled, self._frames), request, response)
 
     def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
-        answer_list(self._shelf, response)
+        handle_list_models(self._registry, response)
         return response
 
     def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
-        awaited = self._state == "inactive" and not self._shelf.names
-        response = self._guarded(answer_load, request, response)
+        was_empty = not self._registry.names
+        response = self._guarded(handle_load_model, request, response)
         if not response.success:
             return response
         self.get_logger().info(response.message)
         gc.collect()
         if request.make_default:
             self.set_parameters([Parameter("default_model", value=response.name)])
-        if awaited and self.value("autostart"):
+        if was_empty and self._state == "inactive" and self.value("autostart"):
             self.trigger_activate()
         return response
 
-    def _prediction(self, answer: Answer, request: Any, response: Any) -> Any:
+    def _prediction(self, handler: Handler, request: Any, response: Any) -> Any:
         start = perf_counter()
-        response = self._guarded(answer if self._state == "active" else self._inactive, request, response)
-        self._log.add(perf_counter() - start, None if response.success else response.message)
+        response = self._guarded(handler if self._state == "active" else self._refuse_inactive, request, response)
+        self._statistics.add(perf_counter() - start, None if response.success else response.message)
         return response
 
-    def _go_on(self) -> None:
-        """What a long answer calls now and then. Raises InactiveError when the node ends."""
-        if self._ending.is_set():
+    def _check_cancelled(self) -> None:
+        """Raise InactiveError when the node ends; long requests call it between their parts."""
+        if self._closing.is_set():
             raise InactiveError("the node ends")
 
-    def _inactive(self, shelf: ModelRegistry, request: Any, response: Any) -> None:
-        raise InactiveError(f"the node is {self._state}: {'activate it' if shelf.names else NO_MODEL}")
+    def _refuse_inactive(self, registry: ModelRegistry, request: Any, response: Any) -> None:
+        raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
 
     def _deployed(self, name: str) -> PushModel:
-        """The model that a trace is about. Raises RequestError, or InactiveError."""
+        """The model to be traced. Raises RequestError, or InactiveError."""
         if self._state != "active":
-            self._inactive(self._shelf, None, None)
-        return self._shelf.get(name).model
+            self._refuse_inactive(self._registry, None, None)
+        return self._registry.get(name).model
 
-    def _guarded(self, answer: Answer, request: Any, response: Any) -> Any:
-        """A callback that raises would end the node, so every failure becomes an answer."""
+    def _guarded(self, handler: Handler, request: Any, response: Any) -> Any:
+        """Turn every exception into a refusal: one that left a callback would end the node."""
         try:
-            answer(self._shelf, request, response)
+            handler(self._registry, request, response)
             return response
         except PushPredictorError as error:
             reason = str(error)
@@ -243,39 +254,39 @@ class PredictServer(LifecycleNode):
 
     def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         for parameter in changed:
-            if parameter.name == "default_model" and parameter.value not in ("", *self._shelf.names):
-                error = RequestError(parameter.name, parameter.value, self._shelf.accepted)
+            if parameter.name == "default_model" and parameter.value not in ("", *self._registry.names):
+                error = RequestError(parameter.name, parameter.value, self._registry.accepted)
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply_parameters(self, changed: list[Parameter]) -> None:
         for parameter in changed:
             if parameter.name == "default_model":
-                self._shelf.choose_default(parameter.value)
+                self._registry.choose_default(parameter.value)
             elif parameter.name == "introspection":
                 self._introspect(parameter.value)
 
     def _introspect(self, mode: str) -> None:
-        direct = [self._direct.service] if self._direct is not None else []
-        for service in [*direct, *self._offered]:
+        threaded = [] if self._predict_push is None else [self._predict_push.service]
+        for service in [*threaded, *self._other_services]:
             service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
 
-    def _silent(self, error: Exception) -> None:
-        self.get_logger().error(f"no diagnostics: {error!r}", throttle_duration_sec=10.0)
+    def _log_diagnostics_error(self, error: Exception) -> None:
+        self.get_logger().error(f"diagnostics could not be published: {error!r}", throttle_duration_sec=10.0)
 
     def _publish_diagnostics(self) -> None:
         name = self.get_fully_qualified_name()
-        status = server_status(name, self._state, self._shelf, self._problems, self._log)
+        status = server_status(name, self._state, self._registry, self._problems, self._statistics)
         self._diagnostics.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; answers the exit status."""
+    """Run the node until SIGINT or SIGTERM; returns the exit status."""
     return run("predict_server", started_server, args)
 
 
 def started_server(stop: Stop) -> PredictServer:
-    """The node, serving if its parameter `autostart` says so. Raises RequestError for a bad parameter."""
+    """The node, active if its parameter `autostart` is true. Raises RequestError for a bad parameter."""
     node = PredictServer()
     if node.value("autostart"):
         node.start()

@@ -1,4 +1,4 @@
-"""Node push_replay: a recording as the sensors it was made with, on time, with a report of how well that went."""
+"""The node push_replay: publishes a recording on time in place of the sensors, and reports how late it was."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
@@ -20,26 +19,29 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
+from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
 from push_predictor.errors import RigError
 from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay.controls import ReplayControls
-from push_predictor.nodes.replay.options import ReplayOptions, read_options
-from push_predictor.nodes.replay.topics import ReplayTopics, Restamper
+from push_predictor.nodes.replay.parameters import read_options
+from push_predictor.nodes.replay.topics import ReplayTopics
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
-from push_predictor.replay.back_pressure import Patience
-from push_predictor.replay.clock import SECOND, PlayerClock, SystemWall, sharpen_sleep
-from push_predictor.replay.player import Outlet, ReplayPlayer
+from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
+from push_predictor.replay.flow_control import FlowControl
+from push_predictor.replay.options import ReplayOptions
+from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.report import ReplayReport
+from push_predictor.replay.restamper import Restamper
 from push_predictor.replay.source import BagSource
-from push_predictor.replay.summary import ReplayReport
 from push_predictor.resources import share_path
 
 _PUSH_TOPICS = ("slider/pose", "pusher/pose", "pusher/wrench")
 
 
 class PushReplay(Node):
-    """Plays one recording. Raises PushPredictorError if a parameter or the recording is not accepted."""
+    """Plays one recording. Raises PushPredictorError for a parameter or a recording that is not accepted."""
 
     def __init__(self, stop: Stop) -> None:
         super().__init__("push_replay")
@@ -58,31 +60,31 @@ class PushReplay(Node):
         self._player = self._make_player(options)
         self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._start_reporting()
-        self._threads = [threading.Thread(target=self._guarded, args=(work,)) for work in (self._play, self._tick)]
+        self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """Stop playing and say how it went."""
+        """Stop the playback and publish the last report."""
         self._ending.set()
         self._player.close()
         for thread in self._threads:
             thread.join()
         report = self._report()
         self._publish_report(report)
-        if report.state != "finished":  # which has been reported
+        if report.state != "finished":  # that state has been reported
             self.get_logger().info(report.summary)
 
     def _open_topics(self, bag: Bag) -> ReplayTopics:
         chosen = {topic: kind for topic, kind in bag.topics.items() if self._options.filter.accepts(topic)}
         overrides = read_overrides(self._options.qos_overrides)
-        topics = ReplayTopics(self, chosen, bag.qos, overrides, self._restamper, Patience(self._ending.is_set))
+        topics = ReplayTopics(self, chosen, bag.qos, overrides, self._restamper, FlowControl(self._ending.is_set))
         for topic, why in topics.skipped.items():
             self.get_logger().warning(f"{topic} is not published: {why}")
         return topics
 
     def _publish_rig(self, bag: Bag) -> str:
-        """Publish the push_rig record; answers what is wrong with it, if anything."""
+        """Publish the push_rig record; returns what is wrong with it, empty if nothing."""
         if self._options.rig is not None:
             record = load_rig(self._options.rig).to_record()
         else:
@@ -90,16 +92,16 @@ class PushReplay(Node):
             try:
                 rig_from_record(record, str(bag.path))
             except RigError as error:
-                self.get_logger().warning(f"topic rig stays silent: {error}")
+                self.get_logger().warning(f"the topic rig is not published: {error}")
                 return str(error)
         self._rig.publish(String(data=json.dumps(record)))
         return ""
 
     def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
-        wall = SystemWall()
+        wall = SystemClock()
         clock = PlayerClock(wall, options.rate, options.start_paused, options.spin)
-        outlet = Outlet(self._topics.make_room, self._publish, self._settle, self._announce)
-        return ReplayPlayer(self._source, clock, wall, outlet, options.window, options.loop, options.delay)
+        output = PlayerOutput(self._topics.make_room, self._publish, self._settle, self._announce)
+        return ReplayPlayer(self._source, clock, wall, output, options.window, options.loop, options.delay)
 
     def _publish(self, message: RawMessage) -> bool:
         untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
@@ -108,7 +110,7 @@ class PushReplay(Node):
         return self._topics.send(message)
 
     def _settle(self) -> None:
-        """Wait for acknowledgements, so that nobody hears `finished` before the last message."""
+        """Wait for acknowledgements, so that no subscriber receives `finished` before the last message."""
         timeout, begin = self._options.acked_timeout, time.perf_counter_ns()
         while timeout >= 0 and not self._ending.is_set():
             if self._topics.acknowledged():
@@ -128,11 +130,11 @@ class PushReplay(Node):
                 self._stop.request()
 
     def _play(self) -> None:
-        sharpen_sleep()
+        reduce_timer_slack()
         self._wait_for_subscribers()
         self._player.play(self._options.range)
         gc.collect()
-        gc.freeze()  # what lives by now need not be looked at again while messages wait
+        gc.freeze()  # objects that exist by now need no further collection while messages wait
         self._player.run()
 
     def _wait_for_subscribers(self) -> None:
@@ -140,22 +142,22 @@ class PushReplay(Node):
         wanted = [s for topic, s in senders.items() if topic.strip("/") in _PUSH_TOPICS] or list(senders.values())
         deadline = time.perf_counter_ns() + self._options.wait_for_subscribers
         while time.perf_counter_ns() < deadline and not self._ending.is_set():
-            if all(sender.publisher.get_subscription_count() for sender in wanted) and self._rig_is_known():
+            if all(sender.publisher.get_subscription_count() for sender in wanted) and self._rig_received():
                 return
             time.sleep(0.01)
 
-    def _rig_is_known(self) -> bool:
-        """Have those who want the rig got it? Samples that come before it would be judged by another one's."""
+    def _rig_received(self) -> bool:
+        """Whether all subscribers of the rig have received it; samples must not come before their rig."""
         matched = self._rig.get_subscription_count() >= self.count_subscribers(self._rig.topic_name)
         return matched and bool(self._rig.wait_for_all_acked(Duration(seconds=0)))
 
-    def _tick(self) -> None:
-        """Publish /clock at its frequency, of wall time: an executor's timer costs more and keeps its pace less."""
+    def _publish_time(self) -> None:
+        """Publish /clock at its frequency; an executor's timer would cost more and be less regular."""
         frequency = self._options.clock_frequency
         period, begin, ticks = (1.0 / frequency if frequency else 0.0), time.perf_counter(), 0
         while frequency and not self._ending.wait(max(0.0, begin + ticks * period - time.perf_counter())):
             ticks = max(ticks + 1, int((time.perf_counter() - begin) / period))
-            self._player.tell_time(self._publish_clock)
+            self._player.report_time(self._publish_clock)
 
     def _publish_clock(self, recorded: int) -> None:
         if self._restamper is not None:
@@ -166,12 +168,12 @@ class PushReplay(Node):
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
             work()
-        except BaseException as error:  # a thread's death must not pass for a silent recording
+        except BaseException as error:  # a dead thread must not look like a recording without messages
             self._stop.fail(error)
 
     def _start_reporting(self) -> None:
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # a second of the wall, also where use_sim_time is set
+        steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
         self.create_timer(1.0, lambda: self._publish_report(self._report()), clock=steady)
 
     def _report(self) -> ReplayReport:
@@ -194,32 +196,22 @@ class PushReplay(Node):
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if report.warnings else DiagnosticStatus.OK,
-            name=f"{self.get_fully_qualified_name().lstrip('/')}: replay",
-            message="; ".join(report.warnings) or report.state,
-            hardware_id=self._options.recording.name,
-            values=[KeyValue(key=key, value=value) for key, value in report.values.items()],
-        )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = _stamp(time.time_ns())
-        self._diagnostics.publish(message)
+        name = f"{self.get_fully_qualified_name().lstrip('/')}: replay"
+        level = Level.WARN if report.warnings else Level.OK
+        message = "; ".join(report.warnings) or report.state
+        status = diagnostic_status(name, level, message, report.values, self._options.recording.name)
+        self._diagnostics.publish(diagnostic_array(time.time_ns(), status))
 
 
 def main() -> int:
-    """The executable."""
-    # By default Fast DDS learns only every 3 s what a subscriber lacks; in that time a fast replay overwrites it.
+    """Run the node until SIGINT or SIGTERM; returns the exit status."""
+    # By default Fast DDS asks subscribers only every 3 s what they lack; a fast replay overwrites it in that time.
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(share_path("config", "fastdds_replay.xml")))
     return run("push_replay", PushReplay)
 
 
 def _text(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
-
-
-def _stamp(nanoseconds: int) -> Time:
-    seconds, rest = divmod(nanoseconds, SECOND)
-    return Time(sec=seconds, nanosec=rest)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Replay of a recording without ROS: clock, player, range, lateness, back-pressure and summary.
+"""Replay of a recording without ROS: clock, player, range, lateness, flow control, options and report.
 
 `nodes.replay` and `nodes.push_replay` add publishers and services; import anything from here.
 """

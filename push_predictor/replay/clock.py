@@ -1,4 +1,4 @@
-"""The clock of a replay: recorded time as a function of the wall's. Everything that waits, waits here."""
+"""The clock of a replay: recorded time as a function of wall time. All waiting happens here."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import time
 from typing import Protocol
 
 SECOND = 1_000_000_000
-COARSE = 20_000_000  # ns: longer sleeps wait on a condition, which a control can end; the rest is one plain sleep
+COARSE = 20_000_000  # ns: a longer sleep waits on a condition that a control notifies; the rest is one plain sleep
 
 
-class Wall(Protocol):
-    """The time that passes, ns; replaced by a fake in tests."""
+class SteadyClock(Protocol):
+    """Wall time, ns; tests replace it by a fake."""
 
     def now(self) -> int:
         """Steady time, ns."""
@@ -22,10 +22,10 @@ class Wall(Protocol):
         """Sleep for so many ns."""
 
     def wait(self, condition: threading.Condition, duration: int | None) -> None:
-        """Wait on a condition that is held, at most so many ns."""
+        """Wait on a locked condition, at most so many ns."""
 
 
-class SystemWall:
+class SystemClock:
     """The machine's steady clock, the one of perf_counter."""
 
     def now(self) -> int:
@@ -37,19 +37,19 @@ class SystemWall:
         time.sleep(duration / SECOND)
 
     def wait(self, condition: threading.Condition, duration: int | None) -> None:
-        """Wait on a condition that is held, at most so many ns."""
+        """Wait on a locked condition, at most so many ns."""
         condition.wait(None if duration is None else duration / SECOND)
 
 
 class PlayerClock:
     """Recorded time, ns: it runs at a rate, pauses and jumps.
 
-    Deadlines are absolute, from one pair (recorded time, wall time) that only a control replaces, so that lateness
-    never adds up. generation counts the controls: a sleeper hands in the count it has seen, and any later control
-    wakes it.
+    Deadlines are absolute: they follow from one pair (recorded time, wall time), which only a control replaces.
+    Lateness therefore never accumulates. generation counts the controls: a sleeper passes the count that it has seen,
+    and any later control wakes it.
     """
 
-    def __init__(self, wall: Wall, rate: float = 1.0, paused: bool = False, spin: int = 0) -> None:
+    def __init__(self, wall: SteadyClock, rate: float = 1.0, paused: bool = False, spin: int = 0) -> None:
         self._wall = wall
         self._rate = rate
         self._paused = paused
@@ -60,7 +60,7 @@ class PlayerClock:
 
     @property
     def paused(self) -> bool:
-        """Does it stand still?"""
+        """Whether the clock is paused."""
         return self._paused
 
     @property
@@ -74,7 +74,7 @@ class PlayerClock:
             return self._now()
 
     def deadline(self, recorded: int) -> int:
-        """The wall time of a recorded time, if nothing is changed until then, ns."""
+        """The wall time of a recorded time, ns, if no control comes before."""
         with self._changed:
             return self._deadline(recorded)
 
@@ -83,25 +83,28 @@ class PlayerClock:
         self._change(rate=rate)
 
     def pause(self) -> None:
-        """Stand still."""
+        """Stop the recorded time."""
         self._change(paused=True)
 
     def resume(self) -> None:
-        """Run again from where it stands."""
+        """Continue from the present recorded time."""
         self._change(paused=False)
 
     def jump(self, recorded: int) -> None:
-        """Go on from another recorded time."""
+        """Continue from another recorded time."""
         self._change(recorded=recorded)
 
     def interrupt(self) -> None:
-        """Wake the sleeper and leave the time as it is."""
+        """Wake the sleeper without changing the time."""
         with self._changed:
             self.generation += 1
             self._changed.notify_all()
 
     def sleep_until(self, recorded: int, generation: int) -> bool:
-        """Sleep until a recorded time. False if the caller shall look again: a control came, or much time is left."""
+        """Sleep until a recorded time. False if the caller must check again.
+
+        It must when a control came, or when the time is still far away.
+        """
         with self._changed:
             if generation != self.generation:
                 return False
@@ -136,7 +139,7 @@ class PlayerClock:
         return self._at + round((recorded - self._recorded) / self._rate)
 
 
-def sharpen_sleep() -> None:
-    """Let this thread's sleeps end within 1 ns of slack instead of Linux's 50 us."""
+def reduce_timer_slack() -> None:
+    """Set the timer slack of this thread's sleeps to 1 ns; Linux's default is 50 us."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK

@@ -1,16 +1,16 @@
-"""How late messages went out: a histogram of bounded size, cheap enough for every message."""
+"""How late messages were published: a histogram of bounded size, cheap enough for every message."""
 
 from __future__ import annotations
 
 import math
 import threading
 
-_PER_DOUBLING = 16  # bins a factor of 1.044 wide: a percentile is right to 4.4 %
+_PER_DOUBLING = 16  # bins are a factor of 1.044 wide: a percentile is accurate to 4.4 %
 _BINS = 40 * _PER_DOUBLING  # up to 2**40 ns, 18 minutes
 
 
 class Lateness:
-    """Durations in ns; negative ones count as 0."""
+    """A histogram of durations in ns; negative ones count as 0."""
 
     def __init__(self) -> None:
         self._bins = [0] * _BINS
@@ -19,7 +19,7 @@ class Lateness:
         self.maximum = 0
 
     def add(self, late: int) -> None:
-        """Take one in."""
+        """Add one duration."""
         place = min(_BINS - 1, int(_PER_DOUBLING * math.log2(late))) if late > 1 else 0
         with self._lock:
             self._bins[place] += 1
@@ -27,12 +27,12 @@ class Lateness:
             self.maximum = max(self.maximum, late)
 
     def percentile(self, share: float) -> float:
-        """The duration that a share (0..1) of all does not exceed, ns, rounded up to its bin; 0 where there is none."""
+        """The duration in ns that a share (0 to 1) of all does not exceed, rounded up to its bin."""
         with self._lock:
             bins, rank, maximum = list(self._bins), math.ceil(share * self.count), self.maximum
         seen = 0
         for place, number in enumerate(bins):
             seen += number
             if number and seen >= rank:
-                return min(float(maximum), 2.0 ** ((place + 1) / _PER_DOUBLING))
+                return min(float(maximum), math.pow(2.0, (place + 1) / _PER_DOUBLING))
         return 0.0

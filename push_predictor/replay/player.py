@@ -1,4 +1,4 @@
-"""Plays a source: peek, sleep until its time, publish, pop. Every control is one public method. No ROS here."""
+"""The player of a replay: peek, sleep until the message's time, publish, pop. Every control is a public method."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay.clock import PlayerClock, Wall
+from push_predictor.replay.clock import PlayerClock, SteadyClock
 from push_predictor.replay.lateness import Lateness
-from push_predictor.replay.range import PlayRange
+from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.source import ReadAhead, Source
 
-_READING = 300_000  # ns: with less time than this before the next deadline nothing is read ahead
+_READING = 300_000  # ns: nothing is read ahead in less time than this before a deadline
 
 
 @dataclass(frozen=True)
-class Outlet:
-    """Where a player speaks.
+class PlayerOutput:
+    """The callbacks of a player.
 
-    make_room: waits until subscribers have what a message would overwrite, while controls go on; publish: sends it,
-    False if that failed; settle: waits until subscribers have what was sent; announce: is told playing, paused or
-    finished.
+    make_room: wait until subscribers have received what a message would overwrite; controls still work meanwhile.
+    publish: send a message, False if that failed. settle: wait until subscribers have received everything.
+    announce: take the new state: playing, paused or finished.
     """
 
     make_room: Callable[[RawMessage], None]
@@ -33,21 +33,28 @@ class Outlet:
 
 
 class ReplayPlayer:
-    """A player over a source and a clock; run() is a thread's work, all else may be called from others.
+    """Plays a source by a clock. run() takes a thread; all other methods may be called from any thread.
 
-    Messages are never dropped: one that is late goes out at once. published and failed count messages.
+    Messages are never dropped: a late one is published at once. published and failed count messages.
     """
 
     def __init__(
-        self, source: Source, clock: PlayerClock, wall: Wall, outlet: Outlet, window: int, loop: bool, delay: int
+        self,
+        source: Source,
+        clock: PlayerClock,
+        wall: SteadyClock,
+        output: PlayerOutput,
+        window: int,
+        loop: bool,
+        delay: int,
     ) -> None:
-        self._source, self._clock, self._wall, self._outlet = source, clock, wall, outlet
+        self._source, self._clock, self._wall, self._output = source, clock, wall, output
         self._size, self._loop, self._delay = window, loop, delay
         self._changed = threading.Condition()
         self._waiting, self._counting = 0, threading.Lock()
         self._ahead: ReadAhead | None = None
         self._range = PlayRange()
-        self._todo: int | None = None
+        self._start_at: int | None = None
         self._stopped = self._closed = False
         self._time: int | None = None
         self.state = "waiting"
@@ -55,29 +62,29 @@ class ReplayPlayer:
         self.published = self.failed = 0
 
     def run(self) -> None:
-        """Play whenever play() or seek() asks, until close()."""
+        """Play whenever play() or seek() is called, until close()."""
         while (position := self._next_position()) is not None:
             while self._wait_delay() and self._play_through(position) and self._loop:
                 position = self._range.first(self._source.start)
             self._finish()
 
     def play(self, what: PlayRange) -> bool:
-        """Play from the range's start. False while playing."""
+        """Play a range from its start. False if a playback is already running."""
         with self._control():
             if self._busy:
                 return False
             self._range = what
-            self._todo = what.first(self._source.start)
+            self._start_at = what.first(self._source.start)
         return True
 
     def pause(self) -> None:
-        """Stand still."""
+        """Pause the playback."""
         with self._control():
             self._clock.pause()
             self._announce()
 
     def resume(self) -> None:
-        """Go on."""
+        """Continue the playback."""
         with self._control():
             self._clock.resume()
             self._announce()
@@ -88,7 +95,7 @@ class ReplayPlayer:
 
     @property
     def paused(self) -> bool:
-        """Does it stand still?"""
+        """Whether the playback is paused."""
         return self._clock.paused
 
     @property
@@ -105,15 +112,15 @@ class ReplayPlayer:
         return True
 
     def play_next(self) -> bool:
-        """Publish the next message now. False if not paused, or after the last."""
+        """Publish the next message now. False if not paused or after the last message."""
         return self.burst(1) == 1
 
     def burst(self, count: int) -> int:
-        """Publish the next `count` messages now (0: all); answers how many that were, 0 if not paused."""
+        """Publish the next `count` messages now (0: all); returns how many there were, 0 if not paused."""
         done = 0
         with self._control():
             while self._clock.paused and (count == 0 or done < count) and (head := self._head()) is not None:
-                self._outlet.make_room(head)
+                self._output.make_room(head)
                 self._send(head)
                 done += 1
             if done and self._time is not None:
@@ -121,19 +128,19 @@ class ReplayPlayer:
         return done
 
     def seek(self, time: int) -> None:
-        """Go on from a log time, ns; before the first message means its start. After the end it plays again."""
+        """Continue from a log time, ns, no earlier than the first message. After the end, play again."""
         with self._control():
             time = max(time, self._source.start)
             if self._ahead is None:
-                self._todo = time
+                self._start_at = time
             else:
                 self._go_to(time)
 
     def stop(self) -> None:
-        """End this playback; play() begins a new one."""
+        """End this playback; play() starts a new one."""
         with self._control():
             self._stopped = True
-            self._todo = None
+            self._start_at = None
             self._clock.interrupt()
 
     def close(self) -> None:
@@ -141,25 +148,25 @@ class ReplayPlayer:
         self._closed = True
         self.stop()
 
-    def tell_time(self, tell: Callable[[int], None]) -> None:
-        """Tell the recorded time (ns), never beyond a message that is still to come; nothing before the first playback.
+    def report_time(self, publish: Callable[[int], None]) -> None:
+        """Call `publish` with the recorded time (ns), at most that of the next message; not before the first playback.
 
-        No message goes out meanwhile, so that the times told are in order with those of messages.
+        No message is published meanwhile, so that all published times are in order.
         """
         with self._control():
             if (now := self._now()) is not None:
-                tell(now)
+                publish(now)
 
     @property
     def behind(self) -> int:
-        """By how much the next message is overdue, ns of wall time."""
+        """How much the next message is overdue, ns of wall time."""
         with self._control():
             head = None if self._clock.paused else self._head()
             return 0 if head is None else max(0, self._wall.now() - self._clock.deadline(head.log_time))
 
     @property
     def _busy(self) -> bool:
-        return self._ahead is not None or self._todo is not None or self.state in ("playing", "paused")
+        return self._ahead is not None or self._start_at is not None or self.state in ("playing", "paused")
 
     def _now(self) -> int | None:
         if self._ahead is not None and (head := self._head()) is not None:
@@ -168,7 +175,7 @@ class ReplayPlayer:
 
     @contextmanager
     def _control(self) -> Iterator[None]:
-        """Hold the lock. The count makes the player step aside: a Python lock is not fair to those who wait."""
+        """Hold the lock. The count makes the player yield: a Python lock is not fair to waiting threads."""
         self._count_waiting(1)
         try:
             with self._changed:
@@ -184,13 +191,13 @@ class ReplayPlayer:
     def _next_position(self) -> int | None:
         """Wait for work; None after close()."""
         with self._changed:
-            while self._todo is None and not self._closed:
+            while self._start_at is None and not self._closed:
                 self._wall.wait(self._changed, None)
-            position, self._todo, self._stopped = self._todo, None, self._closed
+            position, self._start_at, self._stopped = self._start_at, None, self._closed
             return None if self._closed else position
 
     def _wait_delay(self) -> bool:
-        """Sleep the delay; False if told to stop."""
+        """Sleep for the delay; False if the playback was stopped."""
         begin = self._wall.now() + self._delay
         with self._changed:
             while not self._stopped and (left := begin - self._wall.now()) > 0:
@@ -198,7 +205,7 @@ class ReplayPlayer:
         return not self._stopped
 
     def _play_through(self, position: int) -> bool:
-        """One pass; False if it was stopped or held no message."""
+        """Play once; False if stopped or without any message."""
         before = self.published + self.failed
         with self._changed:
             self._go_to(position)
@@ -209,7 +216,7 @@ class ReplayPlayer:
         return not self._stopped and self.published + self.failed > before
 
     def _step(self) -> bool:
-        """One message, or one look; False at the end."""
+        """Publish the next message, or only sleep; False at the end."""
         generation = self._clock.generation
         with self._changed:
             if self._stopped or (head := self._head()) is None:
@@ -218,13 +225,13 @@ class ReplayPlayer:
             assert self._ahead is not None
             self._ahead.fill(lambda: deadline - self._wall.now() > _READING)
         if self._clock.sleep_until(head.log_time, generation):
-            self._outlet.make_room(head)
+            self._output.make_room(head)
             self._send_at(head, generation)
         return True
 
     def _send_at(self, head: RawMessage, generation: int) -> None:
         with self._changed:
-            # A control may have come between the sleep and the lock; then the head may be another one.
+            # A control may have come between the sleep and the lock: the head may have changed.
             if generation == self._clock.generation and not self._stopped:
                 deadline = self._clock.deadline(head.log_time)
                 self._send(head)
@@ -234,7 +241,7 @@ class ReplayPlayer:
         assert self._ahead is not None
         self._ahead.pop()
         self._time = message.log_time
-        if self._outlet.publish(message):
+        if self._output.publish(message):
             self.published += 1
         else:
             self.failed += 1
@@ -251,17 +258,17 @@ class ReplayPlayer:
 
     def _announce(self) -> None:
         if self._ahead is not None:
-            self._tell("paused" if self._clock.paused else "playing")
+            self._set_state("paused" if self._clock.paused else "playing")
 
     def _finish(self) -> None:
         with self._changed:
             self._ahead = None
         if not self._closed:
-            self._outlet.settle()
+            self._output.settle()
             with self._changed:
-                self._tell("finished")
+                self._set_state("finished")
 
-    def _tell(self, state: str) -> None:
+    def _set_state(self, state: str) -> None:
         if state != self.state:
             self.state = state
-            self._outlet.announce(state)
+            self._output.announce(state)

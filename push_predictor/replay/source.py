@@ -1,4 +1,4 @@
-"""Messages of a bag from any time on, by log time, through a read-ahead window."""
+"""Messages of a bag from any log time on, sorted within a read-ahead window."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from push_predictor.recordings.bag.reader import Bag, RawMessage
 
 
 class Source(Protocol):
-    """What a player plays."""
+    """Messages to play."""
 
     @property
     def start(self) -> int:
         """Log time of the first message, ns."""
 
     def messages(self, start: int) -> Iterator[RawMessage]:
-        """Messages with a log time of at least start, nearly in order."""
+        """Messages with a log time of at least start, roughly in order."""
 
 
 class BagSource:
@@ -35,18 +35,18 @@ class BagSource:
 
     @property
     def damage(self) -> list[str]:
-        """In words, with file and place."""
+        """What could not be read, with file and position."""
         return [*self._bag.notes, *self._refused]
 
     def messages(self, start: int) -> Iterator[RawMessage]:
-        """Messages of the chosen topics from a log time on, in file order; what is unreadable becomes damage."""
+        """Messages of the chosen topics from a log time on, in file order; unreadable parts are added to damage."""
         try:
             yield from (m for m in self._bag.messages(self._topics) if m.log_time >= start)
         except RecordingError as error:
             self._refuse(error)
 
     def _head(self, topics: Collection[str] | None) -> Iterator[RawMessage]:
-        """The first few messages, enough to see the earliest of them."""
+        """The first messages, enough to find the earliest log time."""
         try:
             yield from (message for _, message in zip(range(100), self._bag.messages(topics), strict=False))
         except RecordingError as error:
@@ -58,10 +58,10 @@ class BagSource:
 
 
 class ReadAhead:
-    """The next messages, ordered by log time within a window of so many.
+    """The next messages, sorted by log time within a window of `size` messages.
 
-    Recordings are written nearly in order, so a message that comes later than its place in the window allows is rare:
-    it goes out as soon as it is read.
+    Recordings are roughly in order. A message that comes later than the window allows is returned as soon as it is
+    read.
     """
 
     def __init__(self, messages: Iterator[RawMessage], size: int) -> None:
@@ -78,11 +78,11 @@ class ReadAhead:
         return self._window[0][2] if self._window else None
 
     def pop(self) -> None:
-        """Go on to the one after."""
+        """Remove the next message."""
         heapq.heappop(self._window)
 
     def fill(self, has_time: Callable[[], bool]) -> None:
-        """Read on while there is time, and without it as far as half the window."""
+        """Fill half the window; then read on while there is time."""
         while len(self._window) < self._size and (2 * len(self._window) < self._size or has_time()):
             if not self._pull():
                 return

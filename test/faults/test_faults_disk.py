@@ -31,7 +31,7 @@ from push_predictor.evaluation.validation import compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server import trace_worker
+from push_predictor.online import trace_process
 from push_predictor.recordings import atomic
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.definitions import FLOAT64
@@ -215,15 +215,15 @@ def test_a_trace_tells_which_result_could_not_be_written(
     monkeypatch.setattr(
         "push_predictor.residuals.trace.trace_data", lambda *_, **__: made_up_trace(slippery(0.1), count=30)
     )
-    monkeypatch.setattr(trace_worker.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(trace_worker.os, "nice", lambda _: None)
+    monkeypatch.setattr(trace_process.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(trace_process.os, "nice", lambda _: None)
     place = tmp_path / "result" / ".trace-x"
     place.mkdir(parents=True)
-    task = trace_worker.TraceTask((tmp_path / "bag",), tmp_path / "m", (), 0.01, place)
+    task = trace_process.TraceTask((tmp_path / "bag",), tmp_path / "m", (), 0.01, place)
     pipe = Pipe()
     with full_disk():
-        trace_worker._serve(pipe, task)  # type: ignore[arg-type]  # a pipe that can be looked at
-    assert pipe.said[-1] == trace_worker.Failed(f"[Errno 27] File too large: '{tmp_path}/result/trace.json'")
+        trace_process._run(pipe, task)  # type: ignore[arg-type]  # a pipe that can be looked at
+    assert pipe.said[-1] == trace_process.Failed(f"[Errno 27] File too large: '{tmp_path}/result/trace.json'")
     assert not list(place.iterdir())
 
 

@@ -76,9 +76,9 @@ def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_pa
     whole = files["gp"].read_bytes()
     (tmp_path / "good.model").write_bytes(whole)
     (tmp_path / "half.model").write_bytes(whole[: len(whole) // 2])
-    shelf = ModelRegistry()
-    (problem,) = shelf.load_all([str(tmp_path)])
-    assert str(tmp_path / "half.model") in problem and shelf.names == ["gp"]
+    registry = ModelRegistry()
+    (problem,) = registry.load_all([str(tmp_path)])
+    assert str(tmp_path / "half.model") in problem and registry.names == ["gp"]
 
 
 # --- code ---------------------------------------------------------------------------------------------------------
@@ -114,10 +114,10 @@ def test_no_code_of_a_file_is_run(
         write(path, {name: npy(array) for name, array in arrays_of(files["gp"]).items()} | {member: payload(mark)})
     else:
         path.write_bytes(payload(mark))
-    shelf = ModelRegistry()
+    registry = ModelRegistry()
     with pytest.raises(ModelFileError, match=r"m\.model: "):
-        shelf.load(path)
-    assert not mark.exists() and not len(shelf)
+        registry.load(path)
+    assert not mark.exists() and not len(registry)
     np.load(io.BytesIO(objects(mark)), allow_pickle=True)
     assert mark.exists()  # it would have
 
@@ -259,13 +259,15 @@ def test_a_path_that_leads_nowhere_is_told_and_blocks_nothing(
     monkeypatch.chdir(tmp_path)
     os.mkfifo("pipe")
     Path("loop").symlink_to("loop")
-    shelf, problems = ModelRegistry(), []
-    loading = threading.Thread(target=lambda: problems.extend(shelf.load_all([place, str(files["gp"])])), daemon=True)
+    registry, problems = ModelRegistry(), []
+    loading = threading.Thread(
+        target=lambda: problems.extend(registry.load_all([place, str(files["gp"])])), daemon=True
+    )
     loading.start()
     loading.join(20.0)
     assert not loading.is_alive()
     assert len(problems) == 1 and place[:100].replace("\0", "\\x00").rstrip("/x") in problems[0]
-    assert shelf.names == ["gp"]
+    assert registry.names == ["gp"]
 
 
 # --- under a running server ---------------------------------------------------------------------------------------

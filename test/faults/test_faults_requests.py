@@ -35,9 +35,9 @@ from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.parameters import Param, declare
-from push_predictor.nodes.replay import options as replay_options
+from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
-from push_predictor.nodes.server.answers import answer_batch, answer_push
+from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor_interfaces.msg import PushStep
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch, PredictSliderPose, RolloutPushes
@@ -46,7 +46,7 @@ NAN, INF = math.nan, math.inf
 TABLES = {
     "predict_server": server_parameters.PARAMETERS,
     "push_validator": validator_parameters.PARAMETERS,
-    "push_replay": replay_options.PARAMETERS,
+    "push_replay": replay_parameters.PARAMETERS,
 }
 
 
@@ -226,10 +226,10 @@ def test_mechanics_is_integrated_over_a_metre_and_no_more(models: dict[str, Push
 def test_what_has_no_finite_answer_gets_no_number(
     models: dict[str, PushModel], tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
-    shelf = ModelRegistry()
+    registry = ModelRegistry()
     for name in ("matern", "drifting"):
         save_model(models[name], tmp_path / name)
-        shelf.load(tmp_path / name)
+        registry.load(tmp_path / name)
     far: list[tuple[Any, Any]] = [
         ("matern", ((1e300, 0.1, 0.2), {})),
         ("drifting", ((0.02, 0.1, 0.8), {"elapsed_time": 1.7e308})),
@@ -237,13 +237,13 @@ def test_what_has_no_finite_answer_gets_no_number(
     for name, (push, covariates) in far:
         response = PredictPush.Response()
         with pytest.raises(PushPredictorError, match=f"push 0: {name} has no finite answer"):
-            answer_push(shelf, query_to_request(name, np.array(push), 0.2, covariates), response)
+            handle_predict_push(registry, query_to_request(name, np.array(push), 0.2, covariates), response)
         both = np.array([(0.02, 0.1, 0.8), push])
         columns = {key: np.array([1.0, value]) for key, value in covariates.items()}
         with pytest.raises(PushPredictorError, match=f"push 1: {name} has no finite answer"):
-            answer_batch(
+            handle_predict_push_batch(
                 lambda: None,
-                shelf,
+                registry,
                 query_to_batch_request(PushQuery(name, both, 0.2, columns)),
                 PredictPushBatch.Response(),
             )

@@ -447,7 +447,7 @@ def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: 
     assert after.predictor.effects[0].coefficients.shape == (design.shape[2],)
 
 
-# --- the command line, the shelf, the service -------------------------------------------------------------------
+# --- the command line, the registry, the service -------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -504,9 +504,9 @@ def test_validate_takes_from_the_windows_what_it_needs_or_names_it(
 
 
 def test_the_shelf_lists_what_a_request_must_bring(model_file: Path) -> None:
-    shelf = ModelRegistry()
-    shelf.load(model_file)
-    assert "covariates=elapsed_time;" in shelf.describe("extended")
+    registry = ModelRegistry()
+    registry.load(model_file)
+    assert "covariates=elapsed_time;" in registry.describe("extended")
 
 
 @pytest.fixture(scope="module")

@@ -335,21 +335,25 @@ def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
         query_to_request,
     )
     from push_predictor.models.store.model_registry import ModelRegistry
-    from push_predictor.nodes.server.answers import answer_batch, answer_load, answer_push
+    from push_predictor.nodes.server.model_services import handle_load_model
+    from push_predictor.nodes.server.prediction_services import (
+        handle_predict_push,
+        handle_predict_push_batch,
+    )
     from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
     model = coupled(trained(OUTLINES["square"], "vhgp", *WIDE))
     save_model(model, tmp_path / "m.model")
-    shelf, loaded = ModelRegistry(), LoadModel.Response()
-    answer_load(shelf, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
+    registry, loaded = ModelRegistry(), LoadModel.Response()
+    handle_load_model(registry, LoadModel.Request(path=str(tmp_path / "m.model")), loaded)
     expected = tabulate(model)
-    assert expected.tabulated and expected.how in loaded.message and shelf.answering == [f"a vhgp: {expected.how}"]
+    assert expected.tabulated and expected.how in loaded.message and registry.answering == [f"a vhgp: {expected.how}"]
     inputs = inside(model, 40)
     inputs[0, 0] = 0.2  # outside the domain
     together, batch = of(expected, inputs), PredictPushBatch.Response()
-    answer_batch(lambda: None, shelf, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
+    handle_predict_push_batch(lambda: None, registry, query_to_batch_request(PushQuery("", inputs, 0.2, {})), batch)
     for k, push in enumerate(inputs):
-        answer_push(shelf, query_to_request("", push, 0.2), single := PredictPush.Response())
+        handle_predict_push(registry, query_to_request("", push, 0.2), single := PredictPush.Response())
         assert_close(prediction_from_response(single), together, k, 1e-12 if k else 1e-8)
     for name in FIELDS:
         assert np.array_equal(getattr(prediction_from_response(batch), name), getattr(together, name))

@@ -30,8 +30,8 @@ from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose, vertical_tu
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server.pose_answers import answer_slider_pose
 from push_predictor.nodes.server.request_frames import RequestFrames
+from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
 from push_predictor.planning.slider_pose import SliderAfter, slider_after
 from push_predictor_interfaces.srv import PredictSliderPose
 
@@ -401,12 +401,12 @@ def analytical() -> Any:
 
 
 def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_path: Any) -> None:
-    shelf, frames = ModelRegistry(), RequestFrames(object(), "world")
+    registry, frames = ModelRegistry(), RequestFrames(object(), "world")
     save_model(analytical(), tmp_path / "square.model")
-    shelf.load(tmp_path / "square.model")
+    registry.load(tmp_path / "square.model")
     here, there = PredictSliderPose.Response(), PredictSliderPose.Response()
-    answer_slider_pose(frames, shelf, slider_request(), here)
-    answer_slider_pose(frames, shelf, seen_from(CAMERA, slider_request(), "camera"), there)
+    handle_predict_slider_pose(frames, registry, slider_request(), here)
+    handle_predict_slider_pose(frames, registry, seen_from(CAMERA, slider_request(), "camera"), there)
     assert here.success and there.success
     assert here.slider_after.header.frame_id == "world" and there.slider_after.header.frame_id == "camera"
     assert_same_pose(CAMERA @ pose_of(there.slider_after), pose_of(here.slider_after), atol=1e-9)
@@ -416,7 +416,7 @@ def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_
 
 
 def test_a_refusal_leaves_no_number_behind(no_tf: None, tmp_path: Any) -> None:
-    shelf, response = ModelRegistry(), PredictSliderPose.Response()
+    registry, response = ModelRegistry(), PredictSliderPose.Response()
     with pytest.raises(PushPredictorError):
-        answer_slider_pose(RequestFrames(object(), "world"), shelf, slider_request(), response)
+        handle_predict_slider_pose(RequestFrames(object(), "world"), registry, slider_request(), response)
     assert response == PredictSliderPose.Response()

@@ -18,13 +18,13 @@ import pytest
 from ros_harness import REPOSITORY
 
 from push_predictor.nodes import predict_server
-from push_predictor.nodes.replay import options as replay_options
+from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 
 FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
 PARAMETERS = {
     "predict_server": predict_server.PARAMETERS,
-    "push_replay": replay_options.PARAMETERS,
+    "push_replay": replay_parameters.PARAMETERS,
     "push_validator": validator_parameters.PARAMETERS,
 }
 

@@ -37,9 +37,9 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
 from push_predictor.nodes.runtime import Stop
-from push_predictor.nodes.server import answers
-from push_predictor.nodes.server.answers import MOST_PUSHES, answer_batch
+from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
+from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push_batch
 from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
@@ -172,9 +172,9 @@ def test_arrays_of_unequal_length_are_refused(server):
 
 
 def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
-    request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MOST_PUSHES + 1))))
+    request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MAX_PUSHES + 1))))
     with pytest.raises(RequestError) as caught:
-        answer_batch(lambda: None, ModelRegistry(), request, PredictPushBatch.Response())
+        handle_predict_push_batch(lambda: None, ModelRegistry(), request, PredictPushBatch.Response())
     assert str(caught.value) == "velocity length: 1000001 is not accepted, give at most 1000000 pushes a call"
 
 
@@ -197,12 +197,12 @@ def test_covariates_that_no_model_needs_change_nothing(server):
 
 
 def test_what_nobody_foresaw_is_answered_and_logged_and_the_node_lives(folder, monkeypatch, capfd):
-    def broken(shelf, request, response):
+    def broken(registry, request, response):
         response.mean[0] = 1.0
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.setattr(predict_server, "answer_push", broken)
+    monkeypatch.setattr(predict_server, "handle_predict_push", broken)
     arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']"]
     rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
     try:
@@ -243,9 +243,9 @@ def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
 
 
 def test_a_long_batch_stops_when_the_node_ends(folder):
-    shelf = ModelRegistry()
-    shelf.load(folder / "analytical.model")
-    inputs = np.tile(GOOD, (3 * answers.ROWS_AT_ONCE, 1))
+    registry = ModelRegistry()
+    registry.load(folder / "analytical.model")
+    inputs = np.tile(GOOD, (3 * prediction_services.CHUNK, 1))
     asked = []
 
     def go_on():
@@ -255,16 +255,16 @@ def test_a_long_batch_stops_when_the_node_ends(folder):
 
     request = query_to_batch_request(PushQuery("", inputs, 0.2, {}))
     with pytest.raises(KeyboardInterrupt):
-        answers.answer_batch(go_on, shelf, request, PredictPushBatch.Response())
+        prediction_services.handle_predict_push_batch(go_on, registry, request, PredictPushBatch.Response())
     assert len(asked) == 2
 
 
 def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folder):
-    shelf = ModelRegistry()
-    shelf.load(folder / "analytical.model")
-    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (answers.MOST_EXACT + 1, 1)), 0.2, {}))
+    registry = ModelRegistry()
+    registry.load(folder / "analytical.model")
+    request = query_to_batch_request(PushQuery("", np.tile(GOOD, (prediction_services.MAX_EXACT + 1, 1)), 0.2, {}))
     with pytest.raises(RequestError, match="50001 pushes without a table"):
-        answers.answer_batch(lambda: None, shelf, request, PredictPushBatch.Response())
+        prediction_services.handle_predict_push_batch(lambda: None, registry, request, PredictPushBatch.Response())
 
 
 # --- models -----------------------------------------------------------------------------------------------------

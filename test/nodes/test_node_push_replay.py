@@ -28,7 +28,7 @@ from ros_harness import REPOSITORY, call, free_domain, node_environment, node_pr
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from push_predictor.nodes.replay.options import PARAMETERS
+from push_predictor.nodes.replay.parameters import PARAMETERS
 from push_predictor_interfaces.srv import (
     Burst,
     GetRate,
@@ -413,7 +413,7 @@ def test_a_bad_parameter_is_one_line_and_status_1(second: Path, params: dict[str
 
 
 def test_a_big_endian_stamp_is_restamped_too() -> None:
-    from push_predictor.nodes.replay.topics import Restamper
+    from push_predictor.replay.restamper import Restamper
 
     restamper = Restamper(lambda: START + 5 * 10**9)
     restamper.settle(START)

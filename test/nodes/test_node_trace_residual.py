@@ -23,7 +23,7 @@ from validator_bench import Status
 
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.server.trace_worker import EXTENDED, REPORT, VERDICT, evidence_in
+from push_predictor.online.trace_process import EXTENDED, REPORT, VERDICT, evidence_in
 from push_predictor.recordings.table_file import write_table
 from push_predictor_interfaces.srv import LoadModel
 
@@ -121,7 +121,7 @@ def cut(folder: Path) -> None:
 
 BAD = {
     "no output": ({"output": ""}, ["output: ''"]),
-    "no folder": ({"output": "absent"}, ["absent", "nothing to trace", "no push_validator", "pushes.csv"]),
+    "no folder": ({"output": "absent"}, ["absent", "no data to trace", "no push_validator", "pushes.csv"]),
     "unknown model": ({"model": "other"}, ["model: 'other'", "deployed"]),
     "unknown covariate": ({"covariates": ["topic:/warmth"]}, ["topic:/warmth", "elapsed_time"]),
     "no rig": ({"change": lambda folder: (folder / RIG).unlink()}, [RIG]),

@@ -13,7 +13,7 @@ from ros_harness import REPOSITORY
 
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.nodes.parameters import Param
-from push_predictor.nodes.replay import options as replay_options
+from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.nodes.validator.scalar_subscriber import CLOCK
@@ -22,7 +22,7 @@ from push_predictor.online.live_validation import MAIN_RESULT
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
-    "push_replay": ("push_replay", tuple(replay_options.PARAMETERS)),
+    "push_replay": ("push_replay", tuple(replay_parameters.PARAMETERS)),
     "push_validator": ("push_validator", tuple(validator_parameters.PARAMETERS)),
 }
 REFERENCE = REPOSITORY / "docs" / "reference"

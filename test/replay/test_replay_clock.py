@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_predictor.replay.clock import COARSE, SECOND, PlayerClock, SystemWall
+from push_predictor.replay.clock import COARSE, SECOND, PlayerClock, SystemClock
 from push_predictor.replay.lateness import Lateness
 
 
-class FakeWall:
+class FakeClock:
     """Time that passes only when somebody sleeps; a wait without end is the test's mistake."""
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ def sleep_through(clock: PlayerClock, recorded: int) -> int:
 
 @given(rate=st.floats(0.01, 100.0), recorded=st.integers(0, 3600 * SECOND))
 def test_sleeping_takes_the_recorded_time_divided_by_the_rate(rate: float, recorded: int) -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     clock = PlayerClock(wall, rate)
     sleep_through(clock, recorded)
     assert wall.time == pytest.approx(recorded / rate, abs=1.0)
@@ -49,7 +49,7 @@ def test_sleeping_takes_the_recorded_time_divided_by_the_rate(rate: float, recor
 
 
 def test_deadlines_are_absolute_so_that_lateness_does_not_add_up() -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     clock = PlayerClock(wall)
     for k in range(1, 101):
         sleep_through(clock, k * 1_000_000)
@@ -58,7 +58,7 @@ def test_deadlines_are_absolute_so_that_lateness_does_not_add_up() -> None:
 
 
 def test_a_paused_clock_stands_still_and_goes_on_where_it_stood() -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     clock = PlayerClock(wall)
     wall.time = 5 * SECOND
     clock.pause()
@@ -71,7 +71,7 @@ def test_a_paused_clock_stands_still_and_goes_on_where_it_stood() -> None:
 
 
 def test_a_new_rate_counts_from_now_on() -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     clock = PlayerClock(wall)
     wall.time = 2 * SECOND
     clock.set_rate(10.0)
@@ -80,14 +80,14 @@ def test_a_new_rate_counts_from_now_on() -> None:
 
 
 def test_a_jump_moves_recorded_time_and_keeps_a_pause() -> None:
-    clock = PlayerClock(FakeWall(), paused=True)
+    clock = PlayerClock(FakeClock(), paused=True)
     clock.jump(42 * SECOND)
     assert clock.paused
     assert clock.now() == 42 * SECOND
 
 
 def test_a_control_that_came_before_the_sleep_is_not_slept_over() -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     clock = PlayerClock(wall)
     seen = clock.generation
     clock.jump(0)
@@ -96,7 +96,7 @@ def test_a_control_that_came_before_the_sleep_is_not_slept_over() -> None:
 
 
 def test_the_last_stretch_is_one_plain_sleep() -> None:
-    wall = FakeWall()
+    wall = FakeClock()
     sleep_through(PlayerClock(wall), 10 * SECOND)
     assert len(wall.sleeps) == 1
     assert wall.sleeps[0] <= COARSE
@@ -104,7 +104,7 @@ def test_the_last_stretch_is_one_plain_sleep() -> None:
 
 @pytest.mark.parametrize("control", ["pause", "interrupt", "jump"])
 def test_a_control_wakes_a_long_sleep(control: str) -> None:
-    clock = PlayerClock(SystemWall())
+    clock = PlayerClock(SystemClock())
     arguments = [0] if control == "jump" else []
     timer = threading.Timer(0.05, getattr(clock, control), arguments)
     timer.start()
@@ -115,7 +115,7 @@ def test_a_control_wakes_a_long_sleep(control: str) -> None:
 
 
 def test_spinning_ends_no_earlier_than_the_deadline() -> None:
-    wall = SystemWall()
+    wall = SystemClock()
     clock = PlayerClock(wall, spin=500_000)
     begin = wall.now()
     assert clock.sleep_until(clock.now() + 5_000_000, clock.generation)

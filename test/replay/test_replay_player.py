@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from push_predictor.recordings.bag.reader import RawMessage
 from push_predictor.replay.clock import SECOND, PlayerClock
-from push_predictor.replay.player import Outlet, ReplayPlayer
-from push_predictor.replay.range import PlayRange
+from push_predictor.replay.play_range import PlayRange
+from push_predictor.replay.player import PlayerOutput, ReplayPlayer
 from push_predictor.replay.source import ReadAhead
 
 START = 1000 * SECOND
@@ -44,11 +44,11 @@ class Stage:
         self.settled: list[int] = []
         self.cost = 0
         self.clock = PlayerClock(self, float(options.pop("rate", 1.0)), bool(options.pop("paused", False)))
-        outlet = Outlet(
+        output = PlayerOutput(
             lambda message: None, self.publish, lambda: self.settled.append(len(self.log)), self.states.append
         )
         settings = {"window": 10, "loop": False, "delay": 0, **options}
-        self.player = ReplayPlayer(ListSource(messages), self.clock, self, outlet, **settings)
+        self.player = ReplayPlayer(ListSource(messages), self.clock, self, output, **settings)
 
     def now(self) -> int:
         return self.time
@@ -267,10 +267,10 @@ def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
 
     def look(sent: RawMessage) -> bool:
         done = stage.publish(sent)
-        stage.player.tell_time(seen.append)  # late by now, so that the clock alone would be far ahead
+        stage.player.report_time(seen.append)  # late by now, so that the clock alone would be far ahead
         return done
 
-    stage.player._outlet = Outlet(lambda message: None, look, lambda: None, stage.states.append)
+    stage.player._output = PlayerOutput(lambda message: None, look, lambda: None, stage.states.append)
     stage.run()
     assert seen == [*(m.log_time for m in TEN[1:]), TEN[-1].log_time]
 

@@ -58,7 +58,7 @@ class ModelRegistry:
     def load(self, path: Path, name: str = "", *, replace: bool = True) -> str:
         """Load a model file under a name (empty: the one in the file); a model of that name gives way to it.
 
-        Answers the name. Raises ModelFileError, after which the shelf is as it was; also for a name that is taken
+        Answers the name. Raises ModelFileError, after which the registry is as it was; also for a name that is taken
         if `replace` is false.
         """
         path = _located(path)

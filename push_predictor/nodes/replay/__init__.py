@@ -1,4 +1,4 @@
-"""ROS parts of `push_replay`: parameters, player services, publishers.
+"""The ROS side of `push_replay`: parameters, player services, publishers.
 
-Imported by `nodes.push_replay` only, except the QoS of topics.
+Imported by `nodes.push_replay` only, except `message_class`.
 """

@@ -1,4 +1,4 @@
-"""rosbag2's player services: each calls the player's method of the same name."""
+"""rosbag2's player services; each calls the player's method of the same name."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 from builtin_interfaces.msg import Duration, Time
 from rclpy.node import Node
 
+from push_predictor.errors import RequestError
 from push_predictor.replay.clock import SECOND
+from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.player import ReplayPlayer
-from push_predictor.replay.range import PlayRange
 from push_predictor_interfaces.srv import (
     Burst,
     GetRate,
@@ -26,7 +27,7 @@ from push_predictor_interfaces.srv import (
 
 
 class ReplayControls:
-    """The services of a player, private to its node."""
+    """The player services of a node, with private names."""
 
     def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
         self._node, self._player, self._restamps = node, player, restamps
@@ -67,7 +68,8 @@ class ReplayControls:
 
     def _set_rate(self, request: Any, response: Any) -> Any:
         if self._restamps and request.rate != 1.0:
-            self._node.get_logger().warning(f"set_rate: rate {request.rate!r} refused, restamped replay keeps 1.0")
+            refusal = RequestError("set_rate", request.rate, "1.0: restamped messages keep their pace")
+            self._node.get_logger().warning(str(refusal))
             response.success = False
         else:
             response.success = self._player.set_rate(request.rate)
@@ -106,5 +108,5 @@ def _nanoseconds(time: Time | Duration) -> int:
 
 
 def _limit(time: Time | Duration) -> int | None:
-    """A request left empty plays everything, so 0 is no limit here."""
+    """None for 0: an empty request plays everything."""
     return value if (value := _nanoseconds(time)) > 0 else None

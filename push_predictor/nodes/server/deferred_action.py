@@ -1,4 +1,4 @@
-"""An action whose goals are answered when their work is done, while the executor goes on with other things."""
+"""An action server whose goals end when work elsewhere is done; the executor stays free meanwhile."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rclpy.node import Node
 
 
 class DeferredAction(ActionServer):
-    """Goals are executing from the moment they come, may be cancelled, and end with `finish`.
+    """Goals execute from their arrival, can be cancelled, and end with `finish`.
 
-    A callback that waits would be polled by the executor without a pause. begin: called with every new goal.
+    An execute callback that waits would make the executor poll it without a pause. begin: called with every new goal.
     """
 
     def __init__(self, node: Node, action_type: Any, name: str, begin: Callable[[Any], None]) -> None:
@@ -20,7 +20,7 @@ class DeferredAction(ActionServer):
             goal.execute()
             begin(goal)
 
-        self._untold: Any = None  # the last result, until somebody was sent it
+        self._unsent: Any = None  # the last result, until it has been sent to a client
         super().__init__(
             node,
             action_type,
@@ -31,24 +31,24 @@ class DeferredAction(ActionServer):
         )
 
     @property
-    def told(self) -> bool:
-        """Whether the last result has been sent to somebody who asked for it."""
-        return self._untold is None
+    def result_sent(self) -> bool:
+        """Whether the last result has been sent to a client that requested it."""
+        return self._unsent is None
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
         """Do nothing: the work is done elsewhere."""
 
     def finish(self, goal: Any, end: Callable[[], None], result: Any) -> None:
-        """Have the executor set the last state by `end` (goal.succeed, abort or canceled) and send the result."""
+        """Let the executor set the final state with `end` (goal.succeed, abort or canceled) and send the result."""
 
         def last(_: Any) -> Any:
             end()
             return result
 
-        self._untold = result
+        self._unsent = result
         super().notify_execute(goal, last)
 
     def _send_result_response(self, request_header: Any, future: Any) -> None:
         super()._send_result_response(request_header, future)
-        if future.result().result is self._untold:
-            self._untold = None
+        if future.result().result is self._unsent:
+            self._unsent = None

@@ -1,4 +1,4 @@
-"""The frames that requests may be in: the world frame, and where tf2_ros is installed those that tf can lead to it."""
+"""The frames that requests may use: the world frame and, where tf2_ros is installed, frames that tf connects to it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
 
 
 class RequestFrames:
-    """Knows the world frame, and listens to tf with the node where it can. A lookup never waits.
-
-    world: name of the frame in which sliders lie flat.
-    """
+    """Looks frames up in tf; a lookup never waits. world: name of the frame in which sliders lie flat."""
 
     def __init__(self, node: Node, world: str) -> None:
         self.world = world
@@ -26,10 +23,10 @@ class RequestFrames:
             self._buffer = self._tf.Buffer()
             self._listener = self._tf.TransformListener(self._buffer, node)
 
-    def located(self, header: Any) -> SpatialPose:
-        """The frame of a request's header as it lies in the world at the header's stamp; a zero stamp: the latest.
+    def pose_in_world(self, header: Any) -> SpatialPose:
+        """The pose in the world of a header's frame at the header's stamp; a zero stamp means the latest.
 
-        Raises RequestError for a frame without a name, and for one that tf cannot lead to the world.
+        Raises RequestError for an empty frame and for one that tf does not connect to the world.
         """
         if header.frame_id == self.world:
             return SAME_FRAME
@@ -45,7 +42,7 @@ class RequestFrames:
         try:
             found = self._buffer.lookup_transform(self.world, header.frame_id, Time.from_msg(header.stamp))
         except tf.TransformException as error:
-            accepted = f"{self.world!r}, or a frame that tf leads to it: {error}"
+            accepted = f"{self.world!r}, or a frame that tf connects to it: {error}"
             raise RequestError("header.frame_id", header.frame_id, accepted) from None
         return pose_of_transform(found.transform)
 

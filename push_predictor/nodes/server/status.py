@@ -1,4 +1,4 @@
-"""How a predict_server does, as one diagnostic status (docs/reference/predict_server.md, "Diagnostics")."""
+"""The diagnostic status of a predict_server (docs/reference/predict_server.md, "Diagnostics")."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from msg_adapters.diagnostics import Level, diagnostic_status
 from push_predictor.models.store.model_registry import ModelRegistry
-from push_predictor.nodes.server.request_log import RequestLog
+from push_predictor.online.request_statistics import RequestStatistics
 
 NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
 
 
 def server_status(
-    node_name: str, state: str, shelf: ModelRegistry, problems: Sequence[str], log: RequestLog
+    node_name: str, state: str, registry: ModelRegistry, problems: Sequence[str], statistics: RequestStatistics
 ) -> DiagnosticStatus:
-    """The status of a node in a lifecycle state; problems: what could not be loaded, a line each."""
-    level, message = _health(state, shelf, problems)
+    """The status of a node in a lifecycle state; problems: one line per model that could not be loaded."""
+    level, message = _health(state, registry, problems)
     values = {
         "state": state,
-        "models": shelf.names,
-        "default_model": shelf.default,
-        "answers": shelf.answering,
+        "models": registry.names,
+        "default_model": registry.default,
+        "answers": registry.answering,
         "problems": "; ".join(problems) or None,
-        **log.values(),
+        **statistics.values(),
     }
     return diagnostic_status(f"{node_name}: predictions", level, message, values)
 
 
-def _health(state: str, shelf: ModelRegistry, problems: Sequence[str]) -> tuple[Level, str]:
-    if not shelf.names:
+def _health(state: str, registry: ModelRegistry, problems: Sequence[str]) -> tuple[Level, str]:
+    if not registry.names:
         return Level.ERROR, NO_MODEL
     if state != "active":
         return Level.WARN, f"the node is {state}"
-    if shelf.default not in shelf.names:
-        return Level.WARN, f"default_model {shelf.default!r} is not loaded"
+    if registry.default not in registry.names:
+        return Level.WARN, f"default_model {registry.default!r} is not loaded"
     if problems:
         return Level.WARN, f"{len(problems)} of the models could not be loaded"
-    return Level.OK, f"{len(shelf.names)} models are served"
+    return Level.OK, f"{len(registry.names)} models loaded"

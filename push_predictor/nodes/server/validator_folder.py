@@ -1,4 +1,4 @@
-"""Where the push_validator that runs beside a node writes: its parameter `output`."""
+"""The output folder of the push_validator in a node's namespace: that node's parameter `output`."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from rclpy.task import Future
 
 from push_predictor.errors import RecordingError
 
-PATIENCE = 5.0  # s that a validator has to be found, and to answer
-AGAIN = 1.0  # s until it is asked again: the middleware drops an answer to a client that the validator has just met
+TIMEOUT = 5.0  # s to find a validator and to receive its answer
+RETRY_PERIOD = 1.0  # s; the middleware drops an answer to a client that the validator has just discovered
 
 
 class ValidatorFolder:
-    """Asks the push_validator of the node's namespace: `ask`, then `work` until it answers."""
+    """Asks a running push_validator for its output folder: `start`, then `poll` until it answers."""
 
     def __init__(self, node: Node) -> None:
         self._client = node.create_client(GetParameters, "push_validator/get_parameters")
-        self._asked: list[Future] = []
-        self._begun = self._due = 0.0
+        self._calls: list[Future] = []
+        self._started = self._due = 0.0
 
-    def ask(self) -> None:
-        """Begin anew."""
+    def start(self) -> None:
+        """Start a new query."""
         self._forget()
-        self._begun = self._due = monotonic()
+        self._started = self._due = monotonic()
 
-    def work(self) -> Path | None:
-        """The folder, None while there is no answer. Raises RecordingError if there will be none."""
+    def poll(self) -> Path | None:
+        """The folder, None while there is no answer. Raises RecordingError after TIMEOUT."""
         now = monotonic()
         if now >= self._due and self._client.service_is_ready():
-            self._asked.append(self._client.call_async(GetParameters.Request(names=["output"])))
-            self._due = now + AGAIN
-        for asked in self._asked:
-            if asked.done():
-                return _folder(asked.result())
-        if now - self._begun > PATIENCE:
-            raise RecordingError(f"no push_validator {'answers' if self._asked else 'runs'}")
+            self._calls.append(self._client.call_async(GetParameters.Request(names=["output"])))
+            self._due = now + RETRY_PERIOD
+        for call in self._calls:
+            if call.done():
+                return _folder(call.result())
+        if now - self._started > TIMEOUT:
+            raise RecordingError(f"no push_validator {'answers' if self._calls else 'runs'}")
         return None
 
     def _forget(self) -> None:
-        for asked in self._asked:
-            self._client.remove_pending_request(asked)
-        self._asked.clear()
+        for call in self._calls:
+            self._client.remove_pending_request(call)
+        self._calls.clear()
 
 
 def _folder(response: GetParameters.Response) -> Path:

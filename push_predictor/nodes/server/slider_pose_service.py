@@ -1,4 +1,4 @@
-"""From poses in a request's frame to the slider's pose after the push: what predict_slider_pose does."""
+"""The service predict_slider_pose: from poses in a request's frame to the slider's pose after the push."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.planning.slider_pose import slider_after
 
 
-def answer_slider_pose(frames: RequestFrames, shelf: ModelRegistry, request: Any, response: Any) -> None:
-    """Answer PredictSliderPose, in the frame of the request. Raises RequestError."""
+def handle_predict_slider_pose(frames: RequestFrames, registry: ModelRegistry, request: Any, response: Any) -> None:
+    """Fill the response to PredictSliderPose, in the frame of the request. Raises RequestError."""
     query = query_from_slider_request(request)
-    tabulated = shelf.get(query.model)
-    frame = frames.located(request.header)
+    tabulated = registry.get(query.model)
+    frame = frames.pose_in_world(request.header)
     push = world_push(query, frame)
     fill_slider_response(response, request.header, query, frame, push, slider_after(tabulated, push))

@@ -1,7 +1,7 @@
-"""A service with a thread of its own: answered quickly, and while the executor is busy with something long.
+"""A service with its own thread: its answers do not wait for the executor.
 
-rclpy's executor gathers every entity of its nodes into a new wait set at each turn, and takes two turns a request. For
-a node with twenty services that is as much time as a prediction takes. Here one service is waited for, as
+rclpy's executor builds a new wait set from all entities of its nodes at each turn, and takes two turns per request. For
+a node with twenty services that takes as long as a prediction. Here a thread waits for one service only, as
 rclpy.wait_for_message waits for one topic.
 """
 
@@ -19,63 +19,67 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 
-PATIENCE = 5.0  # s that the end waits for an answer
-PAUSE = 0.1  # s after an error before it goes on
+JOIN_TIMEOUT = 5.0  # s
+RETRY_DELAY = 0.1  # s after an error
 
 
-class DirectService:
-    """A service of a node whose callback runs in a thread of its own, so beside the node's other callbacks.
+class ThreadedService:
+    """A service of a node whose callback runs in its own thread, in parallel with the node's other callbacks.
 
-    The node lists it among its services, but its executor leaves it alone. Requests wait until `begin`.
+    The node lists it among its services, but its executor ignores it. Requests queue until `start`.
     """
 
     def __init__(
         self, node: Node, kind: Any, name: str, callback: Callable[[Any, Any], Any], qos_profile: QoSProfile
     ) -> None:
-        self._node, self._ending = node, threading.Event()
+        self._node, self._closing = node, threading.Event()
         self.service: Service = node.create_service(
-            kind, name, callback, qos_profile=qos_profile, callback_group=_NotTheExecutors()
+            kind, name, callback, qos_profile=qos_profile, callback_group=_NoExecutor()
         )
         with node.context.handle:
             self._wake = rclpy_implementation.GuardCondition(node.context.handle)
-        self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
-    def begin(self) -> None:
-        """Answer from now on; once."""
+    def start(self) -> None:
+        """Answer requests from now on; a second call has no effect."""
         if not self._thread.is_alive():
             self._thread.start()
 
     def close(self) -> None:
-        """Answer what has arrived, end the thread, and take the service off the graph."""
-        self._ending.set()
+        """Answer the requests that have arrived, end the thread and destroy the service."""
+        self._closing.set()
         if self._thread.is_alive():
             with self._wake:
                 self._wake.trigger_guard_condition()
-            self._thread.join(PATIENCE)
+            self._thread.join(JOIN_TIMEOUT)
         self._wake.destroy_when_not_in_use()
         self._node.destroy_service(self.service)
 
-    def _serve(self) -> None:
+    def _run(self) -> None:
         context = self._node.context
-        with ExitStack() as held:
+        with ExitStack() as handles:
             for handle in (context.handle, self.service.handle, self._wake):
-                held.enter_context(handle)
+                handles.enter_context(handle)
             wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 1, 0, context.handle)
-            while context.ok() and not self._ending.is_set():
+            while context.ok() and not self._closing.is_set():
                 try:
-                    wait_set.clear_entities()
-                    wait_set.add_service(self.service.handle)
-                    wait_set.add_guard_condition(self._wake)
-                    wait_set.wait(-1)
+                    self._wait(wait_set)
                     self._answer()
-                except Exception:  # a thread that ended would leave a service that never answers
+                except Exception:  # without its thread the service would exist and never answer
                     self._node.get_logger().error(traceback.format_exc())
-                    self._ending.wait(PAUSE)
+                    self._closing.wait(RETRY_DELAY)
             while context.ok() and self._answer():
                 pass
 
+    def _wait(self, wait_set: Any) -> None:
+        """Wait for a request or for `close`."""
+        wait_set.clear_entities()
+        wait_set.add_service(self.service.handle)
+        wait_set.add_guard_condition(self._wake)
+        wait_set.wait(-1)
+
     def _answer(self) -> bool:
-        """Answer a request if one waits; says whether one did."""
+        """Answer one request; False if none has arrived."""
         request, header = self.service.handle.service_take_request(self.service.srv_type.Request)
         if header is None:
             return False
@@ -84,7 +88,7 @@ class DirectService:
         return True
 
 
-class _NotTheExecutors(CallbackGroup):
+class _NoExecutor(CallbackGroup):
     """Entities that no executor waits for."""
 
     def can_execute(self, entity: Any) -> bool:
@@ -94,4 +98,4 @@ class _NotTheExecutors(CallbackGroup):
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        """Never begun."""
+        """Do nothing: execution never begins."""

@@ -1,4 +1,4 @@
-"""What a replay says about itself: the diagnostics each second and the summary at the end. No ROS here."""
+"""The report of a replay: the diagnostics of each second and the summary at the end."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """State of a replay; late_* in us, behind in s, acknowledged None where nobody has asked yet."""
+    """State of a replay; late_* in us, behind in s, acknowledged None before the end."""
 
     recording: str
     state: str
@@ -28,18 +28,18 @@ class ReplayReport:
 
     @property
     def warnings(self) -> list[str]:
-        """What a person should know, most serious first."""
-        said = [f"{self.lost} messages may be lost"] if self.lost else []
-        said += ["not all messages were acknowledged"] if self.acknowledged is False else []
-        said += [f"damaged: {text}" for text in self.damage]
-        said += [f"{self.behind:.3f} s behind"] if self.behind > 0.1 else []
-        said += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
-        said += [f"not restamped: {topic} (its type has no header in front)" for topic in self.unstamped]
-        return said + ([self.rig] if self.rig else [])
+        """What an operator should know, most serious first."""
+        warnings = [f"{self.lost} messages may be lost"] if self.lost else []
+        warnings += ["not all messages were acknowledged"] if self.acknowledged is False else []
+        warnings += [f"damaged: {text}" for text in self.damage]
+        warnings += [f"{self.behind:.3f} s behind"] if self.behind > 0.1 else []
+        warnings += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
+        warnings += [f"not restamped: {topic} (its type has no header in front)" for topic in self.unstamped]
+        return warnings + ([self.rig] if self.rig else [])
 
     @property
     def values(self) -> dict[str, str]:
-        """Key and value of each figure, as /diagnostics wants them."""
+        """Key and value of each figure, for /diagnostics."""
         return {
             "state": self.state,
             "recording": self.recording,

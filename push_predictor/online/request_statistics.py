@@ -1,4 +1,4 @@
-"""What a server has done: requests served and refused, and how long its callbacks took. No ROS here."""
+"""Statistics of a server's requests: how many were answered and refused, and how long the callbacks took."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections import deque
 
 import numpy as np
 
-KEPT = 2000  # callbacks that the percentiles look back over
+KEPT = 2000  # callbacks that the percentiles cover
 
 
-class RequestLog:
-    """Counts of a server's requests, from any thread; memory does not grow with them."""
+class RequestStatistics:
+    """Counts and callback times; safe to use from any thread, with bounded memory."""
 
     def __init__(self) -> None:
         self._served = self._refused = 0
@@ -20,7 +20,7 @@ class RequestLog:
         self._lock = threading.Lock()
 
     def add(self, seconds: float, refusal: str | None) -> None:
-        """Count one request that took so long; refusal: the reason, None if it was served."""
+        """Count one request. seconds: time in the callback; refusal: the reason, None if it was answered."""
         with self._lock:
             self._seconds.append(seconds)
             if refusal is None:

@@ -1,6 +1,6 @@
-"""The action trace_residual: what a model leaves over in the pushes that were recorded, traced while predictions go on.
+"""The action trace_residual: explain what a model fails to predict in recorded pushes, while predictions go on.
 
-The trace runs in a process of its own (trace_worker); here its goal is taken, followed, cancelled and answered.
+The trace runs in a process of its own (online.trace_process). Here its goal is accepted, watched, cancelled and ended.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.nodes.runtime import one_line
 from push_predictor.nodes.server.deferred_action import DeferredAction
-from push_predictor.nodes.server.trace_worker import (
+from push_predictor.nodes.server.validator_folder import ValidatorFolder
+from push_predictor.online.trace_process import (
     EXTENDED,
-    WRITTEN,
+    RESULTS,
     Failed,
     Stage,
     Traced,
@@ -36,32 +37,31 @@ from push_predictor.nodes.server.trace_worker import (
     evidence_in,
     start_trace,
 )
-from push_predictor.nodes.server.validator_folder import ValidatorFolder
 from push_predictor_interfaces.action import TraceResidual
 
-PERIOD = 0.05  # s between two looks at the process, while there is one
-LAST_PATIENCE = 5.0  # s that the end of the node waits for its executor to end a trace and to send the result
-HOLDS = "pushes.csv as push_validator writes it, push tables or recordings"
+POLL_PERIOD = 0.05  # s between two looks at the trace's process
+CLOSE_TIMEOUT = 5.0  # s in which the executor ends a trace and sends the result when the node ends
+EVIDENCE = "pushes.csv as push_validator writes it, push tables or recordings"
 
 
 @dataclass(eq=False)
 class _Job:
-    """A goal at work: without a pipe a validator is being asked where it writes, with one a process traces."""
+    """An active goal. It first waits for a validator's folder (no pipe), then for its process."""
 
     goal: Any
     model: PushModel
     alpha: float
     output: Path
-    place: Path | None = None
+    folder: Path | None = None
     process: BaseProcess | None = None
     pipe: Connection | None = None
-    told: str = ""
+    stage: str = ""
 
 
-class ResidualTracer:
-    """One trace at a time. model_of: the model of a name, or raises PushPredictorError; alpha: the level at present.
+class TraceAction:
+    """One trace at a time. model_of: the model of a name, or raises PushPredictorError; alpha: the present level.
 
-    Everything but `close` happens in the executor's thread.
+    All methods except `close` run in the executor's thread.
     """
 
     def __init__(self, node: Node, model_of: Callable[[str], PushModel], alpha: Callable[[], float]) -> None:
@@ -73,21 +73,21 @@ class ResidualTracer:
         self._action = DeferredAction(node, TraceResidual, "trace_residual", self._on_goal)
 
     def close(self) -> None:
-        """End the trace that runs; for another thread than the executor's, which goes on meanwhile."""
+        """End a running trace; called from another thread while the executor still spins."""
         self._closing.set()
         if self._job is None:
             return
-        deadline = monotonic() + LAST_PATIENCE
-        while not self._all_told() and monotonic() < deadline:
-            time.sleep(PERIOD)
-        if (job := self._job) is not None:  # the executor has ended: nobody can be told any more
+        deadline = monotonic() + CLOSE_TIMEOUT
+        while not self._all_sent() and monotonic() < deadline:
+            time.sleep(POLL_PERIOD)
+        if (job := self._job) is not None:  # the executor has ended, so no client can get a result
             _clear(job)
 
-    def _all_told(self) -> bool:
-        return self._job is None and self._action.told
+    def _all_sent(self) -> bool:
+        return self._job is None and self._action.result_sent
 
-    def end(self, reason: str) -> None:
-        """End the trace that runs, if there is one; its client is told why."""
+    def abort(self, reason: str) -> None:
+        """End a running trace; its client gets the reason."""
         if self._job is not None:
             self._abort(self._job.goal, reason)
 
@@ -97,9 +97,9 @@ class ResidualTracer:
         self._guarded(goal, lambda: self._begin(goal))
 
     def _begin(self, goal: Any) -> None:
-        """Take the goal up. Raises PushPredictorError or OSError that says what is wrong with it."""
+        """Accept the goal. Raises PushPredictorError or OSError that states what is wrong with it."""
         if self._job is not None:
-            running = f"{self._job.model.name} ({self._job.told})"
+            running = f"{self._job.model.name} ({self._job.stage})"
             raise RequestError("goal", "trace_residual", f"one at a time: {running} is being traced, wait or cancel it")
         request = goal.request
         model = self._model_of(request.model)
@@ -107,25 +107,26 @@ class ResidualTracer:
             raise RequestError("output", "", "the folder for report, verdict and extended model")
         output = Path(request.output).expanduser().absolute()
         self._job = job = _Job(goal, model, self._alpha(), output)
-        self._timer = self._node.create_timer(PERIOD, self._work, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._tell(Stage("recorded pushes", 0.0))
+        self._timer = self._node.create_timer(POLL_PERIOD, self._poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._publish(Stage("recorded pushes", 0.0))
         if evidence := evidence_in(output):
-            self._trace(job, evidence)
+            self._start(job, evidence)
         else:
-            self._validator.ask()
+            self._validator.start()
 
-    def _trace(self, job: _Job, evidence: tuple[Path, ...]) -> None:
+    def _start(self, job: _Job, evidence: tuple[Path, ...]) -> None:
+        """Start the process, with its work folder inside the output folder."""
         job.output.mkdir(parents=True, exist_ok=True)
-        job.place = Path(tempfile.mkdtemp(prefix=".trace-", dir=job.output))
-        model = job.place / "deployed.pushmodel"
-        save_model(job.model, model)  # what is served, whatever has become of the file it was read from
-        task = TraceTask(evidence, model, tuple(job.goal.request.covariates), job.alpha, job.place)
+        job.folder = Path(tempfile.mkdtemp(prefix=".trace-", dir=job.output))
+        model = job.folder / "deployed.pushmodel"
+        save_model(job.model, model)  # the model in use; its original file may have changed since
+        task = TraceTask(evidence, model, tuple(job.goal.request.covariates), job.alpha, job.folder)
         job.process, job.pipe = start_trace(task)
         self._node.get_logger().info(f"tracing {job.model.name} on {', '.join(map(str, evidence))}")
 
-    # --- what becomes of it ---------------------------------------------------------------------------------
+    # --- its progress ---------------------------------------------------------------------------------------
 
-    def _work(self) -> None:
+    def _poll(self) -> None:
         if (job := self._job) is None:
             return
         if job.goal.is_cancel_requested:
@@ -133,16 +134,16 @@ class ResidualTracer:
         elif self._closing.is_set():
             self._abort(job.goal, "the node ends: nothing was written")
         else:
-            self._guarded(job.goal, lambda: self._follow(job))
+            self._guarded(job.goal, lambda: self._advance(job))
 
-    def _follow(self, job: _Job) -> None:
+    def _advance(self, job: _Job) -> None:
         if job.pipe is None:
-            self._await_folder(job)
+            self._poll_validator(job)
         while self._job is job and job.pipe is not None and job.pipe.poll():
-            self._take(job, job.pipe)
+            self._receive(job, job.pipe)
 
     def _guarded(self, goal: Any, work: Callable[[], None]) -> None:
-        """A callback that raises would end the node, so every failure becomes an answer."""
+        """Abort the goal for every exception: one that left a callback would end the node."""
         try:
             work()
         except (PushPredictorError, OSError) as error:
@@ -151,49 +152,49 @@ class ResidualTracer:
             self._node.get_logger().error(traceback.format_exc())
             self._abort(goal, f"internal error, see the log of the node: {error!r}")
 
-    def _await_folder(self, job: _Job) -> None:
-        """Go on where the validator writes, once it has said so. Raises RecordingError if there is nothing to trace."""
+    def _poll_validator(self, job: _Job) -> None:
+        """Start on the validator's data once its folder is known. Raises RecordingError if there is none to trace."""
         try:
-            folder = self._validator.work()
+            folder = self._validator.poll()
         except RecordingError as error:
-            raise RecordingError(f"output {job.output}: holds nothing to trace, and {error}; give {HOLDS}") from None
+            raise RecordingError(f"output {job.output}: no data to trace, and {error}; give {EVIDENCE}") from None
         if folder is None:
             return
         if not (evidence := evidence_in(folder)):
             here = f"{folder}, the output of push_validator"
-            raise RecordingError(f"output {job.output}: holds nothing to trace, nor does {here}; give {HOLDS}")
-        self._trace(job, evidence)
+            raise RecordingError(f"output {job.output}: no data to trace, nor in {here}; give {EVIDENCE}")
+        self._start(job, evidence)
 
-    def _take(self, job: _Job, pipe: Connection) -> None:
+    def _receive(self, job: _Job, pipe: Connection) -> None:
         try:
-            said = pipe.recv()
+            received = pipe.recv()
         except (EOFError, OSError):
-            raise RecordingError(_death(job.process)) from None
-        if isinstance(said, Stage):
-            self._tell(said)
-        elif isinstance(said, Failed):
-            self._abort(job.goal, said.reason)
-        elif isinstance(said, Traced):
-            self._succeed(job, said)
+            raise RecordingError(_exit_reason(job.process)) from None
+        if isinstance(received, Stage):
+            self._publish(received)
+        elif isinstance(received, Failed):
+            self._abort(job.goal, received.reason)
+        elif isinstance(received, Traced):
+            self._succeed(job, received)
 
     def _succeed(self, job: _Job, traced: Traced) -> None:
-        assert job.place is not None
-        for name in WRITTEN:
-            if (job.place / name).exists():
-                (job.place / name).replace(job.output / name)
+        assert job.folder is not None
+        for name in RESULTS:
+            if (job.folder / name).exists():
+                (job.folder / name).replace(job.output / name)
         result = _result(traced.message)
         result.success, result.verdict = True, traced.verdict
         if traced.needs is not None:
             result.extended_model = str(job.output / EXTENDED)
-            brings = ", ".join(traced.needs) or "nothing more"
-            result.message += f" Offered to load_model: {result.extended_model}; a request must bring {brings}."
+            needs = ", ".join(traced.needs) or "no covariates"
+            result.message += f" Load {result.extended_model} with load_model to use it; its requests need {needs}."
         self._node.get_logger().info(result.message)
-        self._tell(Stage("done", 1.0))
+        self._publish(Stage("done", 1.0))
         self._finish(job.goal, job.goal.succeed, result)
 
-    def _tell(self, stage: Stage) -> None:
+    def _publish(self, stage: Stage) -> None:
         assert self._job is not None
-        self._job.told = stage.name
+        self._job.stage = stage.name
         self._job.goal.publish_feedback(TraceResidual.Feedback(stage=stage.name, progress=stage.share))
 
     def _abort(self, goal: Any, reason: str) -> None:
@@ -207,28 +208,28 @@ class ResidualTracer:
         _clear(job)
         self._node.destroy_timer(self._timer)
         self._action.finish(goal, end, result)
-        self._job = None  # last: `close` then waits until the result was sent
+        self._job = None  # last: from now on `close` waits for the result to be sent
 
 
 def _result(message: str) -> TraceResidual.Result:
     return TraceResidual.Result(success=False, message=message)
 
 
-def _death(process: BaseProcess | None) -> str:
-    """Why a process that said nothing more has ended."""
+def _exit_reason(process: BaseProcess | None) -> str:
+    """In words, how a process ended that sent no result."""
     assert process is not None
     process.join(5.0)
     code = process.exitcode
     how = f"signal {-code}" if code is not None and code < 0 else f"status {code}"
-    return f"the process of the trace ended with {how} and told nothing, see the log of the node"
+    return f"the process of the trace ended with {how} and no result, see the log of the node"
 
 
 def _clear(job: _Job) -> None:
-    """End the process and take away what it has laid down and nobody took."""
+    """Kill the process and delete its work folder."""
     if job.process is not None:
         job.process.kill()
         job.process.join()
     if job.pipe is not None:
         job.pipe.close()
-    if job.place is not None:
-        shutil.rmtree(job.place, ignore_errors=True)
+    if job.folder is not None:
+        shutil.rmtree(job.folder, ignore_errors=True)

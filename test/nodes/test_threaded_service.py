@@ -1,4 +1,4 @@
-"""DirectService: a service that no executor has to get round to."""
+"""ThreadedService: a service that no executor has to get round to."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from push_predictor.nodes.server.direct_service import DirectService
+from push_predictor.nodes.server.threaded_service import ThreadedService
 
 DEPTH = QoSProfile(depth=100)
 
@@ -36,8 +36,8 @@ def thread_name(request: Trigger.Request, response: Trigger.Response) -> Trigger
 
 
 def test_it_answers_though_nobody_spins_its_node(client_node, server):
-    service = DirectService(server, Trigger, "alone", thread_name, DEPTH)
-    service.begin()
+    service = ThreadedService(server, Trigger, "alone", thread_name, DEPTH)
+    service.start()
     client = client_node.create_client(Trigger, "alone", qos_profile=DEPTH)
     for _ in range(20):
         assert harness.call(client, Trigger.Request()).message == "alone"
@@ -45,8 +45,8 @@ def test_it_answers_though_nobody_spins_its_node(client_node, server):
 
 
 def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_node, server):
-    service = DirectService(server, Trigger, "direct", thread_name, DEPTH)
-    service.begin()
+    service = ThreadedService(server, Trigger, "direct", thread_name, DEPTH)
+    service.start()
     server.create_service(Trigger, "usual", thread_name, qos_profile=DEPTH)
     clients = {name: client_node.create_client(Trigger, name, qos_profile=DEPTH) for name in ("direct", "usual")}
     executor = SingleThreadedExecutor(context=client_node.context)
@@ -64,8 +64,8 @@ def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_n
 
 
 def test_requests_that_arrive_together_are_all_answered(client_node, server):
-    service = DirectService(server, Trigger, "many", thread_name, DEPTH)
-    service.begin()
+    service = ThreadedService(server, Trigger, "many", thread_name, DEPTH)
+    service.start()
     client = client_node.create_client(Trigger, "many", qos_profile=DEPTH)
     harness.call(client, Trigger.Request())
     futures = [client.call_async(Trigger.Request()) for _ in range(30)]
@@ -78,12 +78,12 @@ def test_requests_wait_until_it_begins_and_those_that_wait_when_it_ends_are_answ
         time.sleep(0.05)
         return thread_name(request, response)
 
-    service = DirectService(server, Trigger, "late", slow, DEPTH)
+    service = ThreadedService(server, Trigger, "late", slow, DEPTH)
     client = client_node.create_client(Trigger, "late", qos_profile=DEPTH)
     assert client.wait_for_service(harness.START_TIMEOUT)
     futures = [client.call_async(Trigger.Request()) for _ in range(5)]
     assert not harness.wait_until(lambda: any(future.done() for future in futures), 0.3)
-    service.begin()
+    service.start()
     assert harness.wait_until(lambda: futures[0].done())
     service.close()
     assert harness.wait_until(lambda: all(future.done() for future in futures))
@@ -97,8 +97,8 @@ def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(clien
         return thread_name(request, response)
 
     asked: list[Trigger.Request] = []
-    service = DirectService(server, Trigger, "broken", broken_once, DEPTH)
-    service.begin()
+    service = ThreadedService(server, Trigger, "broken", broken_once, DEPTH)
+    service.start()
     client = client_node.create_client(Trigger, "broken", qos_profile=DEPTH)
     assert client.wait_for_service(harness.START_TIMEOUT)
     unanswered = client.call_async(Trigger.Request())
@@ -110,8 +110,8 @@ def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(clien
 
 def test_closing_ends_the_thread_and_takes_the_service_off_the_graph(client_node, server):
     for _ in range(3):  # it can be offered again
-        service = DirectService(server, Trigger, "passing", thread_name, DEPTH)
-        service.begin()
+        service = ThreadedService(server, Trigger, "passing", thread_name, DEPTH)
+        service.start()
         client = client_node.create_client(Trigger, "passing", qos_profile=DEPTH)
         assert harness.call(client, Trigger.Request()).success
         service.close()

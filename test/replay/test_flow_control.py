@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 from rclpy.qos import HistoryPolicy, ReliabilityPolicy
 
-from push_predictor.nodes.replay import topics as replay_topics
-from push_predictor.nodes.replay.topics import TopicSender
+from push_predictor.nodes.replay import topic_sender
+from push_predictor.nodes.replay.topic_sender import TopicSender
 from push_predictor.recordings.bag.reader import RawMessage
-from push_predictor.replay import back_pressure as replay_patience
-from push_predictor.replay.back_pressure import LONG, Patience
+from push_predictor.replay import flow_control
+from push_predictor.replay.flow_control import FIRST_TIMEOUT, FlowControl
 
 DEPTH = 100
 MESSAGE = RawMessage("/slider/pose", "geometry_msgs/msg/PoseStamped", 0, b"")
@@ -34,7 +34,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    for module in (replay_topics, replay_patience):
+    for module in (topic_sender, flow_control):
         monkeypatch.setattr(module, "time", made)
     return made
 
@@ -62,9 +62,9 @@ class Publisher:
         return done
 
 
-def sender_of(publisher: Publisher, patience: Patience | None = None) -> TopicSender:
+def sender_of(publisher: Publisher, control: FlowControl | None = None) -> TopicSender:
     made: Any = publisher  # has what is used of a Publisher
-    return TopicSender(made, None, patience or Patience(lambda: False))
+    return TopicSender(made, None, control or FlowControl(lambda: False))
 
 
 def send(sender: TopicSender, clock: Clock, count: int, pause: float = 1e-4) -> None:
@@ -124,7 +124,7 @@ def test_one_that_hangs_holds_it_up_once_and_is_waited_for_again_when_it_runs(cl
     sender = sender_of(publisher)
     send(sender, clock, 1000 * DEPTH)
     passed = 1000 * DEPTH * 1e-4
-    assert LONG < clock.now - passed < LONG + 0.3 * passed
+    assert FIRST_TIMEOUT < clock.now - passed < FIRST_TIMEOUT + 0.3 * passed
     assert sender.overwritten >= publisher.lost > 0
     publisher.lag = 0.025
     send(sender, clock, 200 * DEPTH)
@@ -133,16 +133,16 @@ def test_one_that_hangs_holds_it_up_once_and_is_waited_for_again_when_it_runs(cl
     assert (sender.overwritten, publisher.lost) == (counted, lost)
 
 
-def test_patience_is_spent_once_for_all_topics(clock: Clock):
-    patience = Patience(lambda: False)
-    assert not patience.wait("/slider/pose", lambda: False)
-    assert not patience.wait("/pusher/pose", lambda: False)
-    assert clock.now == pytest.approx(LONG + replay_patience.AGAIN, abs=0.01)
-    assert patience.wait("/slider/pose", lambda: True) and patience.wait("/pusher/pose", lambda: True)
-    assert not patience.wait("/slider/pose", lambda: False)
-    assert clock.now == pytest.approx(2.0 * LONG + replay_patience.AGAIN, abs=0.02)
+def test_control_is_spent_once_for_all_topics(clock: Clock):
+    control = FlowControl(lambda: False)
+    assert not control.wait("/slider/pose", lambda: False)
+    assert not control.wait("/pusher/pose", lambda: False)
+    assert clock.now == pytest.approx(FIRST_TIMEOUT + flow_control.RETRY_TIMEOUT, abs=0.01)
+    assert control.wait("/slider/pose", lambda: True) and control.wait("/pusher/pose", lambda: True)
+    assert not control.wait("/slider/pose", lambda: False)
+    assert clock.now == pytest.approx(2.0 * FIRST_TIMEOUT + flow_control.RETRY_TIMEOUT, abs=0.02)
 
 
 def test_the_end_of_the_replay_ends_the_wait(clock: Clock):
-    assert not Patience(lambda: clock.now > 0.1).wait("/slider/pose", lambda: False)
+    assert not FlowControl(lambda: clock.now > 0.1).wait("/slider/pose", lambda: False)
     assert clock.now == pytest.approx(0.1, abs=0.01)

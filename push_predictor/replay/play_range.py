@@ -1,4 +1,4 @@
-"""Which part of a recording is played."""
+"""The part of a recording to play."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PlayRange:
-    """What to play, ns: offset from the first message; duration from there and until (a log time), None for no limit.
+    """The part to play, in ns: offset from the first message, duration from there, until (a log time).
 
-    Of two limits the later one counts, as in rosbag2.
+    A limit of None is no limit. Of two limits the later one applies, as in rosbag2.
     """
 
     offset: int = 0
@@ -17,11 +17,11 @@ class PlayRange:
     until: int | None = None
 
     def first(self, start: int) -> int:
-        """Log time to begin at, of a source that starts at `start`."""
+        """Log time of the beginning, for a source that starts at `start`."""
         return start + self.offset
 
     def last(self, start: int) -> int | None:
-        """Log time to end at, inclusive."""
+        """Log time of the end, inclusive; None for no limit."""
         ends = [self.until] if self.until is not None else []
         ends += [self.first(start) + self.duration] if self.duration is not None else []
         return max(ends, default=None)

@@ -1,0 +1,85 @@
+"""The services predict_push and predict_push_batch: from a request and the loaded models to a response.
+
+A handler fills the response, or raises a PushPredictorError that states what is wrong with the request.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from msg_adapters.predictions import (
+    PushQuery,
+    extend_batch_response,
+    fill_response,
+    push_from_request,
+    query_from_batch_request,
+)
+from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.models.push_model import Prediction
+from push_predictor.models.request import check_request, check_requests
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
+
+MAX_PUSHES = 1_000_000  # per batch: the server needs up to 0.6 kB for each while it answers
+MAX_EXACT = 50_000  # of these outside a table: up to a millisecond each
+CHUNK = 4096  # rows predicted at once: the length of a batch must not determine the memory of a prediction
+
+
+class PredictionError(PushPredictorError):
+    """A model has no finite prediction for a push that passed the checks."""
+
+
+def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) -> None:
+    """Fill the response to PredictPush. Raises RequestError or PredictionError."""
+    push = push_from_request(request)
+    tabulated = registry.get(request.model)
+    check_request(tabulated.model, push)
+    prediction = tabulated.predict_one(push)
+    _check_finite(tabulated, prediction, 0)
+    fill_response(response, prediction)
+
+
+def handle_predict_push_batch(
+    check_cancelled: Callable[[], None], registry: ModelRegistry, request: Any, response: Any
+) -> None:
+    """Fill the response to PredictPushBatch; one bad push refuses the whole batch.
+
+    check_cancelled: called before each chunk; it raises when the node ends. Raises RequestError or PredictionError.
+    """
+    if (count := len(request.velocity)) > MAX_PUSHES:
+        raise RequestError("velocity length", count, f"at most {MAX_PUSHES} pushes a call")
+    query = query_from_batch_request(request)
+    tabulated = registry.get(query.model)
+    check_requests(tabulated.model, query.inputs, query.duration, query.covariates)
+    _check_exact(tabulated, query)
+    for start in range(0, count, CHUNK):
+        check_cancelled()
+        rows = slice(start, start + CHUNK)
+        inputs, covariates = query.inputs[rows], {name: column[rows] for name, column in query.covariates.items()}
+        prediction = tabulated.predict_rows(inputs, np.full(len(inputs), query.duration), covariates)
+        _check_finite(tabulated, prediction, start)
+        extend_batch_response(response, prediction)
+    response.success = True
+
+
+def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
+    """Raise RequestError if too many pushes need the model itself, not its table."""
+    if len(query.inputs) > MAX_EXACT and (count := tabulated.exact_count(query.inputs)) > MAX_EXACT:
+        accepted = f"at most {MAX_EXACT} pushes that no table answers (docs/reference/predict_server.md) a call"
+        raise RequestError("velocity length", f"{count} pushes without a table", accepted)
+
+
+def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:
+    """Raise PredictionError for the first push without a finite prediction; start: index of the chunk's first push."""
+    if prediction.in_domain.all():
+        return  # a model is finite between the pushes that it was trained on
+    finite = np.isfinite(prediction.mean).all(axis=1) & np.isfinite(prediction.covariance).all(axis=(1, 2))
+    if not finite.all():
+        index = start + int(np.argmin(finite))
+        raise PredictionError(
+            f"push {index}: {tabulated.model.name} has no finite answer, its velocity or a covariate is too far "
+            "from what the model was trained on"
+        )
