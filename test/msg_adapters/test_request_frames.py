@@ -355,25 +355,25 @@ def header(frame_id: str, sec: int = 100) -> Header:
 
 
 def test_the_world_frame_is_used_as_it_is(no_tf: None) -> None:
-    assert RequestFrames(object(), "table").located(header("table")) is SAME_FRAME
+    assert RequestFrames(object(), "table").pose_in_world(header("table")) is SAME_FRAME
 
 
 @pytest.mark.parametrize("frame_id", ["map", "World"])
 def test_without_tf_another_frame_is_refused_by_name(no_tf: None, frame_id: str) -> None:
     with pytest.raises(RequestError) as caught:
-        RequestFrames(object(), "world").located(header(frame_id))
+        RequestFrames(object(), "world").pose_in_world(header(frame_id))
     expected = f"header.frame_id: {frame_id!r} is not accepted, give 'world'; tf2_ros is not installed"
     assert str(caught.value) == expected
 
 
 def test_a_slash_of_old_habit_is_named(tf: MadeUpTf) -> None:
     with pytest.raises(RequestError, match="give 'world', without a slash"):
-        RequestFrames(object(), "world").located(header("/world"))
+        RequestFrames(object(), "world").pose_in_world(header("/world"))
 
 
 def test_a_frame_without_a_name_is_refused(tf: MadeUpTf) -> None:
     with pytest.raises(RequestError, match=r"header\.frame_id: '' is not accepted, give .* 'world'"):
-        RequestFrames(object(), "world").located(header(""))
+        RequestFrames(object(), "world").pose_in_world(header(""))
     assert not tf.buffers[0].asked
 
 
@@ -381,16 +381,16 @@ def test_made_up_tf_is_asked_for_the_frame_in_the_world_at_the_stamp(tf: MadeUpT
     node = object()
     frames = RequestFrames(node, "world")
     assert tf.listeners == [(tf.buffers[0], node)]
-    assert_same_pose(frames.located(header("camera", 100)), CAMERA)
-    assert_same_pose(frames.located(header("table_top", 0)), TABLE_TOP)  # zero: the latest
-    assert frames.located(header("world")) is SAME_FRAME
+    assert_same_pose(frames.pose_in_world(header("camera", 100)), CAMERA)
+    assert_same_pose(frames.pose_in_world(header("table_top", 0)), TABLE_TOP)  # zero: the latest
+    assert frames.pose_in_world(header("world")) is SAME_FRAME
     assert tf.buffers[0].asked == [("world", "camera", 100_000_000_000), ("world", "table_top", 0)]
 
 
 @pytest.mark.parametrize(("frame_id", "sec", "said"), [("map", 100, '"map" passed'), ("camera", 10, "extrapolation")])
 def test_what_made_up_tf_says_is_passed_on(tf: MadeUpTf, frame_id: str, sec: int, said: str) -> None:
     with pytest.raises(RequestError) as caught:
-        RequestFrames(object(), "world").located(header(frame_id, sec))
+        RequestFrames(object(), "world").pose_in_world(header(frame_id, sec))
     assert str(caught.value).startswith(f"header.frame_id: {frame_id!r} is not accepted, give 'world', or a frame")
     assert said in str(caught.value)
 
