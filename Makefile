@@ -1,6 +1,7 @@
 # make demo   learn, serve, replay, validate, report, trace a change: the main job, end to end
 # make test   lint, types, tests
-# Both build .venv themselves and write into ignored folders only.
+# make docs   the documentation site in out/site; a broken link fails
+# All build .venv themselves and write into ignored folders only.
 
 PYTHON ?= python3
 VENV := .venv
@@ -15,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export PYTHONUNBUFFERED := 1
 unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint bags clean
+.PHONY: demo test lint docs bags clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m examples.demo
@@ -28,6 +29,10 @@ lint: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo out/site/index.html
+
 bags: $(VENV)/.installed
 	scripts/make_bags.sh
 
@@ -37,6 +42,11 @@ clean:
 $(VENV)/.python:
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13) and "Python 3.10 to 3.13 is needed, this is " + sys.version)'
 	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+# The site is built from the sources: no ROS needed.
+$(VENV)/.docs: $(VENV)/.python setup.py
+	$(BIN)/pip install -qq '.[docs]'
 	touch $@
 
 # Building the message package takes most of the time: only when it changes.

@@ -1,6 +1,7 @@
 """The ROS package push_predictor (ament_python), installable by pip and by colcon alike."""
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -11,7 +12,20 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Learned and analytical models of planar pushing for ROS 2",
+    long_description=Path(__file__).with_name("README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    author="push_predictor founders",
     license="Apache-2.0",
+    keywords=["robotics", "ROS 2", "planar pushing", "manipulation", "Gaussian process"],
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        *(f"Programming Language :: Python :: 3.{minor}" for minor in range(10, 14)),
+        "Topic :: Scientific/Engineering",
+        "Typing :: Typed",
+    ],
     python_requires=">=3.10",
     packages=find_packages(include=["push_predictor", "push_predictor.*", "msg_adapters", "msg_adapters.*"]),
     package_data={"push_predictor": ["py.typed", "reporting/templates/*"]},
@@ -24,11 +38,20 @@ setup(
         # pip puts the executables into bin/ only; `ros2 run` looks here
         (f"lib/{NAME}", [f"scripts/run/{node}" for node in NODES]),
     ],
-    install_requires=["numpy>=1.24", "scipy>=1.10", "mcap>=1.1", "PyYAML>=5.4", "threadpoolctl>=3"],
+    install_requires=[
+        "numpy>=1.24",
+        "scipy>=1.10",
+        "mcap>=1.1",
+        "lz4>=4",
+        "zstandard>=0.22",
+        "PyYAML>=5.4",
+        "threadpoolctl>=3",
+    ],
     extras_require={
         "report": ["matplotlib>=3.8", "jinja2>=3.1", "joblib>=1.4", "diptest>=0.9", "rich>=13"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
+        "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
         "test": [
             "pytest>=8",
             "pytest-xdist>=3.5",

@@ -1,56 +1,140 @@
-"""Which way imports point, and what needs ROS: the picture in docs/architecture.md, checked."""
+"""The direction of imports, and what needs ROS: docs/architecture.md and its picture, checked against the code."""
 
 from __future__ import annotations
 
 import ast
+import re
+import runpy
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from repository import REPOSITORY
 
-LAYERS = [
-    "geometry",
-    "recordings",
-    "replay",
-    "models",
-    "planning",
-    "reporting",
-    "evaluation",
-    "residuals",
-    "online",
-    "nodes",
-]
 ROS = ("rclpy", "rcl_interfaces", "push_predictor_interfaces", "launch", "ament_index_python")
 
 
+ROWS = runpy.run_path(str(REPOSITORY / "docs" / "pictures" / "draw_architecture.py"))["ROWS"]
+PICTURE = [[room for box in row for room in box[0].split(", ")] for row in ROWS[1:]]  # the first row is outside
+PACKAGE = REPOSITORY / "push_predictor"
+LIBRARY = sorted({room for row in PICTURE for room in row if (PACKAGE / room).is_dir()} - {"nodes"})
+MOST_MODULES = 15
+
+
 def imports_of(path: Path) -> set[str]:
+    """Modules that a file imports, and what it imports from them: a.b and a.b.c for `from a.b import c`."""
     tree = ast.parse(path.read_text())
     named = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    return named | {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            named |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return named
+
+
+def files_of(room: str) -> list[Path]:
+    """The modules of a room: a package or a module of push_predictor, or msg_adapters."""
+    if (PACKAGE / f"{room}.py").is_file():
+        return [PACKAGE / f"{room}.py"]
+    return sorted((REPOSITORY / room if room == "msg_adapters" else PACKAGE / room).rglob("*.py"))
+
+
+def imports_room(names: set[str], room: str) -> bool:
+    module = room if room == "msg_adapters" else f"push_predictor.{room}"
+    return any(f"{name}.".startswith(f"{module}.") for name in names)
 
 
 def modules(package: str) -> list[Path]:
-    return sorted((REPOSITORY / "push_predictor" / package).rglob("*.py"))
+    return sorted((PACKAGE / package).rglob("*.py"))
 
 
-@pytest.mark.parametrize("package", [*LAYERS[:-1], "simulation", "commands"])
+@pytest.mark.parametrize("package", LIBRARY)
 def test_the_library_imports_no_ros(package: str) -> None:
     for path in modules(package):
         for name in imports_of(path):
             assert not name.startswith((*ROS, "msg_adapters")) and "_msgs" not in name, f"{path}: {name}"
 
 
-@pytest.mark.parametrize("package", LAYERS)
-def test_imports_point_one_way(package: str) -> None:
-    later = LAYERS[LAYERS.index(package) + 1 :]
-    for path in modules(package):
-        for name in imports_of(path):
-            assert not name.startswith(tuple(f"push_predictor.{layer}" for layer in later)), f"{path}: {name}"
+def test_the_picture_shows_every_room() -> None:
+    shown = {room for row in PICTURE for room in row}
+    assert shown == {path.parent.name for path in PACKAGE.glob("*/__init__.py")} | {"api", "msg_adapters"}
 
 
-@pytest.mark.parametrize("package", [*LAYERS, "simulation"])
+def test_imports_point_down_or_right_in_the_picture() -> None:
+    for height, row in enumerate(PICTURE):
+        for place, room in enumerate(row):
+            forbidden = [*(above for rows in PICTURE[:height] for above in rows), *row[:place]]
+            for path in files_of(room):
+                names = imports_of(path)
+                assert not [other for other in forbidden if imports_room(names, other)], path
+
+
+@pytest.mark.parametrize("room", ["models", "recordings", "residuals", "nodes", "evaluation"])
+def test_no_two_folders_of_a_room_import_each_other(room: str) -> None:
+    folders = sorted(path.parent.name for path in (PACKAGE / room).glob("*/__init__.py"))
+    arrows = {
+        (folder, other)
+        for folder in folders
+        for path in modules(f"{room}/{folder}")
+        for other in folders
+        if other != folder and imports_room(imports_of(path), f"{room}.{other}")
+    }
+    assert not [arrow for arrow in arrows if arrow[::-1] in arrows]
+
+
+@pytest.mark.parametrize("product", ["push_predictor", "msg_adapters", "push_predictor_paper/push_predictor_paper"])
+def test_no_folder_has_more_modules_than_one_can_survey(product: str) -> None:
+    for package in (REPOSITORY / product).rglob("__init__.py"):
+        found = [path for path in package.parent.glob("*.py") if path != package]
+        assert len(found) <= MOST_MODULES, package.parent
+
+
+@pytest.mark.parametrize("product", ["push_predictor", "msg_adapters", "push_predictor_paper/push_predictor_paper"])
+def test_every_package_has_a_docstring(product: str) -> None:
+    for package in (REPOSITORY / product).rglob("__init__.py"):
+        assert ast.get_docstring(ast.parse(package.read_text())), package
+
+
+# --- the paths of data in docs/architecture.md ------------------------------------------------------------------------
+
+
+def paths_of_data() -> dict[str, list[str]]:
+    """{title: modules in order} of the numbered lists."""
+    text = (REPOSITORY / "docs" / "architecture.md").read_text().split("## Three paths of data", 1)[1]
+    parts = re.split(r"^\*\*(.+)\*\*$", text, flags=re.MULTILINE)[1:]
+    lists = zip(parts[::2], parts[1::2], strict=True)
+    return {title: re.findall(r"^\d+\. `([\w/]+\.py)`", part, re.MULTILINE) for title, part in lists}
+
+
+def test_there_are_three_paths_of_data() -> None:
+    assert [title.split()[-1] for title in paths_of_data()] == ["row", "answer", "effect"]
+    assert all(len(path) > 3 for path in paths_of_data().values())
+
+
+@pytest.mark.parametrize("title", paths_of_data())
+def test_each_module_of_a_path_imports_the_next_or_is_imported_by_it(title: str) -> None:
+    for one, two in pairwise(paths_of_data()[title]):
+        assert imports(one, two) or imports(two, one), f"{one}, {two}"
+
+
+def imports(one: str, two: str) -> bool:
+    """Whether a module imports another; paths below push_predictor, or of msg_adapters."""
+    return module_name(two) in imports_of(located(one))
+
+
+def located(module: str) -> Path:
+    return REPOSITORY / module if module.startswith("msg_adapters/") else PACKAGE / module
+
+
+def module_name(module: str) -> str:
+    return ".".join(located(module).relative_to(REPOSITORY).with_suffix("").parts)
+
+
+# --- what may be imported where --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("package", [*(room for room in LIBRARY if room != "commands"), "nodes"])
 def test_only_commands_know_the_paper(package: str) -> None:
     for path in modules(package):
         assert not any(name.startswith("push_predictor_paper") for name in imports_of(path)), path

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
+import dataclasses
+import importlib.util
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from ros_harness import REPOSITORY
 
+import push_predictor
 from push_predictor.cli import COMMANDS, build_parser
+from push_predictor.geometry.shapes import SHAPES, shape_outline
 from push_predictor.nodes.parameters import Param
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
@@ -19,14 +25,19 @@ from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.nodes.validator.scalar_subscriber import CLOCK
 from push_predictor.nodes.validator.sensor_subscriber import TOPICS
 from push_predictor.online.live_validation import MAIN_RESULT
+from push_predictor.recordings.rig import Rig, load_rig
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
     "push_replay": ("push_replay", tuple(replay_parameters.PARAMETERS)),
     "push_validator": ("push_validator", tuple(validator_parameters.PARAMETERS)),
 }
-REFERENCE = REPOSITORY / "docs" / "reference"
-DOCUMENTS = [REPOSITORY / "README.md", REPOSITORY / "bags" / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
+DOCS = REPOSITORY / "docs"
+REFERENCE = DOCS / "reference"
+DOCUMENTS = [
+    *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "bags/README.md")),
+    *sorted(DOCS.rglob("*.md")),
+]
 SERVICES = ("predict_push", "predict_push_batch", "predict_slider_pose", "rollout_pushes", "list_models", "load_model")
 
 
@@ -127,3 +138,106 @@ def test_the_names_in_the_documented_files_are_those_that_are_written():
     names = " ".join(row[0] for row in table(REFERENCE / "push_validator.md", "What is written"))
     for name in (MAIN_RESULT, "windows.json", "residuals/", "report.html"):
         assert f"`{name}`" in names
+
+
+# --- reference pages -------------------------------------------------------------------------------------------------
+
+
+def section(document: Path, heading: str) -> str:
+    return document.read_text().split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_command_line_page_names_every_option(command: str):
+    page = REFERENCE / "command_line.md"
+    known = section(page, command) + section(page, "Conventions")
+    for action in command_parser(command)._actions:
+        assert action.dest == "help" or not action.option_strings or any(o in known for o in action.option_strings), (
+            action.option_strings
+        )
+
+
+def command_parser(command: str) -> argparse.ArgumentParser:
+    groups = [action for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction)]
+    parser: argparse.ArgumentParser = groups[0].choices[command]
+    return parser
+
+
+def test_the_python_page_shows_every_public_name():
+    shown = re.findall(r"^::: push_predictor\.(\w+)$", (REFERENCE / "python_api.md").read_text(), re.MULTILINE)
+    assert sorted(shown) == sorted(name for name in push_predictor.__all__ if not name.startswith("__"))
+
+
+def test_the_messages_page_names_every_interface():
+    page = (REFERENCE / "messages.md").read_text()
+    for path in sorted((REPOSITORY / "push_predictor_interfaces").glob("*/*")):
+        if path.suffix in (".msg", ".srv", ".action"):
+            assert f"{path.stem}`" in page, path.name
+
+
+def test_the_json_page_names_every_field_of_a_trace():
+    source = (REPOSITORY / "push_predictor" / "residuals" / "reporting" / "trace_json.py").read_text()
+    page = (REFERENCE / "json.md").read_text()
+    fields = re.findall(r'^ {8}"(\w+)":', source, re.MULTILINE)
+    assert len(fields) > 20
+    for field in fields:
+        assert f'"{field}"' in page, field
+
+
+def test_the_push_page_gives_the_size_of_every_standard_outline():
+    rows = {row[0].strip("`"): row[1] for row in table(REFERENCE / "push.md", "Standard outlines")}
+    assert set(rows) == set(SHAPES)
+    for name, text in rows.items():
+        extent = 2.0 * np.abs(shape_outline(name).vertices).max(axis=0)
+        sizes = [float(size) for size in re.findall(r"\d+\.\d+", text)]
+        assert sizes[0] == pytest.approx(extent[0] / 2.0 if name == "hex" else extent[0], rel=1e-3), name
+
+
+def test_the_example_rig_has_every_key_and_loads():
+    keys = yaml.safe_load((REFERENCE / "rig.yaml").read_text())
+    fields = {field.name for field in dataclasses.fields(Rig)}
+    assert set(keys) == fields | {"shape_parameters"}
+    rig = load_rig(REFERENCE / "rig.yaml")
+    assert rig.support_points is not None and rig.support_points[:, 2].sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(rig.outline.centroid, 0.0, atol=1e-9)
+
+
+def test_the_rig_page_explains_every_key():
+    page = (REFERENCE / "rig_file.md").read_text()
+    for key in yaml.safe_load((REFERENCE / "rig.yaml").read_text()):
+        assert f"| `{key}` |" in page, key
+
+
+# --- what the documents cite -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
+def test_cited_modules_and_files_exist(document: Path):
+    text = document.read_text()
+    for module in re.findall(r"python -m ((?:benchmarks|examples)[\w.]*)", text):
+        assert importlib.util.find_spec(module.rstrip(".")), module
+    for path in re.findall(r"`((?:test|benchmarks|examples|config|docs)/[\w/.]+\.(?:py|yaml|xml|json|rviz|md))`", text):
+        assert (REPOSITORY / path).is_file(), path
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
+def test_model_files_have_one_suffix(document: Path):
+    assert not re.findall(r"\b(?!pushes_)\w+\.(?:model|npz)\b", document.read_text())
+
+
+def test_code_cites_documents_that_exist():
+    for room in ("push_predictor", "msg_adapters", "push_predictor_paper", "benchmarks", "examples", "launch", "test"):
+        for path in (REPOSITORY / room).rglob("*.py"):
+            for cited in re.findall(r"docs/[\w/]+\.md", path.read_text()):
+                assert (REPOSITORY / cited).is_file(), f"{path}: {cited}"
+
+
+def test_the_site_shows_every_page():
+    text = (REPOSITORY / "mkdocs.yml").read_text()
+    named = re.findall(r"([\w/]+\.md)$", text, re.MULTILINE)
+    assert sorted(named) == sorted(p.relative_to(DOCS).as_posix() for p in DOCS.rglob("*.md"))
+
+
+def test_the_glossary_stays_short():
+    rows = [line for line in (DOCS / "glossary.md").read_text().splitlines() if line.startswith("|")][2:]
+    assert 0 < len(rows) <= 20

@@ -1,4 +1,4 @@
-"""The parameters of push_validator; the table in docs/validation.md repeats them."""
+"""The parameters of push_validator; the table in docs/reference/push_validator.md repeats them."""
 
 from __future__ import annotations
 
