@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.offline import recording_rig, rig_difference, training_overlap, validate_recording
     from push_predictor.evaluation.validation import metrics_json
     from push_predictor.models.store.model_file import load_model
-    from push_predictor.online.window_log import write_window_log
+    from push_predictor.online.files.window_log import write_window_log
     from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
 from push_predictor.models.push_model import Prediction, PushModel
-from push_predictor.online.row_file import RowFile
+from push_predictor.online.files.row_file import RowFile
+from push_predictor.online.files.window_log import Refusal, write_window_log
+from push_predictor.online.files.window_rows import WindowRows
 from push_predictor.online.running_score import RunningScore
-from push_predictor.online.window_log import Refusal, write_window_log
-from push_predictor.online.window_rows import WindowRows
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array, IntArray

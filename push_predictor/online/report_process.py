@@ -14,8 +14,8 @@ from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.offline import report_windows
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.push_model import PushModel
+from push_predictor.online.files.window_rows import WindowRows
 from push_predictor.online.live_validation import LiveValidation
-from push_predictor.online.window_rows import WindowRows
 
 
 class ReportWriter:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor.errors import PushPredictorError, RecordingError
-from push_predictor.online.window_table import TABLE
+from push_predictor.online.files.window_table import TABLE
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.metadata import METADATA_FILE
 from push_predictor.recordings.rig import HOW_TO_GIVE

@@ -20,9 +20,9 @@ from synthetic import square_rig
 
 from push_predictor.models.train import train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
-from push_predictor.online import row_file
+from push_predictor.online.files import row_file
+from push_predictor.online.files.row_file import RowFile
 from push_predictor.online.live_validation import LiveValidation
-from push_predictor.online.row_file import RowFile
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor_interfaces.srv import PredictPush
 

@@ -11,8 +11,8 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.residual_schema import RESIDUAL_DEFINITION, RESIDUAL_TYPE
 from msg_adapters.residuals import ValidatedWindow, residual_to_message
+from push_predictor.online.files.residual_journal import JOURNAL
 from push_predictor.online.live_validation import LiveValidation
-from push_predictor.online.residual_journal import JOURNAL
 from push_predictor.recordings.bag.cdr import encode
 from push_predictor.recordings.bag.definitions import FLOAT64, SCALAR_LAYOUTS
 from push_predictor.recordings.bag.writer import BagWriter

@@ -18,10 +18,10 @@ from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.residual_recorder import residual_message, write_residuals
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.completed_pushes import CompletedPushes
+from push_predictor.online.files.residual_journal import ResidualJournal
+from push_predictor.online.files.window_table import WindowTable
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
-from push_predictor.online.residual_journal import ResidualJournal
 from push_predictor.online.stream_sync import Samples, StreamSync
-from push_predictor.online.window_table import WindowTable
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import ScalarStream

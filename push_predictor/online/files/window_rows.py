@@ -8,7 +8,7 @@ from typing import overload
 
 import numpy as np
 
-from push_predictor.online.row_file import RowFile
+from push_predictor.online.files.row_file import RowFile
 from push_predictor.recordings.windows.push_window import PushWindow
 
 _FIXED = struct.Struct("<3q14d2H")  # the last two: number of the covariates' names, length of the push's id
