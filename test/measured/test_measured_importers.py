@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.recordings.importers import ImportReport, import_source
-from push_predictor.recordings.importers.cleaning import in_order, without_held
+from push_predictor.recordings.importers.cleaning import in_order, without_repeats
 from push_predictor.recordings.importers.mcube.pushes import read_numbers
 from push_predictor.recordings.importers.mcube.rig import ALUMINIUM, PUSHER_RADIUS, STEEL, TIP_LATE
 from push_predictor.recordings.importers.report import Notes
@@ -96,7 +96,9 @@ def _tip_at(recording: Recording, stamp: int) -> Array:
 def test_the_clock_offset_is_what_the_delay_test_shows_once_held_rows_are_left_out(measured_data: Path) -> None:
     folder, notes = measured_data / "mcube_preliminary" / "time_delay", Notes()
     vicon = in_order(read_numbers(folder / "Output_vicon_tcpvicon.txt", 2, notes), "vicon", notes)
-    tip = without_held(in_order(read_numbers(folder / "Output_tip_tcpvicon.txt", 2, notes), "tip", notes), "tip", notes)
+    tip = without_repeats(
+        in_order(read_numbers(folder / "Output_tip_tcpvicon.txt", 2, notes), "tip", notes), "tip", notes
+    )
 
     def scatter(late: float) -> float:
         """Standard deviation (m) of what a straight line from Vicon's x to the tip's leaves."""
@@ -140,7 +142,7 @@ def test_the_report_tells_what_was_done(mcube: tuple[ImportReport, dict[str, Rec
     report, recordings = mcube
     assert sorted(recordings) == RUNS and report.pushes == 8
     assert sum("the tip stream stops" in line for line in report.dropped) == 4
-    assert sum("only hold the tip's position" in line for line in report.repaired) == 8
+    assert sum("repeat the tip's position" in line for line in report.repaired) == 8
     for words in ("15 ms late", "not measured", "fitted to the contact", "surface unknown"):
         assert any(words in line for line in report.assumed), words
 
@@ -294,10 +296,10 @@ def test_the_odd_things_of_the_mlab_logs_are_told(mlab: ImportReport) -> None:
     ("name", "pushes", "words"),
     [
         ("exp0", 5, ["the number of pushes is missing"]),
-        ("exp2_30", 15, ["says 30 pushes, holds 15", "15 pushes without forces"]),
+        ("exp2_30", 15, ["states 30 pushes, contains 15", "15 pushes without forces"]),
         ("exp7_20", 20, []),
         ("exp8_35_mixed", 35, ["after push 14 the clock goes back"]),
-        ("exp9_15", 11, ["says 15 pushes, holds 11"]),
+        ("exp9_15", 11, ["states 15 pushes, contains 11"]),
     ],
 )
 def test_quirky_logs_come_in_as_far_as_they_can_and_say_so(

@@ -17,7 +17,7 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.importers.cleaning import Samples, in_order, nanoseconds, without_held
+from push_predictor.recordings.importers.cleaning import Samples, in_order, nanoseconds, without_repeats
 from push_predictor.recordings.importers.heading import repair_heading
 from push_predictor.recordings.importers.mcube.pushes import headings
 from push_predictor.recordings.importers.mlab.push_logs import first_touch
@@ -82,20 +82,20 @@ def test_rows_are_sorted_and_repeated_stamps_dropped_and_both_are_told() -> None
     clean = in_order(samples, "FILE", notes)
     assert clean.stamp.tolist() == [10, 20, 30] and clean.values[:, 0].tolist() == [1.0, 2.0, 3.0]
     assert any("1 rows out of order" in line for line in notes.repaired)
-    assert any("not finite" in line for line in notes.dropped) and any(
+    assert any("NaN or infinity" in line for line in notes.dropped) and any(
         "repeat the stamp" in line for line in notes.dropped
     )
 
 
 def test_of_a_stair_only_the_first_row_of_each_step_stays_and_rest_keeps_the_pace_of_the_steps() -> None:
     x = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0])
-    kept = without_held(Samples(np.arange(14), x[:, None]), "tip", Notes())
+    kept = without_repeats(Samples(np.arange(14), x[:, None]), "tip", Notes())
     assert kept.stamp.tolist() == [0, 2, 4, 6, 8, 11, 12]
 
 
 def test_a_stream_without_stairs_keeps_its_rest() -> None:
     x = np.concatenate([np.zeros(9), np.arange(1.0, 20.0), np.full(9, 19.0)])
-    assert len(without_held(Samples(np.arange(37), x[:, None]), "tip", Notes()).stamp) == 37
+    assert len(without_repeats(Samples(np.arange(37), x[:, None]), "tip", Notes()).stamp) == 37
 
 
 @given(st.floats(1.0e9, 2.0e9))
@@ -217,7 +217,7 @@ def test_an_unknown_shape_is_named_and_a_rig_takes_its_place(tmp_path: Path) -> 
         ('{"tip_pose": [[1, 2, 3, 4], [1, 2, 3]], "object_pose": []}', r"tip_pose\[1\]"),
         ('{"tip_pose": [[1, 2, 3, "x"]], "object_pose": []}', r"tip_pose\[0\]"),
         ('{"tip_pose": [[1, 2, 3, 4]], "object_pose": [[1, 2, 3, 4]]}', "1 usable rows"),
-        ('{"tip_pose": [[1,2,3,4],[2,2,3,4]], "object_pose": [[5,2,3,4],[6,2,3,4]]}', "share no time"),
+        ('{"tip_pose": [[1,2,3,4],[2,2,3,4]], "object_pose": [[5,2,3,4],[6,2,3,4]]}', "do not overlap in time"),
         ("\n\n{", ":3: not JSON"),
     ],
 )
@@ -351,13 +351,13 @@ def test_quirks_of_the_logs_are_told_and_the_rest_is_kept(tmp_path: Path) -> Non
     np.testing.assert_allclose(table.covariates["elapsed_time"], [50.0, 0.0, 150.0], atol=1e-6)
     assert np.isnan(table.covariates["normal_force"]).tolist() == [False, True, False]
     for words in (
-        "says 5 pushes, holds 4",
+        "states 5 pushes, contains 4",
         "push 4 is cut off by the end",
         "push 2: 2 robot poses",
         "1 pushes without forces",
         "the clock goes back by 50 s",
         "moved by hand",
-        "tells no configuration",
+        "contains no configuration",
     ):
         assert words in told, words
 

@@ -1,4 +1,7 @@
-"""Importers: foreign recordings of pushes become recordings and push tables, and a report of what was done to them."""
+"""Import other formats as recordings and push tables, with a report of every repair and assumption.
+
+Import `import_source`; each format has a module or folder.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +33,8 @@ __all__ = ["IMPORTERS", "KINDS", "ImportReport", "import_source"]
 def import_source(kind: str, sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
     """Import files or folders of one kind into the folder `out`; either all results are written or none.
 
-    rig takes the place of the one the importer knows. Raises ImportSourceError that names the file and the line (or
-    the row, byte or topic) that cannot be read, and what is accepted.
+    rig replaces the importer's own. Raises ImportSourceError that names the file, the line (or row, byte or topic) that
+    cannot be read, and what is accepted.
     """
     if kind not in IMPORTERS:
         raise ImportSourceError(f"kind {kind!r} is not known, give one of {', '.join(KINDS)}")

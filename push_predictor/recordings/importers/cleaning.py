@@ -1,4 +1,4 @@
-"""Repairs that several foreign formats need: order in time, repeated rows, held poses, the heading's turns."""
+"""Repairs for several formats: order of time, repeated rows, repeated positions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LAST_STAMP = 2**31 * 1_000_000_000  # ns; a ROS stamp has seconds of 31 bits
 
 
 class Samples(NamedTuple):
-    """A stream before it has a meaning: stamps (n,) in ns, values (n, k)."""
+    """Rows of a stream before conversion: stamps (n,) in ns, values (n, k)."""
 
     stamp: IntArray
     values: Array
@@ -27,26 +27,26 @@ class Samples(NamedTuple):
 
 def nanoseconds(seconds: Array) -> IntArray:
     """Unix seconds (n,) as integer ns."""
-    whole = np.floor(np.clip(seconds, -1.0, 9e9))  # within 64 bits; what is out of range is refused later
+    whole = np.floor(np.clip(seconds, -1.0, 9e9))  # within 64 bits; values out of range are rejected later
     return whole.astype(np.int64) * 1_000_000_000 + np.round((seconds - whole) * 1e9).astype(np.int64)
 
 
 def twist(z: Array, w: Array) -> Array:
-    """The planar rotation (rad) nearest to a quaternion with these parts: the tilt of a tracked body is noise."""
+    """The planar rotation (rad) nearest to a quaternion with these z and w; its tilt is treated as noise."""
     return np.asarray(2.0 * np.arctan2(z, w))
 
 
 def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
-    """Samples that are finite, in order of time, one a stamp.
+    """The finite samples in order of time, one per stamp.
 
-    Raises ImportSourceError if fewer than two remain, or a stamp is none that a message can carry.
+    Raises ImportSourceError if fewer than two remain, or a stamp is outside the range of a message.
     """
     if np.any(wrong := (samples.stamp < 0) | (samples.stamp >= LAST_STAMP)):
         row = int(np.argmax(wrong))
         raise ImportSourceError(f"{where}[{row}]: time {samples.stamp[row] / 1e9:.9g} s, give Unix time before 2038")
     finite = np.all(np.isfinite(samples.values), axis=1)
     if missing := int(np.sum(~finite)):
-        notes.dropped.append(f"{where}: {missing} rows with a value that is not finite")
+        notes.dropped.append(f"{where}: {missing} rows that contain NaN or infinity")
         samples = samples.take(finite)
     if late := int(np.sum(np.diff(samples.stamp) < 0)):
         notes.repaired.append(f"{where}: {late} rows out of order in time, sorted")
@@ -60,31 +60,31 @@ def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
     return samples
 
 
-def without_held(samples: Samples, where: str, notes: Notes) -> Samples:
-    """Without rows that only hold the last position of a robot that answers faster than it updates.
+def without_repeats(samples: Samples, where: str, notes: Notes) -> Samples:
+    """The rows with new positions, of a robot that reports faster than it updates.
 
-    Of each step of such stairs the first row is a measurement. Where more than LONGEST_STEP rows are equal the tip
-    rests, and rows at the pace of the moving tip's updates are kept.
+    Of several equal rows the first is a measurement. Where more than LONGEST_STEP rows are equal the tip rests, and
+    rows at the update rate of the moving tip are kept.
     """
     fresh = np.concatenate([[True], np.any(samples.values[1:] != samples.values[:-1], axis=1)])
     starts = np.flatnonzero(fresh)
     length = np.diff(np.append(starts, len(fresh)))
     moving = length[length <= LONGEST_STEP]
-    pace = int(np.median(moving)) if len(moving) else 1
+    interval = int(np.median(moving)) if len(moving) else 1
     step = np.cumsum(fresh) - 1
     place = np.arange(len(fresh)) - starts[step]
-    held = np.where(length[step] <= LONGEST_STEP, place > 0, place % pace > 0)
-    if count := int(np.sum(held)):
+    repeated = np.where(length[step] <= LONGEST_STEP, place > 0, place % interval > 0)
+    if count := int(np.sum(repeated)):
         notes.repaired.append(
-            f"{where}: {count} of {len(held)} rows only hold the tip's position of the row before, left out"
+            f"{where}: {count} of {len(repeated)} rows repeat the tip's position of an earlier row; removed"
         )
-    return samples.take(~held)
+    return samples.take(~repeated)
 
 
 def require_overlap(streams: dict[str, IntArray], where: str) -> None:
-    """Raise ImportSourceError unless all streams (stamps in ns) share some time."""
+    """Raise ImportSourceError unless all streams (stamps in ns) overlap in time."""
     start = max(int(stamp[0]) for stamp in streams.values())
     end = min(int(stamp[-1]) for stamp in streams.values())
     if start >= end:
         spans = ", ".join(f"{name} {stamp[0] / 1e9:.3f} to {stamp[-1] / 1e9:.3f} s" for name, stamp in streams.items())
-        raise ImportSourceError(f"{where}: the streams share no time ({spans})")
+        raise ImportSourceError(f"{where}: the streams do not overlap in time ({spans})")

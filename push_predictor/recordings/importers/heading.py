@@ -1,8 +1,8 @@
-"""A tracker's heading: turns counted, jumps undone where the slider's symmetry allows it.
+"""Repair a tracker's heading: unwrap it and undo jumps that the slider's symmetry allows.
 
-A tracker that takes one marker of a symmetric body for another reports a heading that is off by a multiple of 90
-degrees from one frame on, sometimes through a few frames in between. On a slider that looks the same after that turn
-the jump can be undone; on another one nobody knows which side of the jump is right, and the stream is cut there.
+A tracker that confuses two markers reports a heading that is wrong by a multiple of 90 degrees from one frame on,
+sometimes through a few intermediate frames. On a slider with this symmetry the jump can be undone. On other sliders
+neither side of the jump is known to be right, and the stream is cut there.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from push_predictor.types import Array, BoolArray
 QUARTER = np.pi / 2.0
 LEAST_JUMP = 0.07  # rad between two samples; below it a step is motion or noise
 FASTEST_TURN = 17.0  # rad/s: a pusher of 0.5 m/s on a lever of 3 cm
-NEAR_QUARTER = 0.15  # rad: the slider may turn, too, while the tracker changes its mind
+NEAR_QUARTER = 0.15  # rad: the slider may also turn during the jump
 
 
 @dataclass(frozen=True, eq=False)
 class HeadingRepair:
-    """heading (n,) rad, continuous; keep (n,): samples that may be used; undone and cut: how many jumps."""
+    """heading (n,) rad, continuous; keep (n,): usable samples; undone, cut: numbers of jumps."""
 
     heading: Array
     keep: BoolArray
@@ -31,9 +31,10 @@ class HeadingRepair:
 
 
 def repair_heading(time: Array, heading: Array, symmetry: int) -> HeadingRepair:
-    """Undo jumps of the heading (n,) at times (n,) s for a slider of rotational symmetry `symmetry` (0: a circle).
+    """Undo jumps of the heading (n,) rad at times (n,) s.
 
-    Where a jump cannot be undone, the longest piece without one is kept.
+    symmetry: order of the slider's rotational symmetry, 0 for a circle. If a jump cannot be undone, the longest piece
+    without such a jump is kept.
     """
     heading = np.unwrap(heading)
     keep = np.ones(len(heading), dtype=np.bool_)
@@ -54,7 +55,7 @@ def repair_heading(time: Array, heading: Array, symmetry: int) -> HeadingRepair:
 
 
 def _looks_the_same(quarters: int, symmetry: int) -> bool:
-    """Whether a slider of this symmetry looks the same after so many quarter turns."""
+    """Whether a slider of this symmetry is unchanged by a number of quarter turns."""
     return symmetry == 0 or quarters * symmetry % 4 == 0
 
 

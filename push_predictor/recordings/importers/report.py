@@ -1,4 +1,4 @@
-"""What an import did, told to the person who will trust the result."""
+"""The report of an import: what was written, dropped, repaired and assumed."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from pathlib import Path
 
 @dataclass
 class Notes:
-    """Sentences gathered while foreign files are read; each names the file, and the line or count."""
+    """Sentences collected while files are read; each names the file, and the line or count."""
 
     dropped: list[str] = field(default_factory=list)
     repaired: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
 
     def assume(self, sentence: str) -> None:
-        """Add an assumption once, however many files share it."""
+        """Add an assumption once, even if several files share it."""
         if sentence not in self.assumed:
             self.assumed.append(sentence)
 
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What was written and what was done to it.
+    """The result of an import.
 
-    recordings: recordings written. pushes: pushes known from the format itself (a table's rows, one for a file that
-    holds one push, none for a continuous bag, where windows must be found first).
+    recordings: number of recordings written. pushes: number of pushes known from the format: the rows of a table, one
+    for a file with one push, none for a continuous bag, whose windows must be found first.
     """
 
     kind: str

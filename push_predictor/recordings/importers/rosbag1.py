@@ -1,4 +1,4 @@
-"""Import of ROS 1 bags of known rigs, told apart by their topics."""
+"""Import of ROS 1 bags of known rigs, distinguished by their topics."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ACCEPTED = (
 def import_rosbag1(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
     """One recording for each bag in files and folders (recursive). Raises ImportSourceError.
 
-    A bag of the mlab profile gets no rig of its own: what object it shows is not recorded.
+    A bag of the mlab profile gets no rig, because its object is not recorded.
     """
     notes = Notes()
     with staged(out) as staging:
@@ -62,7 +62,7 @@ def read_mcube_bag(path: Path, body_topic: str, rig: Rig | None, notes: Notes) -
         for topic, values in ((body_topic, _transform), (FORCE, _wrench), (TIP, _position))
     }
     leads = "; ".join(f"{topic} {-1e3 * header_lead(messages[topic])[1]:.1f} ms" for topic in raw)
-    notes.assume(f"{path}: header stamps used; the bag's clock is later by (median) {leads}")
+    notes.assume(f"{path}: header stamps are used; the bag's clock is later by (median) {leads}")
     x, y, z, w = raw[body_topic].values.T
     body = Samples(raw[body_topic].stamp, np.column_stack([x, y, np.unwrap(twist(z, w))]))
     block = block_of(path, int(body.stamp[0]))
@@ -70,7 +70,7 @@ def read_mcube_bag(path: Path, body_topic: str, rig: Rig | None, notes: Notes) -
 
 
 def _vicon_body(topics: dict[str, str]) -> str | None:
-    """The one tracked body of an mcube bag."""
+    """The topic of the single tracked body of an mcube bag, None for other bags."""
     bodies = [topic for topic, kind in topics.items() if topic.startswith("/vicon/") and kind == TRANSFORM]
     return bodies[0] if len(bodies) == 1 and FORCE in topics and TIP in topics else None
 
@@ -95,6 +95,6 @@ def _bags(sources: Sequence[Path]) -> list[Path]:
     for source in sources:
         inside = sorted(source.rglob("*.bag")) if source.is_dir() else [source]
         if not inside:
-            raise ImportSourceError(f"{source}: holds no .bag file")
+            raise ImportSourceError(f"{source}: contains no .bag file")
         found += inside
     return found

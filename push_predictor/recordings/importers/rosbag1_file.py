@@ -13,12 +13,12 @@ import numpy as np
 from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers.cleaning import Samples
 
-CAPITAL_PACKAGE = re.compile(r"\b([A-Z]\w*)/")  # legal in ROS 1, not in ROS 2, which rosbags follows
+CAPITAL_PACKAGE = re.compile(r"\b([A-Z]\w*)/")  # allowed in ROS 1, not in ROS 2, which rosbags follows
 DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
 
 
 class Stamped(NamedTuple):
-    """A message and when the bag recorded it (ns)."""
+    """A message and its bag time (ns)."""
 
     time: int
     message: Any
@@ -64,7 +64,7 @@ def samples_of(
 
 
 def bag_time(item: Stamped) -> int:
-    """When the bag recorded the message, ns."""
+    """The time at which the bag recorded the message, ns."""
     return item.time
 
 
@@ -74,7 +74,7 @@ def header_time(item: Stamped) -> int:
 
 
 def header_lead(messages: Sequence[Stamped]) -> tuple[float, float, float]:
-    """Header stamp minus bag time, s: least, median, most."""
+    """Header stamp minus bag time, s: minimum, median, maximum."""
     lead = [(header_time(item) - item.time) * 1e-9 for item in messages]
     return float(np.min(lead)), float(np.median(lead)), float(np.max(lead))
 

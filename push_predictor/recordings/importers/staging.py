@@ -1,4 +1,4 @@
-"""Writing an import's results all at once: a failure leaves nothing behind."""
+"""Write the results of an import together; after a failure none is left."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from push_predictor.recordings.write import write_recording
 
 
 class Staging:
-    """Results gathered in a folder beside their destination."""
+    """Results collected in a temporary folder within their destination."""
 
     def __init__(self, out: Path, folder: Path) -> None:
         self.out, self.folder = out, folder
@@ -29,7 +29,7 @@ class Staging:
         self.pushes = 0
 
     def recording(self, recording: Recording, pushes: int) -> None:
-        """Write a recording as the folder of its name. Raises ImportSourceError if the name is taken."""
+        """Write a recording to the folder of its name. Raises ImportSourceError if the name is taken."""
         write_recording(self._claimed(recording.name), recording)
         self.recordings += 1
         self.pushes += pushes
@@ -41,7 +41,7 @@ class Staging:
         self.pushes += len(table.pushes)
 
     def report(self, kind: str, notes: Notes) -> ImportReport:
-        """The report of what has been gathered."""
+        """The report of the collected results."""
         sentences = (tuple(notes.dropped), tuple(notes.repaired), tuple(notes.assumed))
         return ImportReport(kind, tuple(self.written), self.recordings, self.pushes, *sentences)
 
@@ -57,7 +57,7 @@ class Staging:
 
 @contextmanager
 def staged(out: Path) -> Iterator[Staging]:
-    """Gather results beside `out` and move them there when the block ends well; on an error none is kept."""
+    """Collect results and move them to `out` when the block ends; after an error none is kept."""
     made = not out.exists()
     folder: Path | None = None
     try:
@@ -77,5 +77,5 @@ def staged(out: Path) -> Iterator[Staging]:
 
 
 def safe_name(text: str) -> str:
-    """`text` with everything that a file system or a shell may trip over replaced by '_'."""
+    """`text` with special characters of file systems and shells replaced by '_'."""
     return re.sub(r"[^A-Za-z0-9.=-]+", "_", text).strip("._") or "unnamed"

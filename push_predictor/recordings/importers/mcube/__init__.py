@@ -1,4 +1,4 @@
 """Importer of the MCube lab's preliminary pushes (August 2015).
 
-Import `pushes`; `rig` holds the two blocks and their frames.
+Import `pushes`; `rig` describes the two blocks and their frames.
 """

@@ -1,4 +1,6 @@
-"""Import of the MCube lab's preliminary pushes: metal_K_{obj,ft,tcp}.txt, one number a line, a recording for each run.
+"""Import of the MCube lab's preliminary pushes, one recording for each run.
+
+The files are metal_K_{obj,ft,tcp}.txt with one number per line.
 
 obj: blocks of time (ns), x, y, z (m), qx, qy, qz in Vicon's world. ft: time, fx, fy (N) of the sensor.
 tcp: time, x, y (m) of the tip in the robot's base.
@@ -13,7 +15,7 @@ import numpy as np
 
 from push_predictor.errors import ImportSourceError
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
-from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_held
+from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_repeats
 from push_predictor.recordings.importers.mcube.rig import CLOCK, FORCE, HEIGHT, TIP_LATE, Block, block_of
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.staging import safe_name, staged
@@ -21,13 +23,13 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.types import Array
 
-WIDTHS = {"obj": 7, "ft": 3, "tcp": 3}  # numbers a sample
-AT_REST = 5e-4  # m; the tip has not left its first position
+WIDTHS = {"obj": 7, "ft": 3, "tcp": 3}  # numbers per sample
+AT_REST = 5e-4  # m; largest distance from the first position at rest
 LEAST_TARE = 5
 STOPS_EARLY = 1_000_000_000  # ns
 NEAR_HALF_TURN = 0.05  # |qw| below which the lost sign of qw may change
 IN_TOUCH = 0.002  # m
-TREND = 8  # samples that tell how the heading goes on
+TREND = 8  # samples that predict the next heading
 
 
 def import_mcube(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
@@ -40,20 +42,20 @@ def import_mcube(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> 
 
 
 def read_mcube(obj: Path, rig: Rig | None, notes: Notes) -> Recording:
-    """The run whose *_obj.txt is given; the other two files lie beside it. Raises ImportSourceError."""
+    """The run of an *_obj.txt; the other two files are in the same folder. Raises ImportSourceError."""
     stem = obj.name.removesuffix("_obj.txt")
     files = {kind: obj.with_name(f"{stem}_{kind}.txt") for kind in WIDTHS}
     raw = {kind: in_order(read_numbers(path, WIDTHS[kind], notes), str(path), notes) for kind, path in files.items()}
     name, where = safe_name(f"{obj.resolve().parent.name}_{stem}"), str(obj.with_name(stem))
     block, heading = block_of(obj, int(raw["obj"].stamp[0])), headings(raw["obj"].values[:, 3:])
     found = []
-    for sign, told in ((1.0, notes), (-1.0, Notes())):
+    for sign, sign_notes in ((1.0, notes), (-1.0, Notes())):
         body = Samples(raw["obj"].stamp, np.column_stack([raw["obj"].values[:, :2], sign * heading]))
-        found.append(assemble(name, where, block, rig, body, raw["tcp"], raw["ft"], told))
+        found.append(assemble(name, where, block, rig, body, raw["tcp"], raw["ft"], sign_notes))
     touches = [samples_in_touch(recording) for recording in found]
     notes.assume(
-        f"{where}: qw is not in the file, taken {'positive' if touches[0] >= touches[1] else 'negative'} at the first "
-        f"sample: so {max(touches)} tip samples lie on the outline, otherwise {min(touches)}"
+        f"{where}: qw is not in the file and assumed {'positive' if touches[0] >= touches[1] else 'negative'} at the "
+        f"first sample: then {max(touches)} tip samples lie on the outline, otherwise {min(touches)}"
     )
     return found[int(touches[1] > touches[0])]
 
@@ -61,7 +63,7 @@ def read_mcube(obj: Path, rig: Rig | None, notes: Notes) -> Recording:
 def assemble(
     name: str, where: str, block: Block, rig: Rig | None, body: Samples, tip: Samples, force: Samples, notes: Notes
 ) -> Recording:
-    """A recording in Vicon's world from what the rig delivered.
+    """A recording in Vicon's world from the streams of the rig.
 
     body: (n, 3) x, y, heading in Vicon's world. tip: (n, 2) x, y in the robot's base, or (n, 3) with its height.
     force: (n, 2) fx, fy of the sensor, or (n, 3) with tz.
@@ -69,11 +71,13 @@ def assemble(
     for sentence in (CLOCK, FORCE, HEIGHT, block.assumed_frames, *(() if rig else (block.assumed_rig,))):
         notes.assume(sentence)
     force = tared(force, tip, where, notes)
-    tip = without_held(tip, f"{where}: tip", notes)
+    tip = without_repeats(tip, f"{where}: tip", notes)
     tip = tip._replace(stamp=tip.stamp - TIP_LATE)
     require_overlap({"slider": body.stamp, "tip": tip.stamp, "force": force.stamp}, where)
     if (missing := int(body.stamp[-1] - tip.stamp[-1])) > STOPS_EARLY:
-        notes.dropped.append(f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's, no push beyond")
+        notes.dropped.append(
+            f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's, later pushes are missing"
+        )
     return Recording(
         name=name,
         rig=rig or block.rig,
@@ -84,7 +88,7 @@ def assemble(
 
 
 def samples_in_touch(recording: Recording) -> int:
-    """How many samples of the tip lie on the slider's outline."""
+    """The number of tip samples on the slider's outline."""
     if recording.rig is None:
         return 0
     slider, tip = recording.slider, recording.pusher
@@ -94,7 +98,10 @@ def samples_in_touch(recording: Recording) -> int:
 
 
 def read_numbers(path: Path, width: int, notes: Notes) -> Samples:
-    """Blocks of one integer stamp and width - 1 numbers, one a line. Raises ImportSourceError with file and line."""
+    """Blocks of an integer stamp and width - 1 numbers, one per line.
+
+    Raises ImportSourceError with file and line.
+    """
     try:
         lines = path.read_bytes().decode("ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -111,8 +118,8 @@ def read_numbers(path: Path, width: int, notes: Notes) -> Samples:
 def headings(quaternion: Array) -> Array:
     """Headings (n,) rad, continuous, from qx, qy, qz (n, 3).
 
-    qw has lost its sign. It is taken as positive at first; near half a turn, where it may change, the heading that
-    goes on as the samples before is taken.
+    The sign of qw is missing. It is assumed positive at first; near half a turn, where it may change, the heading that
+    continues the trend of the previous samples is used.
     """
     qw = np.sqrt(np.maximum(0.0, 1.0 - np.sum(quaternion**2, axis=1)))
     sign, found = 1.0, np.empty(len(qw))
@@ -127,12 +134,12 @@ def headings(quaternion: Array) -> Array:
 
 
 def tared(force: Samples, tip: Samples, where: str, notes: Notes) -> Samples:
-    """Force without its mean from before the tip first moves (two stamps of one instant differ by 20 ms at most)."""
+    """Force minus its mean before the tip first moves; stamps of the two streams differ by at most 20 ms."""
     moved = np.flatnonzero(np.hypot(*(tip.values[:, :2] - tip.values[0, :2]).T) > AT_REST)
     start = tip.stamp[moved[0]] - 2 * TIP_LATE if len(moved) else tip.stamp[-1]
     before = force.stamp < start
     if np.sum(before) < LEAST_TARE:
-        notes.dropped.append(f"{where}: no rest before the push, the force is not tared")
+        notes.dropped.append(f"{where}: no rest before the push; the force is not tared")
         return force
     zero = force.values[before].mean(axis=0)
     notes.repaired.append(
@@ -171,6 +178,6 @@ def _runs(sources: Sequence[Path]) -> list[Path]:
     for source in sources:
         inside = sorted(source.rglob("*_obj.txt")) if source.is_dir() else [source]
         if not inside or not inside[0].name.endswith("_obj.txt") or not inside[0].exists():
-            raise ImportSourceError(f"{source}: give a folder that holds NAME_obj.txt, NAME_ft.txt, NAME_tcp.txt")
+            raise ImportSourceError(f"{source}: give a folder that contains NAME_obj.txt, NAME_ft.txt, NAME_tcp.txt")
         found += inside
     return found

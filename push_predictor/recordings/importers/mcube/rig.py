@@ -1,7 +1,7 @@
-"""The rig of the MCube lab's preliminary pushes of August 2015: two metal blocks, and how their frames lie.
+"""The rig of the MCube lab's preliminary pushes of August 2015: two metal blocks and their frames.
 
-What the files do not tell was found from the contact itself: while the pusher touches a side, its centre keeps the
-distance half side + pusher radius from the block's centre line. test_measured_importers repeats the fit.
+Values that the files lack were fitted to the contact: while the pusher touches a side, the distance of its centre from
+the block's centre line is half side + pusher radius. test_measured_importers repeats the fit.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ PUSHER_RADIUS = 0.004745  # m
 THICKNESS = 0.0132  # m; that of the MIT set's steel square, 0.837 kg on 0.09 m x 0.09 m
 TIP_LATE = 15_000_000  # ns; see CLOCK
 CLOCK = (
-    "clock: tip stamps are 15 ms late against the tracker's and were set back by that (delay test with held rows left "
-    "out: 15.0 ms, rms 0.17 mm; with the held rows, which are 12 ms old: 20 to 21 ms); tracker and force share a clock"
+    "clock: tip stamps are 15 ms late relative to the tracker's and were corrected (delay test without repeated rows: "
+    "15.0 ms, rms 0.17 mm; with the repeated rows, which are 12 ms old: 20 to 21 ms); tracker and force share a clock"
 )
 FORCE = (
     "force: the sensor looks down, world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag; axes "
-    "fitted to the contact normals of each block agree within 3 degrees; it is what the slider exerts on the pusher, "
+    "fitted to the contact normals of each block agree within 3 degrees; it is the force of the slider on the pusher, "
     "tared by the mean before the tip first moves"
 )
-HEIGHT = "tip and slider at height 0 where the files hold no height of the tip"
+HEIGHT = "tip and slider are at height 0 where the files contain no height of the tip"
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Block:
     """One of the blocks.
 
     half_side m; density kg/m^3; base: Vicon's origin in the robot's base (x, y) m; centre: the block's centre in the
-    tracker's body frame (x, y) m; days: Unix seconds of its sessions.
+    tracker's body frame (x, y) m; days: Unix seconds of the sessions.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Block:
 
     @property
     def assumed_rig(self) -> str:
-        """What is assumed of the block."""
+        """The assumptions about the block."""
         rig = self.rig
         return (
             f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from tip's and centre's distance in contact; "
@@ -61,7 +61,7 @@ class Block:
 
     @property
     def assumed_frames(self) -> str:
-        """What is assumed of the frames."""
+        """The assumptions about the frames."""
         (bx, by), (cx, cy) = self.base, self.centre
         source = (
             "the recorded transforms" if self.base == RECORDED_BASE else "fitted to the contact, recorded 10 mm off"
@@ -87,5 +87,5 @@ def block_of(path: Path, stamp: int) -> Block:
         if block.days[0] <= stamp / 1e9 < block.days[1]:
             return block
     raise ImportSourceError(
-        f"{path}: neither its folder (St_... steel, Al_... aluminium) nor its first stamp {stamp} ns tells the block"
+        f"{path}: the block is unknown from its folder (St_... steel, Al_... aluminium) and its first stamp {stamp} ns"
     )

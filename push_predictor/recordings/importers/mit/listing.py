@@ -1,4 +1,4 @@
-"""Which pushes a copy of the MIT push data set holds, by its file names alone."""
+"""List the pushes in a copy of the MIT push data set by file names alone."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from push_predictor.recordings.importers.mit.source import MitPlace, file_metada
 
 @dataclass(frozen=True)
 class MitPush:
-    """A straight push at constant speed (mm/s) of a shape on a surface, and the file that holds it."""
+    """A straight push at constant speed (mm/s); pair: shape and surface; place: its file."""
 
     pair: tuple[str, str]
     speed: float
     place: MitPlace
 
 
-def straight_pushes(paths: Sequence[Path], left_out: list[str]) -> list[MitPush]:
+def straight_pushes(paths: Sequence[Path], skipped: list[str]) -> list[MitPush]:
     """The straight pushes at constant speed in files and zip archives, each once.
 
-    left_out receives archives that cannot be read and shapes whose outline is not known. Other files are passed over.
+    skipped receives the archives that cannot be read and the shapes of unknown outline. Other files are ignored.
     """
     found: dict[tuple[str, int], MitPush] = {}
     for path in paths:
         try:
             places = mit_places(path)
         except (ImportSourceError, OSError) as error:
-            left_out.append(str(error))
+            skipped.append(str(error))
             continue
         for place in places:
-            if push := _push_at(place):  # a file unpacked beside its archive has the same name and length
+            if push := _push_at(place):  # a file extracted next to its archive has the same name and size
                 found.setdefault((Path(place.name).name, place.size), push)
     unknown = sorted({push.pair[0] for push in found.values()} - set(SHAPES))
-    left_out += [f"{shape} (its outline is not known)" for shape in unknown]
+    skipped += [f"{shape} (its outline is not known)" for shape in unknown]
     return [push for push in found.values() if push.pair[0] in SHAPES]
 
 
 def _push_at(place: MitPlace) -> MitPush | None:
-    """None for what is no file of the set, or no straight push at constant speed."""
+    """The push of a file, None for other files and other pushes."""
     try:
         metadata = file_metadata(place.name)
         acceleration, speed = float(metadata["a"]), float(metadata["v"])

@@ -1,7 +1,7 @@
-"""Import of the MIT push data set (Yu, Bauza, Fazeli, Rodriguez, IROS 2016): a recording for each file.
+"""Import of the MIT push data set (Yu, Bauza, Fazeli, Rodriguez, IROS 2016), one recording per file.
 
 Poses are x, y (m) and yaw (rad) in the robot's base frame, Unix seconds; the wrench is fx, fy (N), tz (N m) along the
-same axes, what the slider exerts on the pusher.
+same axes, of the slider on the pusher.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ FRAME = (
     "the tracker's body frame is the outline's: origin at its centroid, the first vertex at heading 0 for hex and the "
     "ellipses, sides along the axes for rect1"
 )
-FORCE = "the wrench is what the slider exerts on the pusher, along the axes of the robot's base, and is not tared"
-CLOCK = "tip, object and wrench are on one clock, no offset was applied"
-HEIGHT = "tip and slider are at height 0: the set holds planar poses, the tip is never lifted within a file"
+FORCE = "the wrench is that of the slider on the pusher, along the axes of the robot's base; it is not tared"
+CLOCK = "tip, object and wrench share a clock; no offset was applied"
+HEIGHT = "tip and slider are at height 0: the set has planar poses, and the tip is never lifted within a file"
 
 
 def import_mit(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
     """One recording for each file in files, folders and zip archives.
 
-    A file in a folder or an archive that cannot be read is reported as dropped; one that was named itself, or the
-    last hope, raises ImportSourceError. rig: for a shape that is not in the set.
+    An unreadable file in a folder or archive is reported as dropped. Raises ImportSourceError for an unreadable file
+    that was named itself, and if no file can be read. rig: for a shape that is not in the set.
     """
     notes = Notes()
     with staged(out) as staging:
@@ -47,7 +47,7 @@ def import_mit(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> Im
             except ImportSourceError as error:
                 if file.alone:
                     raise
-                notes.dropped.append(f"{error}: file refused")
+                notes.dropped.append(f"{error}; file skipped")
                 continue
             staging.recording(recording, pushes=1)
         if not staging.recordings:
@@ -61,14 +61,14 @@ def read_mit(file: MitFile, rig: Rig | None, notes: Notes) -> Recording:
     own = Notes()
     arrays = file_arrays(file)
     if missing := [key for key in ("tip_pose", "object_pose") if not len(arrays.get(key, ()))]:
-        raise ImportSourceError(f"{file.name}: {' and '.join(missing)} missing, a recording needs both poses")
+        raise ImportSourceError(f"{file.name}: {' and '.join(missing)} missing; a recording needs both poses")
     tip = _samples(arrays["tip_pose"], f"{file.name}: tip_pose", own)
     body = _steady(_samples(arrays["object_pose"], f"{file.name}: object_pose", own), rig, file.name, own)
     wrench = None
     if len(arrays.get("ft_wrench", ())):
         wrench = _samples(arrays["ft_wrench"], f"{file.name}: ft_wrench", own)
     else:
-        own.dropped.append(f"{file.name}: ft_wrench missing, imported without forces")
+        own.dropped.append(f"{file.name}: ft_wrench missing; imported without forces")
     streams = {"tip_pose": tip, "object_pose": body, **({"ft_wrench": wrench} if wrench else {})}
     require_overlap({name: stream.stamp for name, stream in streams.items()}, file.name)
     for sentence in (FRAME, FORCE, CLOCK, HEIGHT):
@@ -85,12 +85,12 @@ def read_mit(file: MitFile, rig: Rig | None, notes: Notes) -> Recording:
 
 
 def shape_rig(file: MitFile) -> Rig:
-    """The rig that the file name tells. Raises ImportSourceError for a shape that is not in SHAPES."""
+    """The rig from the file name. Raises ImportSourceError for a shape that is not in SHAPES."""
     metadata = file_metadata(file.name)
     shape = metadata["shape"]
     if shape not in SHAPES:
         raise ImportSourceError(
-            f"{file.name}: shape {shape!r} is not known, accepted are {', '.join(SHAPES)}; "
+            f"{file.name}: shape {shape!r} is unknown, accepted are {', '.join(SHAPES)}; "
             "give another one's outline with --rig FILE.yaml"
         )
     return Rig(shape, shape_outline(shape), PUSHER_RADIUS, metadata["surface"], MASSES[shape])

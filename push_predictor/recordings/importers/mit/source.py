@@ -26,7 +26,7 @@ METADATA = re.compile(r"(?:^|_)(surface|shape|a|v|i|s|t)=([^_=]+)")
 
 @dataclass(frozen=True)
 class MitFile:
-    """A file's name, with its archive's, and its content. alone: the caller named this very file."""
+    """A file: name (with its archive's) and content. alone: the caller named this file itself."""
 
     name: str
     data: bytes
@@ -41,7 +41,10 @@ class MitFile:
 
 @dataclass(frozen=True)
 class MitPlace:
-    """Where a file lies, unread: path, and member if path is a zip archive. size in bytes, changed in ns since 1970."""
+    """The location of an unread file: path, and member if path is a zip archive.
+
+    size in bytes, changed in ns since 1970.
+    """
 
     path: Path
     member: str | None
@@ -50,12 +53,15 @@ class MitPlace:
 
     @property
     def name(self) -> str:
-        """As MitFile.name."""
+        """The name as in MitFile."""
         return str(self.path) if self.member is None else f"{self.path}/{self.member}"
 
 
 def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
-    """All files of the set in files, folders (recursive) and zip archives. Raises ImportSourceError for none."""
+    """All files of the set in files, folders (recursive) and zip archives.
+
+    Raises ImportSourceError if a source contains none.
+    """
     for source in sources:
         if not source.exists():
             raise ImportSourceError(f"{source}: does not exist, give a file, a folder or a zip archive")
@@ -63,13 +69,13 @@ def mit_files(sources: Sequence[Path]) -> Iterator[MitFile]:
         if source.is_dir():
             paths = paths_in(source)
         if not paths:
-            raise ImportSourceError(f"{source}: holds no {', '.join(SUFFIXES)} or .zip file")
+            raise ImportSourceError(f"{source}: contains no {', '.join(SUFFIXES)} or .zip file")
         for path in paths:
             yield from _files_of(path, alone=path == source)
 
 
 def mit_places(path: Path) -> list[MitPlace]:
-    """The files in a zip archive, or the file itself. Raises ImportSourceError for an archive that cannot be read."""
+    """The files in a zip archive, or the file itself. Raises ImportSourceError for an unreadable archive."""
     status = path.stat()
     if path.suffix.lower() != ".zip":
         return [MitPlace(path, None, status.st_size, status.st_mtime_ns)]
@@ -79,7 +85,7 @@ def mit_places(path: Path) -> list[MitPlace]:
 
 
 def read_places(places: Sequence[MitPlace]) -> Iterator[MitFile]:
-    """Their files; those of one archive are best given in a row. Raises ImportSourceError, OSError."""
+    """The files at some places; group those of one archive. Raises ImportSourceError, OSError."""
     for path, inside in groupby(places, lambda place: place.path):
         members = [place.member for place in inside if place.member is not None]
         if members:
@@ -89,12 +95,12 @@ def read_places(places: Sequence[MitPlace]) -> Iterator[MitFile]:
 
 
 def paths_in(folder: Path) -> list[Path]:
-    """Paths in a folder (recursive) that may be files of the set or archives of them."""
+    """Paths in a folder (recursive) with the suffix of a file of the set or of an archive."""
     return sorted(path for path in folder.rglob("*") if path.suffix.lower() in (*SUFFIXES, ".zip"))
 
 
 def file_metadata(name: str) -> dict[str, str]:
-    """What the file name says: surface, shape, a, v (mm/s), i, s, t (rad). Raises ImportSourceError."""
+    """The fields of a file name: surface, shape, a, v (mm/s), i, s, t (rad). Raises ImportSourceError."""
     found: dict[str, str] = dict(METADATA.findall(name.rsplit("/", 1)[-1]))
     if missing := [key for key in ("surface", "shape") if key not in found]:
         raise ImportSourceError(
@@ -105,7 +111,7 @@ def file_metadata(name: str) -> dict[str, str]:
 
 
 def file_arrays(file: MitFile) -> dict[str, Array]:
-    """The arrays (n, 4) that the file holds, by name. Raises ImportSourceError with line, byte or row."""
+    """The arrays (n, 4) of a file, by name. Raises ImportSourceError with line, byte or row."""
     raw = _json_lists(file) if file.name.lower().endswith(JSON_SUFFIXES) else _hdf5_arrays(file)
     return {key: _rows(raw[key], f"{file.name}: {key}") for key in STREAMS if key in raw}
 
@@ -122,7 +128,7 @@ def _files_of(path: Path, alone: bool) -> Iterator[MitFile]:
 def _zipped(path: Path) -> Iterator[MitFile]:
     names = sorted(place.member for place in mit_places(path) if place.member is not None)
     if not names:
-        raise ImportSourceError(f"{path}: the archive holds no {', '.join(SUFFIXES)} file")
+        raise ImportSourceError(f"{path}: the archive contains no {', '.join(SUFFIXES)} file")
     yield from _members(path, names)
 
 
@@ -140,8 +146,8 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
     except (
         zipfile.BadZipFile,
         EOFError,
-        NotImplementedError,  # zipfile's word for a compression that it does not know
-        RuntimeError,  # and for a member that is encrypted
+        NotImplementedError,  # raised by zipfile for an unknown compression
+        RuntimeError,  # raised for an encrypted member
     ) as error:
         raise ImportSourceError(f"{path}: the archive cannot be read ({error})") from None
 
@@ -171,7 +177,7 @@ def _hdf5_arrays(file: MitFile) -> dict[str, object]:
 
 
 def _rows(raw: object, where: str) -> Array:
-    """Rows of four numbers; null stands for a missing one. Raises ImportSourceError with the row."""
+    """Rows of four numbers; null is a missing number. Raises ImportSourceError with the row."""
     if not isinstance(raw, (list, np.ndarray)):
         raise ImportSourceError(f"{where}: a {type(raw).__name__}, give a list of rows")
     if len(raw) == 0:

@@ -31,7 +31,7 @@ EDGE = 0
 COLUMNS = ("c", "beta", "dx", "dy", "dtheta", "push_group_est", "row_id")
 CSV_NAMES = {"beta": "beta_rad", "dx": "dx_m", "dy": "dy_m", "dtheta": "dtheta_rad"}
 ASSUMED = (
-    f"every window: pusher {VELOCITY} m/s, duration {DURATION} s, edge {EDGE} of rect1 (the source holds neither)",
+    f"every window: pusher {VELOCITY} m/s, duration {DURATION} s, edge {EDGE} of rect1 (the source contains neither)",
     "dy turned: the source counts it positive to the right of the push",
     "push_id is the source's estimate push_group_est",
     f"pusher radius {PUSHER_RADIUS} m, mass {MASSES['rect1']} kg, surface unknown",
@@ -39,7 +39,10 @@ ASSUMED = (
 
 
 def import_mit_square(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
-    """NAME.csv and NAME.rig.yaml for each .npz or .csv[.gz]. Raises ImportSourceError with line or array index."""
+    """NAME.csv and NAME.rig.yaml for each .npz or .csv[.gz].
+
+    Raises ImportSourceError with line or array index.
+    """
     notes = Notes(assumed=list(ASSUMED))
     with staged(out) as staging:
         for source in sources:
@@ -50,7 +53,7 @@ def import_mit_square(sources: Sequence[Path], out: Path, rig: Rig | None = None
 
 
 def square_rig() -> Rig:
-    """The square of the MIT set; its surface is not told by the source."""
+    """The square of the MIT set; the source does not state its surface."""
     return Rig("rect1", shape_outline("rect1"), PUSHER_RADIUS, "unknown", MASSES["rect1"])
 
 
@@ -124,7 +127,9 @@ def _numbers(row: dict[str, str], names: list[str], where: str) -> list[float]:
 
 def _require(wanted: Sequence[str], found: Sequence[str], source: Path) -> None:
     if missing := [name for name in wanted if name not in found]:
-        raise ImportSourceError(f"{source}: lacks {', '.join(missing)}; it holds {', '.join(found)[:200] or 'nothing'}")
+        raise ImportSourceError(
+            f"{source}: lacks {', '.join(missing)}; it contains {', '.join(found)[:200] or 'nothing'}"
+        )
 
 
 def _check_finite(column: Array, name: str, source: Path) -> None:

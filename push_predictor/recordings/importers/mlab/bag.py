@@ -1,7 +1,7 @@
-"""ROS 1 bags of the MLab rig of June 2015: several pushes in a row, all streams on the bag's clock, lengths in mm.
+"""ROS 1 bags of the MLab rig of June 2015: several consecutive pushes, bag time, lengths in mm.
 
-The tracked body's axes are not the object's, and no calibration of that session exists: only the body's own motion
-is certain. So a recording gets a rig only if the caller gives one, in the tracked body's frame.
+The tracked body's axes are not the object's, and no calibration of that session exists: only the motion of the tracked
+body is certain. So a recording gets a rig only if the caller gives one, in the tracked body's frame.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, yaw_of_quaternion
-from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_held
+from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_repeats
 from push_predictor.recordings.importers.report import Notes
 from push_predictor.recordings.importers.rosbag1_file import Stamped, bag_time, header_lead, samples_of
 from push_predictor.recordings.importers.staging import safe_name
@@ -23,17 +23,17 @@ from push_predictor.types import IntArray
 
 TOPICS = ("/Mocap", "/netft_data", "/robot_CartesianLog")
 MILLIMETRE = 1e-3
-UNIT = 0.02  # a quaternion whose length is off by more belongs to an untracked frame
+UNIT = 0.02  # largest error of a quaternion's norm; a larger one marks an untracked frame
 PAUSE = 0.3  # s
 MOVING = 0.001  # m/s
 BODY = (
-    "mlab bags: slider pose is the tracked body's own (origin at its markers, heading of its x axis); where the "
-    "object's outline lies in it is not recorded, only displacement and change of heading are certain"
+    "mlab bags: slider pose is that of the tracked body (origin at its markers, heading of its x axis); where the "
+    "object's outline lies in it is not recorded, so only displacement and change of heading are certain"
 )
 FORCE = (
     "mlab bags: force in the world on the pusher = R(tool yaw) diag(-1, 1) (F - zero); the axes were found from the "
     "pushes (force against the direction of motion, 8 degrees or less on the mean in four bags, 22 in one), the "
-    "zero is the pause with the least pressure"
+    "zero is the mean of the pause with the smallest force"
 )
 
 
@@ -44,9 +44,9 @@ def read_mlab_bag(path: Path, messages: Mapping[str, Sequence[Stamped]], rig: Ri
     force = in_order(samples_of(netft, _force, bag_time), f"{path}: /netft_data", notes)
     tool = in_order(samples_of(robot, _tool, bag_time), f"{path}: /robot_CartesianLog", notes)
     require_overlap({"slider": body.stamp, "pusher": tool.stamp, "force": force.stamp}, str(path))
-    _tell(path, netft, rig, notes)
+    _report(path, netft, rig, notes)
     wrench = _on_pusher(force, tool, path, notes)
-    tool = without_held(tool, f"{path}: /robot_CartesianLog", notes)
+    tool = without_repeats(tool, f"{path}: /robot_CartesianLog", notes)
     x, y, z, yaw = tool.values.T
     bx, by, heading = body.values.T
     return Recording(
@@ -58,16 +58,16 @@ def read_mlab_bag(path: Path, messages: Mapping[str, Sequence[Stamped]], rig: Ri
     )
 
 
-def _tell(path: Path, netft: Sequence[Stamped], rig: Rig | None, notes: Notes) -> None:
+def _report(path: Path, netft: Sequence[Stamped], rig: Rig | None, notes: Notes) -> None:
     least, median, most = header_lead(netft)
     notes.repaired.append(
         f"{path}: /netft_data header stamps lead the bag's clock by {median:.3f} s ({least:.3f} to {most:.3f}); "
-        "bag time used for all streams, the robot's log has no other"
+        "bag time is used for all streams, because the robot's log has no other"
     )
     notes.assume(BODY)
     notes.assume(FORCE)
     if rig is None:
-        notes.assume(f"{path}: written without a push_rig record, contact cannot be computed; {HOW_TO_GIVE}")
+        notes.assume(f"{path}: written without a push_rig record, so contact cannot be computed; {HOW_TO_GIVE}")
 
 
 def _tracked(path: Path, mocap: Sequence[Stamped], notes: Notes) -> list[Stamped]:
@@ -83,7 +83,7 @@ def _is_unit(pose: Any) -> bool:
 
 
 def _on_pusher(force: Samples, tool: Samples, path: Path, notes: Notes) -> WrenchStream:
-    zero = force.values[_least_pressed(force, tool)].mean(axis=0)
+    zero = force.values[_unloaded_rows(force, tool)].mean(axis=0)
     notes.repaired.append(f"{path}: force tared by {zero[0]:.3f}, {zero[1]:.3f} N (mean of a pause of {PAUSE} s)")
     fx, fy, tz = (force.values - zero).T
     yaw = np.interp(force.stamp, tool.stamp, np.unwrap(tool.values[:, 3]))
@@ -91,8 +91,8 @@ def _on_pusher(force: Samples, tool: Samples, path: Path, notes: Notes) -> Wrenc
     return WrenchStream(force.stamp, world[:, 0], world[:, 1], -tz)
 
 
-def _least_pressed(force: Samples, tool: Samples) -> IntArray:
-    """Rows of the force in the pause of the tip in which it is smallest along the mean force of the moving tip."""
+def _unloaded_rows(force: Samples, tool: Samples) -> IntArray:
+    """Rows of the force in the pause with the smallest component along the mean force of the moving tip."""
     time = (force.stamp - force.stamp[0]) * 1e-9
     when = (tool.stamp - force.stamp[0]) * 1e-9
     edges = np.arange(0.0, time[-1], PAUSE)

@@ -1,4 +1,4 @@
-"""Forces of the MLab rig: from the axes of the sensor to the world's (MLab_EXP, ExtractFromLog.m)."""
+"""Forces of the MLab rig, transformed from sensor axes to the world (MLab_EXP, ExtractFromLog.m)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ TARE_SAMPLES = 10
 
 
 def contact_force(force: Array, robot: Array) -> Array:
-    """Mean force (2,) N of the finger on the object in the world over the second half of a push; NaN if unknown.
+    """Mean force (2,) N of the finger on the object in the world in the second half of a push.
 
-    force: (n, 3) of t, fx, fy as logged. robot: (m, 8) of t, x, y, z, qw, qx, qy, qz.
+    NaN if unknown.     force: (n, 3) of t, fx, fy as logged. robot: (m, 8) of t, x, y, z, qw, qx, qy, qz.
     """
     if len(force) <= 2 * TARE_SAMPLES:
         return np.full(2, np.nan)

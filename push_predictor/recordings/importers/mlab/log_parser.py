@@ -24,7 +24,7 @@ POSE_WIDTH, FORCE_WIDTH, ROBOT_WIDTH = 7, 3, 8
 
 @dataclass(frozen=True, eq=False)
 class LogPush:
-    """One push: number in the log from 0 and line; before, after (7,); force (n, 3); robot (m, 8)."""
+    """One push: number in the log, from 0; line; before, after (7,); force (n, 3); robot (m, 8)."""
 
     number: int
     line: int
@@ -35,7 +35,7 @@ class LogPush:
 
     @property
     def time(self) -> float:
-        """When it began: Unix seconds of the first force, else of the first robot pose."""
+        """Start of the push: Unix seconds of the first force, else of the first robot pose."""
         return float((self.force if len(self.force) else self.robot)[0, 0])
 
 
@@ -44,7 +44,7 @@ class _EndedError(Exception):
 
 
 class _Lines:
-    """The log's lines as numbers, with their place."""
+    """The lines of a log as numbers, with their line numbers."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -90,34 +90,34 @@ class _Lines:
 
 
 def read_log(path: Path, notes: Notes) -> list[LogPush]:
-    """All pushes that the log holds in full. Raises ImportSourceError with file and line."""
+    """The complete pushes of a log. Raises ImportSourceError with file and line."""
     lines = _Lines(path)
     if not lines:
         raise ImportSourceError(f"{path}: is empty, expected a push log")
     stated = None
     if lines.width() == POSE_WIDTH:
-        notes.repaired.append(f"{path}:{lines.line()}: the number of pushes is missing, read on to the end of the file")
+        notes.repaired.append(f"{path}:{lines.line()}: the number of pushes is missing; read to the end of the file")
     else:
         stated = lines.count("the number of pushes")
     pushes = _pushes(lines, notes)
     if stated is not None and stated != len(pushes):
-        notes.repaired.append(f"{path}:1: says {stated} pushes, holds {len(pushes)}")
+        notes.repaired.append(f"{path}:1: states {stated} pushes, contains {len(pushes)}")
     return pushes
 
 
-def report_oddities(path: Path, pushes: list[LogPush], notes: Notes) -> None:
-    """Tell what is odd about a log's pushes taken together: no forces, held poses, clock set back, moved by hand."""
+def report_irregularities(path: Path, pushes: list[LogPush], notes: Notes) -> None:
+    """Note missing forces, repeated poses, a clock set back and objects moved by hand in a log."""
     if bare := [push.number for push in pushes if not len(push.force)]:
-        notes.dropped.append(f"{path}: {len(bare)} pushes without forces, normal_force and tangential_force are empty")
+        notes.dropped.append(f"{path}: {len(bare)} pushes without forces; normal_force and tangential_force are empty")
     repeats = sum(int(np.sum(np.all(np.diff(push.robot[:, 1:], axis=0) == 0.0, axis=1))) for push in pushes)
     if repeats:
-        notes.repaired.append(f"{path}: {repeats} robot poses repeat the one before, not used for the contact time")
+        notes.repaired.append(f"{path}: {repeats} robot poses repeat the previous one, ignored in the contact time")
     timed = [push for push in pushes if len(push.force) or len(push.robot)]
     for one, two in pairwise(timed):
         if (back := one.time - two.time) > 0.0:
             notes.repaired.append(
                 f"{path}:{two.line}: after push {one.number} the clock goes back by {back:.0f} s: sessions were "
-                "joined, elapsed_time counts from the earliest"
+                "joined; elapsed_time counts from the earliest"
             )
             continue
         moved = float(np.hypot(*(two.before - one.after)[:2]))

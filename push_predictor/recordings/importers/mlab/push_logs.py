@@ -1,7 +1,7 @@
-"""Import of the MLab push logs (Zhou, Paolini, Bagnell, Mason, ICRA 2016): a table, one row a whole push.
+"""Import of the MLab push logs (Zhou, Paolini, Bagnell, Mason, ICRA 2016): a table, one row per push.
 
-A log has the object's pose before and after a push only, so a push is one row: contact where the path of the finger
-meets the outline, duration and velocity those of the part of the path behind it.
+A log has the object's pose only before and after a push, so a push is one row. The contact is where the path of the
+finger meets the outline; duration and velocity are those of the path from there on.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from push_predictor.geometry.frames import rotate, to_body, to_world, wrap_angle
 from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.importers.cleaning import twist
 from push_predictor.recordings.importers.mlab.force import contact_force
-from push_predictor.recordings.importers.mlab.log_parser import LogPush, read_log, report_oddities
+from push_predictor.recordings.importers.mlab.log_parser import LogPush, read_log, report_irregularities
 from push_predictor.recordings.importers.mlab.rig import CENTROID, folder_rig
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.importers.staging import safe_name, staged
@@ -37,7 +37,7 @@ ASSUMED = (
 
 @dataclass(frozen=True, eq=False)
 class PushRow:
-    """One push in the table's terms (contract, section 1); slider (3,) is the pose of the centroid before it."""
+    """One push as a row of a table; slider (3,) is the pose of the centroid before the push."""
 
     velocity: float
     edge: int
@@ -52,11 +52,14 @@ class PushRow:
 
 
 class NotAPushError(Exception):
-    """Why a logged push cannot become a row."""
+    """A logged push that cannot become a row; the text states why."""
 
 
 def import_mlab(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
-    """NAME.csv and NAME.rig.yaml for each log, NAME = FOLDER_LOG. Raises ImportSourceError with file and line."""
+    """NAME.csv and NAME.rig.yaml for each log, NAME = FOLDER_LOG.
+
+    Raises ImportSourceError with file and line.
+    """
     notes = Notes(assumed=list(ASSUMED))
     with staged(out) as staging:
         for path in _logs(sources):
@@ -66,12 +69,14 @@ def import_mlab(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> I
             if len(table):
                 staging.table(name, table, used)
         if not staging.written:
-            raise ImportSourceError(f"{', '.join(map(str, sources))}: no push in it; {'; '.join(notes.dropped)[:300]}")
+            raise ImportSourceError(
+                f"{', '.join(map(str, sources))}: contains no usable push; {'; '.join(notes.dropped)[:300]}"
+            )
     return staging.report("mlab", notes)
 
 
 def read_mlab(path: Path, name: str, rig: Rig, notes: Notes) -> PushTable:
-    """The pushes of one log; what cannot become a row is reported in notes."""
+    """The pushes of one log; pushes that cannot become rows are reported in notes."""
     rows: list[tuple[LogPush, PushRow]] = []
     pushes = read_log(path, notes)
     for push in pushes:
@@ -79,7 +84,7 @@ def read_mlab(path: Path, name: str, rig: Rig, notes: Notes) -> PushTable:
             rows.append((push, push_row(push, rig.outline)))
         except NotAPushError as reason:
             notes.dropped.append(f"{path}:{push.line}: push {push.number}: {reason}")
-    report_oddities(path, pushes, notes)
+    report_irregularities(path, pushes, notes)
     found = [row for _, row in rows]
     return PushTable(
         np.array([[row.velocity, row.contact, row.angle] for row in found]).reshape(-1, 3),
@@ -145,14 +150,14 @@ def centroid_pose(logged: Array) -> Array:
 
 
 def first_touch(outline: Outline, tip: Array, direction: Array) -> tuple[int, float, float]:
-    """Where a tip (2,) that moves along a unit vector (2,) enters the polygon: edge, fraction of it, distance m.
+    """Where a tip (2,) that moves along a unit vector (2,) enters the polygon.
 
-    Raises NotAPushError if it never does.
+    Returns the edge, the fraction along it and the distance in m. Raises NotAPushError if the tip never enters.
     """
     starts = outline.vertices
     along = np.roll(starts, -1, axis=0) - starts
     offset = starts - tip
-    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]  # below 0 where the path enters
+    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]  # negative where the path enters
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         reach = (offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]) / cross
         fraction = (offset[:, 0] * direction[1] - offset[:, 1] * direction[0]) / cross
@@ -164,7 +169,7 @@ def first_touch(outline: Outline, tip: Array, direction: Array) -> tuple[int, fl
 
 
 def _contact_time(time: Array, travelled: Array, reach: float) -> float:
-    """Seconds from the first touch to the tip's last logged move; repeated robot poses are left out."""
+    """Seconds from the first touch to the last logged motion of the tip; repeated poses are removed."""
     fresh = np.concatenate([[True], np.diff(travelled) != 0.0])
     time, travelled = time[fresh], travelled[fresh]
     last = int(np.flatnonzero(travelled < reach)[-1])
@@ -182,6 +187,6 @@ def _logs(sources: Sequence[Path]) -> list[Path]:
             raise ImportSourceError(f"{source}: does not exist, give a log or a folder of exp*.txt[.gz]")
         inside = sorted({*source.rglob("exp*.txt"), *source.rglob("exp*.txt.gz")}) if source.is_dir() else [source]
         if not inside:
-            raise ImportSourceError(f"{source}: holds no exp*.txt or exp*.txt.gz")
+            raise ImportSourceError(f"{source}: contains no exp*.txt or exp*.txt.gz")
         found += inside
     return found

@@ -1,4 +1,4 @@
-"""The rig of the MLab point pushes: a right-angled triangle on three support points, or flat on its face."""
+"""The rig of the MLab point pushes: a right triangle on three support points, or flat on its face."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor.types import Array
 LEG = 0.150  # m
 CENTROID = np.array([0.050, 0.050])  # m from the right angle
 MASS = 1.518  # kg
-FINGER_RADIUS = 1e-4  # m; a pointed finger: the logged tip itself lies on the edge at the end of a push
+FINGER_RADIUS = 1e-4  # m; a pointed finger: at the end of a push the logged tip lies on the edge
 SURFACES = {"": "hardboard", "wood_": "plywood"}
 THREE_POINTS = re.compile(r"(wood_)?((?:\d+(?:\.\d+)?_){5}\d+(?:\.\d+)?)")
 PATCH = re.compile(r"(wood_)?patch")
@@ -23,12 +23,12 @@ ROUND_TRIP = "the object is the aluminium triangle of 150 mm legs and 1.518 kg, 
 
 
 def triangle() -> Outline:
-    """The triangle about its centroid; edge 0 runs from the right angle along +x, edge 1 is the hypotenuse."""
+    """The triangle about its centroid; edge 0 goes from the right angle along +x, edge 1 is the hypotenuse."""
     return Outline(np.array([[0.0, 0.0], [LEG, 0.0], [0.0, LEG]]) - CENTROID)
 
 
 def folder_rig(folder: str, notes: Notes) -> Rig:
-    """The rig that a log's folder name tells: [wood_]x1_x2_x3_y1_y2_y3 (mm) or [wood_]patch."""
+    """The rig from a log's folder name: [wood_]x1_x2_x3_y1_y2_y3 (mm) or [wood_]patch."""
     notes.assume(ROUND_TRIP)
     notes.assume(FINGER)
     if match := THREE_POINTS.fullmatch(folder):
@@ -37,12 +37,14 @@ def folder_rig(folder: str, notes: Notes) -> Rig:
         return _rig(SURFACES[match[1] or ""], np.column_stack([points, load_shares(points)]))
     if match := PATCH.fullmatch(folder):
         return _rig(SURFACES[match[1] or ""], None)
-    notes.assume(f"{folder or 'log'}: the folder's name tells no configuration, surface and support points unknown")
+    notes.assume(
+        f"{folder or 'log'}: the folder's name contains no configuration; surface and support points are unknown"
+    )
     return _rig("unknown", None)
 
 
 def load_shares(points: Array) -> Array:
-    """Shares (3,) of the weight that three points (3, 2) about the centre of mass carry."""
+    """Load shares (3,) of three points (3, 2) about the centre of mass."""
     return np.asarray(np.linalg.solve(np.vstack([points.T, np.ones(3)]), [0.0, 0.0, 1.0]))
 
 
