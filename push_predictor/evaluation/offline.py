@@ -110,7 +110,5 @@ def report_windows(
     )
 
     table = windows_to_table(windows)
-    seen = trained_on(models[0], table)
-    split = f"{len(seen)} of the pushes were trained on" if seen else "pushes that were not trained on, kept whole"
-    facts = {"recording": name, "split": split, **(more or {})}
+    facts = {"recording": name, **(more or {})}
     return write_validation_report(out, f"Validation on {name}", table, windows, models, comparisons, facts, ())

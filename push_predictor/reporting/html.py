@@ -74,9 +74,12 @@ def details(summary: str, content: str) -> str:
     return _part("details", summary, content)
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """A number with that many significant digits and a minus sign; a dash for None."""
-    return NOTHING if value is None else f"{value:.{digits}g}".replace("-", "−")
+def number(value: float | None, digits: int = 4, zeros: bool = False) -> str:
+    """A number with that many significant digits and a minus sign, a dash for None; zeros keeps trailing zeros."""
+    if value is None:
+        return NOTHING
+    text = f"{value:#.{digits}g}".removesuffix(".") if zeros else f"{value:.{digits}g}"
+    return text.replace("-", "−")
 
 
 @cache

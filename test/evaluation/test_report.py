@@ -1,10 +1,11 @@
-"""The report of a validation: maps show what was predicted and recorded, the page holds every number of the metrics."""
+"""The validation report: maps of predictions and recordings, answers first, and every number of the metrics."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from push_predictor.evaluation.report.maps import (
     sector_length,
 )
 from push_predictor.evaluation.report.page import write_validation_report
+from push_predictor.evaluation.report.summary import calibration_sentence, comparison_sentence
 from push_predictor.evaluation.report.tables import paired_difference
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json, pit
 from push_predictor.geometry.frames import rotate
@@ -168,7 +170,7 @@ class Shown(HTMLParser):
 
 
 @given(contact=st.floats(0.0, 0.2499), quarter=st.integers(0, 3))
-def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, quarter: int) -> None:
+def test_arc_length_is_equal_on_all_sides_of_a_square(contact: float, quarter: int) -> None:
     outline = shape_outline("rect1")
     along = arc_length(outline, np.array([contact, contact + 0.25 * quarter]))
     assert along[0] == pytest.approx(contact * 0.36, abs=1e-12)
@@ -176,7 +178,7 @@ def test_the_four_sides_of_a_square_lie_on_top_of_each_other(contact: float, qua
 
 
 @pytest.mark.parametrize(("shape", "edges", "length"), [("rect1", 4, 0.09), ("hex", 6, 0.0605)])
-def test_the_end_of_an_edge_stays_its_end(shape: str, edges: int, length: float) -> None:
+def test_end_of_an_edge_has_the_arc_length_of_the_edge(shape: str, edges: int, length: float) -> None:
     outline = shape_outline(shape)
     ends = outline.contact_on_edge(np.arange(edges), np.ones(edges))
     assert arc_length(outline, ends) == pytest.approx(np.full(edges, length))
@@ -184,7 +186,7 @@ def test_the_end_of_an_edge_stays_its_end(shape: str, edges: int, length: float)
     assert arc_length(outline, starts) == pytest.approx(np.zeros(edges), abs=1e-12)
 
 
-def test_an_ellipse_folds_in_two_and_a_circle_not_at_all() -> None:
+def test_ellipse_has_two_equal_parts_and_circle_is_not_folded() -> None:
     ellipse_outline, circle = shape_outline("ellip2"), shape_outline("ellip1")
     contact = np.array([0.1, 0.6])
     assert np.ptp(arc_length(ellipse_outline, contact)) == pytest.approx(0.0, abs=1e-12)
@@ -195,7 +197,7 @@ def test_an_ellipse_folds_in_two_and_a_circle_not_at_all() -> None:
 # --- maps -----------------------------------------------------------------------------------------------------------
 
 
-def test_the_commonest_speed_is_the_one_of_most_windows(table: PushTable) -> None:
+def test_most_common_speed_is_that_of_most_windows(table: PushTable) -> None:
     condition = commonest_condition(table)
     assert condition.velocity == pytest.approx(0.02, rel=0.01)
     assert condition.duration == 0.2
@@ -203,12 +205,12 @@ def test_the_commonest_speed_is_the_one_of_most_windows(table: PushTable) -> Non
     np.testing.assert_array_equal(condition.rows, table.inputs[:, 0] < 0.03)
 
 
-def test_no_windows_have_no_commonest_speed(table: PushTable) -> None:
+def test_table_without_windows_is_rejected(table: PushTable) -> None:
     with pytest.raises(TableError, match="0 windows"):
         commonest_condition(table.take(np.zeros(len(table), bool)))
 
 
-def test_a_predicted_map_is_what_the_model_predicts_at_the_centres_of_its_cells(
+def test_predicted_map_equals_the_prediction_at_cell_centres(
     models: list[PushModel], table: PushTable, square: Rig
 ) -> None:
     cells = fine_cells(square.outline, table)
@@ -223,9 +225,7 @@ def test_a_predicted_map_is_what_the_model_predicts_at_the_centres_of_its_cells(
         np.testing.assert_allclose(shown.sd[row, column] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)
 
 
-def test_a_predicted_map_shows_nothing_outside_the_domain(
-    models: list[PushModel], table: PushTable, square: Rig
-) -> None:
+def test_predicted_map_is_empty_outside_the_domain(models: list[PushModel], table: PushTable, square: Rig) -> None:
     far = PushTable(table.inputs * [1.0, 1.0, 1.5], table.duration, table.outcomes, table.push_id)
     cells = fine_cells(square.outline, far)
     shown = push_map(models[0], 0.02, 0.2, cells)
@@ -238,14 +238,14 @@ def test_a_predicted_map_shows_nothing_outside_the_domain(
 @pytest.mark.parametrize("shape", SHAPES)
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000), pushes=st.integers(1, 40))
-def test_every_window_lies_in_one_cell_of_the_recorded_map(shape: str, seed: int, pushes: int) -> None:
+def test_every_window_is_in_one_cell_of_the_recorded_map(shape: str, seed: int, pushes: int) -> None:
     outline, table = shape_outline(shape), made_up_table(pushes, seed)
     shown = recorded_map(outline, table, np.zeros_like(table.outcomes), coarse_cells(outline, table))
     assert shown.windows is not None and shown.windows.sum() == len(table)
     np.testing.assert_array_equal(np.isfinite(shown.mean).all(axis=2), shown.windows >= FEWEST)
 
 
-def test_a_recorded_cell_holds_mean_and_distance_from_the_prediction(square: Rig, table: PushTable) -> None:
+def test_recorded_cell_has_mean_and_rms_deviation_from_the_prediction(square: Rig, table: PushTable) -> None:
     cells = coarse_cells(square.outline, table)
     predicted = table.outcomes + [1e-3, -2e-3, 0.03]
     shown = recorded_map(square.outline, table, predicted, cells)
@@ -258,7 +258,7 @@ def test_a_recorded_cell_holds_mean_and_distance_from_the_prediction(square: Rig
     assert shown.pushes is not None and shown.pushes[row, column] == len(set(table.push_id[inside_cell].tolist()))
 
 
-def test_the_recorded_scatter_agrees_with_a_prediction_that_is_right(square: Rig) -> None:
+def test_recorded_sd_agrees_with_a_correct_prediction(square: Rig) -> None:
     """Whatever the inputs do within a cell: here the mean varies by far more than the noise."""
     table, rng = made_up_table(150, 5), np.random.default_rng(6)
     mean = np.column_stack([table.inputs[:, 2], table.inputs[:, 1], table.inputs[:, 2] * 10.0])
@@ -277,7 +277,7 @@ def test_the_recorded_scatter_agrees_with_a_prediction_that_is_right(square: Rig
     )
 
 
-def test_colours_are_symmetric_about_zero_for_signed_values_and_start_at_zero_for_others() -> None:
+def test_colour_scale_is_symmetric_for_signed_values_and_starts_at_zero_otherwise() -> None:
     signed = colour_scale([np.linspace(-1.0, 3.0, 101)])
     assert signed.name == "PuOr" and signed.low == -signed.high
     positive = colour_scale([np.linspace(1.0, 3.0, 101), np.array([np.nan])])
@@ -289,7 +289,7 @@ def test_colours_are_symmetric_about_zero_for_signed_values_and_start_at_zero_fo
 # --- ellipses and examples ------------------------------------------------------------------------------------------
 
 
-def test_an_ellipse_holds_its_share_of_outcomes() -> None:
+def test_ellipse_contains_its_share_of_outcomes() -> None:
     c = gaussian_comparison(1.0)
     hits = [inside(c.mean[k], c.covariance[k], c.observed[[k]])[0] for k in range(len(c.mean))]
     assert np.mean(hits) == pytest.approx(0.95, abs=0.02)
@@ -308,7 +308,7 @@ def test_examples_come_from_different_pushes(seed: int, count: int) -> None:
     assert len(set(push_id[rows].tolist())) == len(rows)
 
 
-def test_outcomes_of_nearby_windows_are_told_for_the_inputs_of_the_example(
+def test_outcomes_of_similar_windows_are_shifted_to_the_inputs_of_the_example(
     square: Rig, table: PushTable, comparisons: list[Comparison]
 ) -> None:
     c = comparisons[0]
@@ -323,9 +323,7 @@ def test_outcomes_of_nearby_windows_are_told_for_the_inputs_of_the_example(
 @pytest.mark.parametrize("shape", SHAPES)
 @given(contact=st.floats(0.0, 0.999), angle=st.floats(-1.5, 1.5))
 @settings(max_examples=25, deadline=None)
-def test_the_slider_is_drawn_touching_the_origin_and_pushed_to_the_right(
-    shape: str, contact: float, angle: float
-) -> None:
+def test_slider_touches_the_origin_and_is_pushed_to_the_right(shape: str, contact: float, angle: float) -> None:
     outline = shape_outline(shape)
     pose = start_pose(outline, np.array([0.02, contact, angle]))
     touch = rotate(outline.point(np.array([contact]))[0], pose[2]) + pose[:2]
@@ -343,7 +341,7 @@ def test_small_motions_are_enlarged_and_large_ones_are_not() -> None:
 # --- calibration and drift ------------------------------------------------------------------------------------------
 
 
-def test_a_calibrated_prediction_lies_on_the_diagonal_and_an_overconfident_one_below() -> None:
+def test_coverage_of_a_calibrated_prediction_is_on_the_diagonal_of_an_overconfident_one_below() -> None:
     share, low, high = coverage_curve(gaussian_comparison(1.0))
     assert np.abs(share - LEVELS[:, None]).max() < 0.04
     assert np.all(low <= share) and np.all(share <= high)
@@ -354,7 +352,7 @@ def test_a_calibrated_prediction_lies_on_the_diagonal_and_an_overconfident_one_b
     assert kstest(pit(gaussian_comparison(0.5))[:, 0], "uniform").pvalue < 1e-6
 
 
-def test_a_drift_is_seen_and_none_is_not_invented() -> None:
+def test_trend_detects_a_drift_and_none_without_one() -> None:
     rng = np.random.default_rng(8)
     place, push_id = np.repeat(np.arange(60.0), 5), np.repeat(np.arange(60).astype(np.str_), 5)
     still = np.repeat(rng.normal(size=60), 5) + 0.3 * rng.normal(size=300)
@@ -369,7 +367,7 @@ def test_a_drift_is_seen_and_none_is_not_invented() -> None:
 # --- the page -------------------------------------------------------------------------------------------------------
 
 
-def test_the_page_holds_every_number_of_the_metrics(page: Path, comparisons: list[Comparison]) -> None:
+def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list[Comparison]) -> None:
     text = " ".join(Shown(page).text).replace("−", "-")
     shown = {float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text)}
     for comparison in comparisons:
@@ -383,7 +381,7 @@ def test_the_page_holds_every_number_of_the_metrics(page: Path, comparisons: lis
             assert float(f"{value:.3g}") in shown
 
 
-def test_the_page_names_split_pushes_and_units(page: Path) -> None:
+def test_page_states_split_pushes_and_units(page: Path) -> None:
     text = " ".join(Shown(page).text)
     assert "288 windows of 36 pushes" in text
     assert "whole pushes are held out" in text
@@ -392,7 +390,7 @@ def test_the_page_names_split_pushes_and_units(page: Path) -> None:
     assert "20" in text and "240 of 288 windows" in text
 
 
-def test_the_page_stands_alone_and_escapes_what_it_is_given(page: Path) -> None:
+def test_page_is_self_contained_and_escapes_all_text(page: Path) -> None:
     shown = Shown(page)
     assert shown.addresses and all(address.startswith("data:image/png;base64,") for address in shown.addresses)
     assert "script" not in shown.tags and "b" not in shown.tags and "link" not in shown.tags
@@ -401,7 +399,7 @@ def test_the_page_stands_alone_and_escapes_what_it_is_given(page: Path) -> None:
     assert "url(" not in page.read_text() and "@import" not in page.read_text()
 
 
-def test_pictures_and_numbers_lie_beside_the_page(page: Path, comparisons: list[Comparison]) -> None:
+def test_figures_and_numbers_are_written_next_to_the_page(page: Path, comparisons: list[Comparison]) -> None:
     files = {path.name for path in page.parent.iterdir()}
     assert files == PICTURES | {"tracks.png", "report.html", "report.json"}  # and no temporary file
     for name in files & PICTURES:
@@ -411,7 +409,7 @@ def test_pictures_and_numbers_lie_beside_the_page(page: Path, comparisons: list[
 
 
 @pytest.mark.parametrize("shape", ["ellip1", "ellip2", "hex"])
-def test_one_push_and_the_analytical_model_alone_make_a_report(shape: str, tmp_path: Path) -> None:
+def test_report_accepts_one_push_and_one_model(shape: str, tmp_path: Path) -> None:
     rig, training, one = rig_of(shape), made_up_table(4, 1, name="train"), made_up_table(1, 2)
     model = train_model(training, rig, "analytical", name="analytical")
     page = write_validation_report(tmp_path, "one", one, None, [model], [compare(model, one)], {}, [])
@@ -421,24 +419,22 @@ def test_one_push_and_the_analytical_model_alone_make_a_report(shape: str, tmp_p
     assert {path.name for path in tmp_path.iterdir()} == PICTURES | {"report.html", "report.json"}
 
 
-def test_a_recording_without_windows_makes_a_page_that_says_so(
-    models: list[PushModel], table: PushTable, tmp_path: Path
-) -> None:
+def test_report_without_windows_states_so(models: list[PushModel], table: PushTable, tmp_path: Path) -> None:
     none = table.take(np.zeros(len(table), bool))
     page = write_validation_report(tmp_path, "none", none, [], models, [compare(m, none) for m in models], {}, [])
     assert "No window was found" in page.read_text()
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_pushes_that_were_trained_on_are_warned_of(square: Rig, tmp_path: Path) -> None:
+def test_report_warns_about_training_pushes(square: Rig, tmp_path: Path) -> None:
     training = made_up_table(4, 1)
     model = train_model(training, square, "analytical", name="analytical")
     seen = training.take(np.arange(8))
     page = write_validation_report(tmp_path, "seen", seen, None, [model], [compare(model, seen)], {}, [])
-    assert "Not held out" in page.read_text() and "held out, none" not in page.read_text()
+    assert "(1 for analytical)" in page.read_text() and "held out" not in page.read_text()
 
 
-def test_things_that_do_not_belong_together_are_refused(
+def test_rejects_models_comparisons_and_windows_that_do_not_match(
     models: list[PushModel], comparisons: list[Comparison], table: PushTable, square: Rig, tmp_path: Path
 ) -> None:
     few = table.take(np.arange(5))
@@ -450,7 +446,25 @@ def test_things_that_do_not_belong_together_are_refused(
         write_validation_report(tmp_path, "", table, windows_of(few, square), models, comparisons, {}, [])
 
 
-def test_without_matplotlib_the_error_names_the_extra(
+@pytest.mark.parametrize(
+    ("sd_factor", "verdict"),
+    [(1.0, "no miscalibration beyond chance"), (0.5, "too narrow for Δx, Δy, Δθ"), (2.0, "too wide for Δx")],
+)
+def test_calibration_sentence_states_whether_intervals_are_too_narrow_or_too_wide(
+    sd_factor: float, verdict: str
+) -> None:
+    assert verdict in calibration_sentence(gaussian_comparison(sd_factor))
+
+
+def test_comparison_sentence_states_which_model_is_better(comparisons: list[Comparison]) -> None:
+    main = comparisons[0]
+    worse = replace(main, model="worse", mean=main.mean + 0.5 * main.observed.std(axis=0))
+    assert comparison_sentence(main, worse).startswith("worse is worse than my vhgp: its NLPD is ")
+    assert comparison_sentence(worse, main).startswith("my vhgp is better than worse: its NLPD is ")
+    assert "cannot be distinguished" in comparison_sentence(main, replace(main, model="same"))
+
+
+def test_error_names_the_extra_without_matplotlib(
     models: list[PushModel],
     comparisons: list[Comparison],
     table: PushTable,
@@ -482,7 +496,7 @@ def test_page_escapes_text_that_is_not_a_part() -> None:
     assert "<p>safe</p>" in page and "&lt;script&gt;" in page
 
 
-def test_a_model_differs_from_itself_by_nothing_and_from_a_worse_one_by_more(comparisons: list[Comparison]) -> None:
+def test_paired_difference_is_zero_to_itself_and_positive_to_a_worse_model(comparisons: list[Comparison]) -> None:
     main = comparisons[0]
     nmse, nlpd = paired_difference(main, main)
     assert not nmse.any() and not nlpd.any()
@@ -494,7 +508,7 @@ def test_a_model_differs_from_itself_by_nothing_and_from_a_worse_one_by_more(com
     assert paired_difference(main, worse)[0][0] == pytest.approx(totals[1] - totals[0])
 
 
-def test_the_readme_picture_is_wide(models: list[PushModel], table: PushTable, tmp_path: Path) -> None:
+def test_readme_figure_is_wide(models: list[PushModel], table: PushTable, tmp_path: Path) -> None:
     picture = readme_picture(tmp_path / "picture.png", models[0], table)
     width, height = np.frombuffer(picture.read_bytes()[16:24], dtype=">u4")
     assert width > 2.5 * height

@@ -60,49 +60,49 @@ def extended(base: PushModel, *effects: Effect) -> PushModel:
     return replace(base, name="extended", predictor=predictor)
 
 
-def test_a_map_is_drawn_at_the_middle_of_the_covariates(base: PushModel, table: PushTable) -> None:
+def test_map_is_drawn_at_the_median_of_the_covariates(base: PushModel, table: PushTable) -> None:
     model, cells = extended(base, slippery(), grain()), fine_cells(base.rig.outline, table)
-    held = fixed_covariates(model, table)
+    fixed = fixed_covariates(model, table)
     times = table.covariates["elapsed_time"]
-    assert set(held) == {"elapsed_time", "slider_heading"}
-    assert held["elapsed_time"] in times and 0.4 < np.mean(times <= held["elapsed_time"]) < 0.6
-    shown = push_map(model, 0.02, 0.2, cells, held)
+    assert set(fixed) == {"elapsed_time", "slider_heading"}
+    assert fixed["elapsed_time"] in times and 0.4 < np.mean(times <= fixed["elapsed_time"]) < 0.6
+    shown = push_map(model, 0.02, 0.2, cells, fixed)
     contact = cells.contact[7:9].mean() / base.rig.outline.perimeter
     inputs = np.array([[0.02, contact, cells.angle[20:22].mean()]])
-    columns = {name: np.array([value]) for name, value in held.items()}
+    columns = {name: np.array([value]) for name, value in fixed.items()}
     expected = model.predict_rows(inputs, np.array([0.2]), columns)
     assert expected.in_domain[0]
     np.testing.assert_allclose(shown.mean[20, 7], expected.mean[0], rtol=1e-9)
     np.testing.assert_allclose(shown.sd[20, 7] ** 2, np.diag(expected.covariance[0]), rtol=1e-9)
 
 
-def test_beyond_what_was_seen_a_map_is_empty_and_says_so(base: PushModel, table: PushTable) -> None:
+def test_map_outside_the_covariate_range_is_empty_and_its_caption_states_why(base: PushModel, table: PushTable) -> None:
     model, cells = extended(base, slippery()), fine_cells(base.rig.outline, table)
-    held = {"elapsed_time": 1e4}
-    assert np.isnan(push_map(model, 0.02, 0.2, cells, held).mean).all()
-    assert "Nothing is drawn: the model was extended on elapsed_time from " in fixed_covariates_text(model, held)
+    fixed = {"elapsed_time": 1e4}
+    assert np.isnan(push_map(model, 0.02, 0.2, cells, fixed).mean).all()
+    assert "Nothing is drawn: the model was extended on elapsed_time from " in fixed_covariates_text(model, fixed)
 
 
-def test_the_heading_of_a_push_follows_from_that_of_the_slider(base: PushModel, table: PushTable) -> None:
+def test_push_heading_follows_from_the_slider_heading(base: PushModel, table: PushTable) -> None:
     model = extended(base, headed())
     assert model.needs == ("push_heading",)
-    held = fixed_covariates(model, table)
-    assert list(held) == ["slider_heading"]
-    inside = {**held, "slider_heading": table.covariates["slider_heading"]}
+    fixed = fixed_covariates(model, table)
+    assert list(fixed) == ["slider_heading"]
+    inside = {**fixed, "slider_heading": table.covariates["slider_heading"]}
     for row in range(0, len(table), 7):
         one = {name: float(np.atleast_1d(column)[row]) for name, column in inside.items()}
         found = map_covariates(base.rig.outline, one, table.inputs[[row]])["push_heading"][0]
         assert abs(wrap_angle(found - table.covariates["push_heading"][row])) < 1e-9
-    assert "(push_heading follows from it); at another the map differs." in fixed_covariates_text(model, held)
+    assert "(push_heading follows from it). At another heading the map differs." in fixed_covariates_text(model, fixed)
     lacking = replace(table.take(np.arange(4)), covariates={"push_heading": np.array([3.1, -3.1, 3.0, 0.0])})
     assert fixed_covariates(model, lacking) == {"push_heading": 3.1}
 
 
-def test_what_is_not_extended_holds_nothing(base: PushModel, table: PushTable) -> None:
+def test_model_without_extension_fixes_no_covariate(base: PushModel, table: PushTable) -> None:
     assert fixed_covariates(base, table) == {} and fixed_covariates_text(base, {}) == ""
 
 
-def test_the_report_of_an_extended_model_names_where_its_maps_are_drawn(
+def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     base: PushModel, table: PushTable, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = extended(base, slippery(), grain())
@@ -115,9 +115,9 @@ def test_the_report_of_an_extended_model_names_where_its_maps_are_drawn(
     page = html.unescape(Path(found["report"]).read_text())
     time = fixed_covariates(model, table)["elapsed_time"]
     assert page.count(f"The map of extended is drawn at elapsed_time {time:.3g} s and slider_heading ") == 2
-    assert "of the outline's 6 alike parts, the first is drawn." in page
+    assert "the first of the 6 equal sides is drawn." in page
     assert "The map of plain" not in page
 
 
-def test_the_picture_of_the_readme_takes_an_extended_model(base: PushModel, table: PushTable, tmp_path: Path) -> None:
+def test_readme_figure_accepts_an_extended_model(base: PushModel, table: PushTable, tmp_path: Path) -> None:
     assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

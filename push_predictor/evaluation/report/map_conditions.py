@@ -1,4 +1,4 @@
-"""At which covariates the map of an extended model is drawn: a map shows contact and angle, all else is held."""
+"""The covariates at which the map of an extended model is drawn. A map varies contact and angle only."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ OF_SLIDER, OF_PUSH = HEADINGS
 
 
 def fixed_covariates(model: PushModel, table: PushTable) -> dict[str, float]:
-    """For each covariate that the model needs, the middle one of the table's values; empty where it needs none.
+    """The median in the table of each covariate that the model needs; empty if it needs none.
 
-    Of a heading it is the one nearest to their mean direction. Where the slider's heading is known, that one is held
-    and the push's follows from it. Raises KeyError where the table lacks a covariate.
+    For a heading it is the value nearest to the mean direction. If the slider's heading is known, it is fixed and the
+    push's heading follows from it. Raises KeyError if the table lacks a covariate.
     """
     names = [OF_SLIDER if name == OF_PUSH and OF_SLIDER in table.covariates else name for name in model.needs]
     return {name: _middle(name, table.covariates[name]) for name in names}
 
 
-def map_covariates(outline: Outline, held: Mapping[str, float], inputs: Array) -> dict[str, Array]:
-    """The covariates (n,) of the pushes (n, 3) of a map, with these held."""
-    columns = {name: np.full(len(inputs), value) for name, value in held.items()}
-    if OF_SLIDER in held and OF_PUSH not in held:
+def map_covariates(outline: Outline, fixed: Mapping[str, float], inputs: Array) -> dict[str, Array]:
+    """The covariates (n,) of the pushes (n, 3) of a map, with these fixed."""
+    columns = {name: np.full(len(inputs), value) for name, value in fixed.items()}
+    if OF_SLIDER in fixed and OF_PUSH not in fixed:
         normal = outline.inward_normal(inputs[:, 1])
-        columns[OF_PUSH] = wrap_angle(held[OF_SLIDER] + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2])
+        columns[OF_PUSH] = wrap_angle(fixed[OF_SLIDER] + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2])
     return columns
 
 
-def fixed_covariates_text(model: PushModel, held: Mapping[str, float]) -> str:
-    """Sentences for a caption: at which values a model's map is drawn, and what that leaves out; empty for none."""
-    if not held:
+def fixed_covariates_text(model: PushModel, fixed: Mapping[str, float]) -> str:
+    """Sentences for a caption: the values at which a model's map is drawn, and what that means; empty without them."""
+    if not fixed:
         return ""
-    told = [f"The map of {model.name} is drawn at {' and '.join(_value(*pair) for pair in held.items())}:"]
-    told.append("the middle of these windows' values.")
-    if headings := [name for name in held if name in HEADINGS]:
-        follows = f" ({OF_PUSH} follows from it)" if OF_PUSH in model.needs and OF_PUSH not in held else ""
-        told.append(f"The {headings[0]} is one of many, that nearest to their mean direction{follows};")
-        told.append("at another the map differs.")
-    for name, value in held.items():
+    values = " and ".join(_value(*pair) for pair in fixed.items())
+    sentences = [f"The map of {model.name} is drawn at {values}, the median of these windows."]
+    if headings := [name for name in fixed if name in HEADINGS]:
+        follows = f" ({OF_PUSH} follows from it)" if OF_PUSH in model.needs and OF_PUSH not in fixed else ""
+        sentences.append(f"The {headings[0]} is the one nearest to the mean direction{follows}.")
+        sentences.append("At another heading the map differs.")
+    for name, value in fixed.items():
         known = model.covariate_ranges.get(name)
         if known is not None and not known.holds(np.array([value]))[0]:
-            told.append(f"Nothing is drawn: the model was extended on {name} from {known}.")
-    return " ".join(told)
+            sentences.append(f"Nothing is drawn: the model was extended on {name} from {known}.")
+    return " ".join(sentences)
 
 
 def _value(name: str, value: float) -> str:

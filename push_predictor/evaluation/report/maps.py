@@ -1,7 +1,7 @@
-"""Maps over contact and angle: what a model predicts and what was recorded, in the same cells.
+"""Maps of the outcome by contact and angle: predictions and recordings in the same cells.
 
-A map holds one speed and one duration. Contacts are folded by the outline's rotational symmetry, as the models fold
-them, and told as the way along the outline; a circle, whose contacts are all alike to a model, is shown unfolded.
+A map is for one speed and one duration. Contacts are folded by the outline's rotational symmetry, as in the models, and
+given as arc length. A circle, whose contacts are all equal to a model, is not folded.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
-SAME = 0.1  # speeds and durations that differ by less than this part are shown as one
+SAME = 0.1  # relative difference of speeds and durations that count as equal
 FINE = 48  # cells of a predicted map along either axis
 FEWEST = 6  # windows in a cell that is shown
 WINDOWS_PER_CELL = 9.0
@@ -29,7 +29,7 @@ ANGLE_STEP = np.radians(5.0)
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """The commonest kind of window: velocity m/s, duration s (medians), and which rows (n,) of the table are alike."""
+    """The most common kind of window: median velocity (m/s) and duration (s), and its rows (n,) in the table."""
 
     velocity: float
     duration: float
@@ -51,9 +51,9 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class PushMap:
-    """Mean and sd (A, C, 3) of an outcome (m, m, rad) per cell, NaN where nothing is known.
+    """Mean and sd (A, C, 3) of an outcome (m, m, rad) per cell, NaN where unknown.
 
-    windows, pushes (A, C): how many stand behind a cell of a map of recorded windows, None for any other.
+    windows, pushes (A, C): their number in each cell of a recorded map, None for a predicted map.
     """
 
     cells: Cells
@@ -64,7 +64,7 @@ class PushMap:
 
 
 def commonest_condition(table: PushTable) -> Condition:
-    """The windows within 10 % of the speed, then of the duration, that most windows have.
+    """The windows within 10 % of the most common speed, and of these within 10 % of the most common duration.
 
     Raises TableError for a table without rows.
     """
@@ -77,7 +77,7 @@ def commonest_condition(table: PushTable) -> Condition:
 
 
 def fold_order(outline: Outline) -> int:
-    """How many alike sectors the outline has; 1 for a circle, which has no sectors."""
+    """The number of equal sectors of the outline, 1 for a circle."""
     return max(outline.rotational_symmetry, 1)
 
 
@@ -87,7 +87,7 @@ def sector_length(outline: Outline) -> float:
 
 
 def arc_length(outline: Outline, contact: Array) -> Array:
-    """Folded contacts (n,) in m, counter-clockwise from the start of their sector."""
+    """Arc length (n,) in m of contacts (n,), counter-clockwise from the start of their sector."""
     order = fold_order(outline)
     if outline.semi_axes is not None:
         return np.asarray((contact * order) % 1.0 * sector_length(outline))
@@ -96,14 +96,14 @@ def arc_length(outline: Outline, contact: Array) -> Array:
 
 
 def fine_cells(outline: Outline, table: PushTable) -> Cells:
-    """Cells for predicted maps: the whole sector, and the angles of the table's rows rounded outwards to 5 degrees."""
+    """Cells of predicted maps: the whole sector, and the table's range of angles rounded outwards to 5 degrees."""
     return _cells(outline, table, FINE, FINE)
 
 
 def coarse_cells(outline: Outline, table: PushTable) -> Cells:
-    """Cells for recorded maps of these rows, over the same ranges: as many as leave about nine windows to each.
+    """Cells of recorded maps over the same ranges, with about nine windows each.
 
-    Contacts on a circle are not told apart.
+    Contacts on a circle share one cell.
     """
     wanted = len(table) / WINDOWS_PER_CELL
     along = 1 if outline.rotational_symmetry == 0 else _whole(np.sqrt(wanted))
@@ -111,17 +111,17 @@ def coarse_cells(outline: Outline, table: PushTable) -> Cells:
 
 
 def push_map(
-    model: PushModel, velocity: float, duration: float, cells: Cells, held: Mapping[str, float] | None = None
+    model: PushModel, velocity: float, duration: float, cells: Cells, fixed: Mapping[str, float] | None = None
 ) -> PushMap:
-    """What the model predicts at the centre of every cell; NaN outside the domain of its training.
+    """Predictions at the centre of every cell, NaN outside the model's domain.
 
-    held: the covariates that an extended model needs, see `map_conditions.fixed_covariates`.
+    fixed: the covariates that an extended model needs, see `map_conditions.fixed_covariates`.
     """
     contact = 0.5 * (cells.contact[1:] + cells.contact[:-1]) / model.rig.outline.perimeter
     angle = 0.5 * (cells.angle[1:] + cells.angle[:-1])
     angles, contacts = np.meshgrid(angle, contact, indexing="ij")
     inputs = np.column_stack([np.full(contacts.size, velocity), contacts.ravel(), angles.ravel()])
-    covariates = map_covariates(model.rig.outline, held or {}, inputs)
+    covariates = map_covariates(model.rig.outline, fixed or {}, inputs)
     prediction = model.predict_rows(inputs, np.full(len(inputs), duration), covariates)
     sd = np.sqrt(np.diagonal(prediction.covariance, axis1=1, axis2=2))
     hidden = ~prediction.in_domain[:, None]
@@ -131,17 +131,17 @@ def push_map(
 
 
 def recorded_map(outline: Outline, table: PushTable, predicted: Array, cells: Cells) -> PushMap:
-    """What the windows of every cell did: mean outcome, and root mean square of its distance from `predicted` (n, 3).
+    """Mean outcome in every cell, and its root mean square deviation from `predicted` (n, 3) as sd.
 
-    The distance from each window's own predicted mean is what a predicted sd speaks of. Neither the variation of the
-    inputs within a cell nor the likeness of windows of one push biases its mean square, as they would a sample sd.
+    The deviation from each window's own prediction corresponds to the predicted sd. Unlike a sample sd it is not biased
+    by the variation of inputs within a cell or by the correlation of windows of one push.
     """
     squared = (table.outcomes - predicted) ** 2
     return _averaged(outline, table, table.outcomes, squared, cells)
 
 
 def predicted_at_windows(outline: Outline, table: PushTable, mean: Array, variance: Array, cells: Cells) -> PushMap:
-    """What was predicted for the recorded windows themselves, mean and variance (n, 3), averaged in the same cells."""
+    """Predictions for the recorded windows, mean and variance (n, 3), averaged in the same cells."""
     return _averaged(outline, table, mean, variance, cells)
 
 
@@ -173,13 +173,13 @@ def _cells(outline: Outline, table: PushTable, along_contact: int, along_angle: 
     angle = table.inputs[:, 2]
     low = max(np.floor(angle.min() / ANGLE_STEP) * ANGLE_STEP, -WIDEST_ANGLE)
     high = min(max(np.ceil(angle.max() / ANGLE_STEP) * ANGLE_STEP, low + ANGLE_STEP), WIDEST_ANGLE)
-    low, high = min(low, angle.min()), max(high, angle.max())  # beyond 89 degrees nothing is cut off
+    low, high = min(low, angle.min()), max(high, angle.max())  # no window beyond 89 degrees is dropped
     contact = np.linspace(0.0, sector_length(outline), along_contact + 1)
     return Cells(contact, np.linspace(low, high, along_angle + 1))
 
 
 def _members(outline: Outline, table: PushTable, cells: Cells) -> Iterator[tuple[tuple[int, int], IntArray]]:
-    """Every cell that is not empty, with the rows in it; a row beyond the last edge by rounding stays in."""
+    """Each cell that is not empty, with its rows; a row beyond the last edge by rounding is included."""
     column = _position(cells.contact, arc_length(outline, table.inputs[:, 1]))
     row = _position(cells.angle, table.inputs[:, 2])
     flat = row * cells.shape[1] + column

@@ -1,4 +1,4 @@
-"""The report of a validation: one HTML page that stands alone, its pictures and the numbers as JSON beside it."""
+"""The validation report: a self-contained HTML page, its figures as PNG and its numbers as JSON."""
 
 from __future__ import annotations
 
@@ -15,8 +15,14 @@ from push_predictor.evaluation.report.figures.gallery import (
     map_pictures,
     residual_pictures,
 )
+from push_predictor.evaluation.report.summary import (
+    calibration_sentence,
+    comparison_sentence,
+    error_sentence,
+    training_sentence,
+)
 from push_predictor.evaluation.report.tables import metrics_tables
-from push_predictor.evaluation.validation import Comparison, metrics_json, trained_on
+from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.table import PushTable
@@ -25,10 +31,10 @@ from push_predictor.reporting import html
 from push_predictor.reporting.canvas import Picture
 
 SECTIONS: tuple[tuple[str, Callable[[Path, Validation], list[Picture]]], ...] = (
-    ("Predicted and recorded maps", map_pictures),
-    ("Predicted ellipses over observed outcomes", example_pictures),
-    ("Calibration", calibration_pictures),
-    ("Residuals", residual_pictures),
+    ("Outcomes by contact and angle, predicted and recorded", map_pictures),
+    ("Predicted ellipses and observed outcomes", example_pictures),
+    ("Calibration of the predicted uncertainty", calibration_pictures),
+    ("Residuals over time", residual_pictures),
 )
 
 
@@ -42,11 +48,11 @@ def write_validation_report(
     facts: Mapping[str, str],
     notes: Sequence[str],
 ) -> Path:
-    """Write out/report.html, its pictures out/*.png and the numbers out/report.json; returns the path of the page.
+    """Write out/report.html, its figures out/*.png and its numbers out/report.json; return the path of the page.
 
-    models and comparisons go together, the first is the main one; comparisons and windows have a row per row of the
-    table. facts and notes are shown as they are given. Raises PushPredictorError if these do not fit together or if
-    matplotlib is not installed.
+    models and comparisons have the same order, the main model first. comparisons and windows have one row per row of
+    the table. facts and notes are shown as given. Raises PushPredictorError if these do not match, or if matplotlib or
+    Jinja2 is not installed.
     """
     shown = Validation(table, windows, models, comparisons)
     _check(shown)
@@ -55,7 +61,7 @@ def write_validation_report(
     parts = [
         *_summary(shown, metrics),
         *([html.definitions(facts)] if facts else []),
-        html.heading("How good are the predictions?"),
+        html.heading("Scores"),
         *metrics_tables(comparisons, metrics),
         *_pictures(out, shown),
         *([html.heading("Notes"), html.bullets(notes)] if notes else []),
@@ -79,24 +85,19 @@ def _check(shown: Validation) -> None:
 
 
 def _summary(shown: Validation, metrics: Sequence[dict[str, Any]]) -> list[str]:
-    main, rig = metrics[0], shown.models[0].rig
-    lead = (
-        f"{main['n_test']} windows of {_pushes(main['n_pushes'])} (shape {rig.shape} on {rig.surface}), "
-        f"predicted by {', '.join(str(m['model']) for m in metrics)}."
-    )
-    return [html.paragraph(lead, "lead"), *_split(shown)]
-
-
-def _split(shown: Validation) -> list[str]:
-    """What the models have seen of these pushes."""
-    seen = {model.name: len(trained_on(model, shown.table)) for model in shown.models}
-    if not any(seen.values()):
-        text = "Split by push: whole pushes are held out, none of these was used to train any of the models."
-        return [html.paragraph(text)]
-    told = ", ".join(f"{count} by {name}" for name, count in seen.items() if count)
-    pushes = _pushes(len(shown.table.pushes))
-    text = f"Not held out: of {pushes}, some were trained on ({told}). Figures and pictures flatter those models."
-    return [html.paragraph(text, "warning")]
+    """Answer first: how good the main model is, whether it is calibrated, how the others compare."""
+    main, *others = shown.comparisons
+    rig, first = shown.models[0].rig, metrics[0]
+    sentence, used = training_sentence(shown.models, shown.table)
+    data = f"{first['n_test']} windows of {_pushes(first['n_pushes'])} (shape {rig.shape} on {rig.surface}). "
+    if not len(shown.table):
+        return [html.paragraph(data + sentence)]
+    answers = [calibration_sentence(main), *(comparison_sentence(main, other) for other in others)]
+    return [
+        html.paragraph(error_sentence(first), "lead"),
+        html.bullets(answers),
+        html.paragraph(data + sentence, "warning" if used else ""),
+    ]
 
 
 def _pushes(count: int) -> str:
@@ -105,7 +106,7 @@ def _pushes(count: int) -> str:
 
 def _pictures(out: Path, shown: Validation) -> list[str]:
     if not len(shown.table):
-        return [html.paragraph("No window was found, so there is nothing to draw.", "warning")]
+        return [html.paragraph("No window was found, so there are no scores and no figures.", "warning")]
     parts = []
     for name, draw_section in SECTIONS:
         parts += [html.heading(name), *map(html.figure, draw_section(out, shown))]

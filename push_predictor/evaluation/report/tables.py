@@ -1,4 +1,4 @@
-"""The tables of a validation report: the numbers of `metrics_json` with 95 % intervals by resampling whole pushes."""
+"""The tables of a validation report: the numbers of `metrics_json` with 95 % intervals from resampling whole pushes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
 from push_predictor.types import Array
 
-MILLIMETRES = 2.0 * np.log(1000.0)  # what the NLPD total gains when dx and dy are told in mm
+MILLIMETRES = 2.0 * np.log(1000.0)  # added to the total NLPD when dx and dy are in mm
 Metrics = Mapping[str, Any]
 COLUMNS = (*OUTPUTS, "total")
 
 
 def metrics_tables(comparisons: Sequence[Comparison], metrics: Sequence[Metrics]) -> list[str]:
-    """HTML tables of the metrics_json of these comparisons, the first of which the others are compared with."""
+    """HTML tables of the metrics_json of these comparisons; the others are compared with the first."""
     pairs = list(zip(comparisons, metrics, strict=True))
     tables = [_error_table(pairs), _density_table(pairs), _coverage_table(pairs)]
     exact = [(c, m) for c, m in pairs if m["exact_nlpd"] is not None]
@@ -33,25 +33,30 @@ def metrics_tables(comparisons: Sequence[Comparison], metrics: Sequence[Metrics]
 
 
 def paired_difference(main: Comparison, other: Comparison) -> tuple[Array, Array]:
-    """Total NMSE and total NLPD of `other` less those of `main`: (value, low, high) each, 95 % by drawing whole pushes.
+    """Total NMSE and total NLPD of `other` minus those of `main`, (value, low, high) each, with 95 % intervals.
 
-    Both comparisons are of the same windows, so what makes a push hard for both cancels. Low and high are NaN where
-    there are fewer than two pushes.
+    Both comparisons contain the same windows, so the difficulty of a push cancels. Low and high are NaN for fewer than
+    two pushes.
     """
     every = np.ones((1, len(main.push_id)))
-    values, draws = _totals_apart(main, other, every), _totals_apart(main, other, _weights(main))
+    values, draws = _total_differences(main, other, every), _total_differences(main, other, row_weights(main))
     nmse, nlpd = (np.array([values[0, k], *_ends(draws)[:, k]]) for k in range(2))
     return nmse, nlpd
+
+
+def interval_of(values: Array, weights: Array) -> Array:
+    """Ends (2, k) of the 95 % intervals of the means of values (n, k) under weights (draws, n); NaN without draws."""
+    return _ends(_mean_draws(values, weights))
 
 
 def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
         counts = [str(m[name]) for name in ("n_train", "n_test", "n_pushes")]
-        rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c, _weights(c)))])
+        rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c, row_weights(c)))])
     caption = (
-        "Normalised mean squared error: 0 is perfect, 1 as good as always answering the training mean; the total is "
-        "the sum over the outputs. In brackets, here and below: 95 % intervals by resampling whole pushes."
+        "Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than the training mean. "
+        "The total is the sum over the outputs. In brackets in all tables: 95 % intervals from resampling whole pushes."
     )
     return html.table(caption, ("model", "training windows", "windows", "pushes", *COLUMNS), rows)
 
@@ -62,10 +67,10 @@ def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         each = gaussian_nlpd(c.mean, c.variance, c.observed)
         scores = np.column_stack([each, each.sum(axis=1), joint_nlpd(c.mean, c.covariance, c.observed)])
         values = [*(m["nlpd"][name] for name in COLUMNS), m["joint_nlpd"]]
-        rows.append([c.model, *_cells(values, _mean_draws(scores, _weights(c)))])
+        rows.append([c.model, *_cells(values, _mean_draws(scores, row_weights(c)))])
     caption = (
-        f"Negative log predictive density, nats per window in SI units (m, m, rad), moment-matched Gaussian; lower "
-        f"is better. In mm and rad, totals and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
+        f"Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
+        f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
     )
     return html.table(caption, ("model", *COLUMNS, "joint"), rows)
 
@@ -74,39 +79,41 @@ def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     rows = []
     for c, m in pairs:
         each = np.zeros((0, 3)) if c.exact_log_density is None else -c.exact_log_density
-        draws = _mean_draws(np.column_stack([each, each.sum(axis=1)]), _weights(c))
+        draws = _mean_draws(np.column_stack([each, each.sum(axis=1)]), row_weights(c))
         rows.append([c.model, *_cells([m["exact_nlpd"][name] for name in COLUMNS], draws)])
-    caption = "The same under the exact predictive density of the VHGP; that of the other models is the Gaussian above."
+    caption = "NLPD of the exact predictive density of the VHGP. For the other models it is that of the Gaussian above."
     return html.table(caption, ("model", *COLUMNS), rows)
 
 
 def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
-    head = ("model", *(f"{name} {level:.0%}" for level in COVERAGE_LEVELS for name in OUTPUTS))
+    head = ("model, output", *(f"{100.0 * level:.0f} % interval" for level in COVERAGE_LEVELS))
     rows = []
     for c, m in pairs:
         away = np.abs(c.observed - c.mean) / np.sqrt(c.variance)
-        hits = np.column_stack([away <= ndtri(0.5 + level / 2.0) for level in COVERAGE_LEVELS]).astype(np.float64)
         levels = [m["coverage"][str(level)] or dict.fromkeys(OUTPUTS) for level in COVERAGE_LEVELS]
-        values = [found[name] for found in levels for name in OUTPUTS]
-        rows.append([c.model, *_cells(values, _mean_draws(hits, _weights(c)), digits=3)])
-    return html.table("Coverage: share of outcomes inside the central predicted interval of that level.", head, rows)
+        for k, name in enumerate(OUTPUTS):
+            hits = np.column_stack([away[:, k] <= ndtri(0.5 + level / 2.0) for level in COVERAGE_LEVELS])
+            draws = _mean_draws(hits.astype(np.float64), row_weights(c))
+            rows.append([f"{c.model}, {name}", *_cells([found[name] for found in levels], draws, digits=3)])
+    caption = (
+        "Coverage: share of outcomes inside the predicted central interval. Below the nominal share the intervals are "
+        "too narrow, above it too wide."
+    )
+    return html.table(caption, head, rows)
 
 
 def _difference_table(comparisons: Sequence[Comparison]) -> str:
     main, *others = comparisons
     rows = [[c.model, *(_cell(v, (low, high)) for v, low, high in paired_difference(main, c))] for c in others]
     caption = (
-        f"Difference to {main.model} on the same windows: above zero, {main.model} is better. 95 % intervals by "
-        f"resampling whole pushes in pairs."
+        f"Difference to {main.model} on the same windows. Above zero, {main.model} is better. "
+        f"An interval that contains zero shows no difference."
     )
     return html.table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)
 
 
-# --- intervals ------------------------------------------------------------------------------------------------------
-
-
-def _weights(c: Comparison) -> Array:
-    """Row weights (draws, n), no draws where fewer than two pushes leave nothing to resample."""
+def row_weights(c: Comparison) -> Array:
+    """Weights (draws, n) of the rows in each bootstrap sample of pushes; no draws for fewer than two pushes."""
     if len(set(c.push_id.tolist())) < 2:
         return np.empty((0, len(c.push_id)))
     return push_bootstrap(c.push_id)
@@ -122,15 +129,15 @@ def _mean_draws(scores: Array, weights: Array) -> Array:
     return np.asarray(weights @ scores / weights.sum(axis=1, keepdims=True))
 
 
-def _totals_apart(main: Comparison, other: Comparison, weights: Array) -> Array:
-    """Total NMSE and NLPD of other less main's, (draws, 2)."""
+def _total_differences(main: Comparison, other: Comparison, weights: Array) -> Array:
+    """Total NMSE and NLPD of other minus those of main, (draws, 2)."""
     nmse = _nmse_draws(other, weights)[:, -1] - _nmse_draws(main, weights)[:, -1]
     nlpd = [gaussian_nlpd(c.mean, c.variance, c.observed).sum(axis=1) for c in (main, other)]
     return np.column_stack([nmse, _mean_draws((nlpd[1] - nlpd[0])[:, None], weights)])
 
 
 def _ends(draws: Array) -> Array:
-    """Low and high ends (2, k) of draws (draws, k), NaN where there are none."""
+    """Ends (2, k) of the central 95 % of draws (draws, k), NaN without draws."""
     if not len(draws) or np.isnan(draws).any(axis=0).all():
         return np.full((2, draws.shape[1]), np.nan)
     return np.asarray(np.quantile(draws, [0.025, 0.975], axis=0))
@@ -142,8 +149,9 @@ def _cells(values: Sequence[float | None], draws: Array, digits: int = 4) -> lis
 
 
 def _cell(value: float | None, ends: tuple[float, float], digits: int = 4) -> str:
-    """A number and, on a line of its own, its interval where there is one."""
-    shown = html.number(value, digits)
+    """A number and, on a second line, its interval if there is one."""
+    shown = html.number(value, digits, zeros=True)
     if value is None or not np.all(np.isfinite(ends)):
         return shown
-    return f"{shown}\n[{html.number(ends[0], digits - 1)}, {html.number(ends[1], digits - 1)}]"
+    low, high = (html.number(end, digits - 1, zeros=True) for end in ends)
+    return f"{shown}\n[{low}, {high}]"

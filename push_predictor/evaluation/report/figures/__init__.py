@@ -1,1 +1,1 @@
-"""Pictures of a validation; each module draws one, `canvas` holds what they share."""
+"""The figures of a validation report, one module each. `gallery` draws them all, with captions."""

@@ -1,4 +1,4 @@
-"""Calibration: how often outcomes lie in the predicted intervals, and where in the predicted distribution."""
+"""Calibration: share of outcomes in the predicted intervals, and histograms of the PIT."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DRAWS = 400
 
 
 def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None:
-    """A row per model: the coverage curve, then a histogram of the PIT per output."""
+    """A row per model: the coverage curve and a PIT histogram per output."""
     axes = figure.subplots(len(comparisons), 4, squeeze=False, width_ratios=(1.25, 1.0, 1.0, 1.0))
     for row, comparison in zip(axes, comparisons, strict=True):
         _paint_coverage(row[0], comparison)
@@ -45,7 +45,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
 
 
 def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Array, Array, Array]:
-    """Observed share, and low and high ends of its 95 % interval by resampling whole pushes, (levels, 3) each."""
+    """Observed share and the ends of its 95 % interval from resampling whole pushes, (levels, 3) each."""
     away = np.abs(comparison.observed - comparison.mean) / np.sqrt(comparison.variance)
     hit = (away[:, None, :] <= ndtri(0.5 + levels / 2.0)[None, :, None]).astype(np.float64)
     weights = push_bootstrap(comparison.push_id, draws=DRAWS)

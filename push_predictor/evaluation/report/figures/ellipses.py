@@ -1,4 +1,4 @@
-"""Predicted 95 % ellipses over observed outcomes, for a few pushes spread over contact and angle."""
+"""Predicted 95 % ellipses with observed outcomes, for a few pushes at different contacts and angles."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ DIAMOND: dict[str, Any] = {"color": OBSERVED, "markersize": 5}
 def paint_examples(
     figure: Figure, rig: Rig, table: PushTable, comparison: Comparison, shown: Sequence[Example]
 ) -> None:
-    """An example a block: the slider, the ellipse of (dx, dy) and the interval of dtheta."""
+    """One block per example: the slider, the ellipse of (dx, dy) and the interval of dtheta."""
     rows = -(-len(shown) // ACROSS)
     parts = figure.subfigures(rows, ACROSS, squeeze=False, hspace=0.03, wspace=0.03)
     for number, (part, example) in enumerate(zip(parts.ravel(), shown, strict=False)):
-        middle = _paint_example(part, rig, table, comparison, example)
+        middle: Axes = _paint_example(part, rig, table, comparison, example)
         if number == 0:
             figure.legend(*middle.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
@@ -57,7 +57,7 @@ def paint_ellipse(ax: Axes, mean: Array, covariance: Array, label: str | None = 
 
 
 def ellipse(covariance: Array, level: float = LEVEL, count: int = 121) -> Array:
-    """Boundary (count, 2) of the ellipse about zero that holds `level` of a Gaussian with that covariance (2, 2)."""
+    """Boundary (count, 2) of the ellipse at zero that contains `level` of a Gaussian with covariance (2, 2)."""
     turn = np.linspace(0.0, 2.0 * np.pi, count)
     circle = np.sqrt(chi2.ppf(level, 2)) * np.stack([np.cos(turn), np.sin(turn)])
     return np.asarray((np.linalg.cholesky(covariance) @ circle).T)
@@ -71,7 +71,7 @@ def inside(mean: Array, covariance: Array, outcomes: Array, level: float = LEVEL
 
 
 def _paint_example(part: SubFigure, rig: Rig, table: PushTable, comparison: Comparison, example: Example) -> Axes:
-    """Paint one block; returns the axes with the ellipse."""
+    """Paint one block and return the axes with the ellipse."""
     row = example.row
     enlarged = magnification(rig.outline, np.stack([comparison.mean[row], comparison.observed[row]]))
     left, middle, right = part.subplots(1, 3, width_ratios=(1.0, 1.25, 0.42))
@@ -79,9 +79,9 @@ def _paint_example(part: SubFigure, rig: Rig, table: PushTable, comparison: Comp
     title = f"{velocity * 1e3:.0f} mm/s, push angle {np.degrees(angle):.0f}°, {table.duration[row]:.2g} s"
     part.suptitle(title.replace("-", "−"), fontsize=9.0)
     paint_slider(left, rig, table.inputs[row], comparison.mean[row], comparison.observed[row], enlarged)
-    left.set_title(f"motion drawn {enlarged:g}×", fontsize=8.0)
+    left.set_title(f"motion ×{enlarged:g}", fontsize=8.0)
     _paint_plane(middle, comparison, example)
-    _paint_turn(right, comparison, example)
+    _paint_rotation(right, comparison, example)
     return middle
 
 
@@ -89,18 +89,18 @@ def _paint_plane(ax: Axes, comparison: Comparison, example: Example) -> None:
     mean, covariance = comparison.mean[example.row], comparison.covariance[example.row]
     grid(ax)
     paint_ellipse(ax, mean, covariance, label="predicted, 95 %")
-    ax.plot(*(example.nearby[:, :2].T * UNITS[0]), "o", label="windows with nearby inputs", **DOTS)
+    ax.plot(*(example.nearby[:, :2].T * UNITS[0]), "o", label="windows with similar inputs", **DOTS)
     ax.plot(*(comparison.observed[example.row, :2] * UNITS[0]), "D", label="this window", **DIAMOND)
     count = int(inside(mean, covariance, example.nearby).sum())
     pushes = f"{example.pushes} push{'' if example.pushes == 1 else 'es'}"
-    ax.set_title(f"nearby inside: {count} of {len(example.nearby)} ({pushes})", fontsize=8.0)
+    ax.set_title(f"similar: {count} of {len(example.nearby)} inside ({pushes})", fontsize=8.0)
     ax.set_xlabel(output_label(0))
     ax.set_ylabel(output_label(1))
     ax.set_aspect("equal", adjustable="datalim")
     ax.locator_params(nbins=5)
 
 
-def _paint_turn(ax: Axes, comparison: Comparison, example: Example) -> None:
+def _paint_rotation(ax: Axes, comparison: Comparison, example: Example) -> None:
     mean, sd = comparison.mean[example.row, 2], np.sqrt(comparison.covariance[example.row, 2, 2])
     half = ndtri(0.5 + LEVEL / 2.0) * sd
     grid(ax)

@@ -1,4 +1,4 @@
-"""The pictures of a validation report with their captions, in the order in which they are shown."""
+"""The figures of a validation report with their captions, in the order of the page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from push_predictor.evaluation.report.figures.calibration import paint_calibrati
 from push_predictor.evaluation.report.figures.ellipses import paint_examples
 from push_predictor.evaluation.report.figures.nearby import ENOUGH, examples
 from push_predictor.evaluation.report.figures.push_maps import Panel, paint_maps
-from push_predictor.evaluation.report.figures.residuals import course_of, paint_residuals
+from push_predictor.evaluation.report.figures.residuals import paint_residuals, time_axis
 from push_predictor.evaluation.report.figures.tracks import paint_tracks
 from push_predictor.evaluation.report.map_conditions import fixed_covariates, fixed_covariates_text
 from push_predictor.evaluation.report.maps import (
@@ -39,7 +39,7 @@ EXAMPLES = 6
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What was validated: models and comparisons in the same order, the first is the main one; windows if known."""
+    """What was validated: models and comparisons in the same order, the main model first; windows if known."""
 
     table: PushTable
     windows: Sequence[PushWindow] | None
@@ -48,13 +48,13 @@ class Validation:
 
 
 def map_pictures(out: Path, shown: Validation) -> list[Picture]:
-    """Mean and sd over contact and angle at the commonest speed, predicted and recorded."""
+    """Maps of mean and sd by contact and angle at the most common speed, predicted and recorded."""
     condition = commonest_condition(shown.table)
     panels = _map_panels(shown, condition)
     recorded = panels[-1].map
     outline = shown.models[0].rig.outline
     size = (WIDTH, 6.6)
-    mean, sd, at = out / "map_mean.png", out / "map_sd.png", _held_caption(shown, condition)
+    mean, sd, at = out / "map_mean.png", out / "map_sd.png", _fixed_caption(shown, condition)
     draw(mean, size, lambda figure: paint_maps(figure, outline, panels, "mean"))
     draw(sd, size, lambda figure: paint_maps(figure, outline, panels, "sd"))
     return [
@@ -64,7 +64,7 @@ def map_pictures(out: Path, shown: Validation) -> list[Picture]:
 
 
 def example_pictures(out: Path, shown: Validation) -> list[Picture]:
-    """Ellipses over outcomes, in the push frame and, where windows are known, along whole pushes."""
+    """Ellipses with outcomes in the push frame and, if windows are known, along whole pushes."""
     rig, comparison = shown.models[0].rig, shown.comparisons[0]
     chosen = examples(rig.outline, shown.table, comparison, EXAMPLES)
     path = out / "examples.png"
@@ -87,69 +87,68 @@ def calibration_pictures(out: Path, shown: Validation) -> list[Picture]:
 
 
 def residual_pictures(out: Path, shown: Validation) -> list[Picture]:
-    """Predicted against observed, and residuals in the order of time, of the main model."""
+    """Observed against predicted outcomes of the main model, and its residuals over time."""
     path, comparison = out / "residuals.png", shown.comparisons[0]
-    course = course_of(comparison, shown.windows)
-    draw(path, (WIDTH, 6.0), lambda figure: paint_residuals(figure, comparison, course))
-    alt = "Predicted against observed displacement per output, and standardised residuals in the order of time."
+    axis = time_axis(comparison, shown.windows)
+    draw(path, (WIDTH, 6.0), lambda figure: paint_residuals(figure, comparison, axis))
+    alt = "Observed against predicted displacement per output, and standardised residuals over time."
     return [Picture(path, alt, f"{comparison.model}. {RESIDUAL_CAPTION}")]
 
 
 def _map_panels(shown: Validation, condition: Condition) -> list[Panel]:
-    """Every model's map, the main model at the recorded windows, and the recorded map last."""
+    """The map of each model, the main model at the recorded windows, and the recorded map."""
     rows, outline = condition.rows, shown.models[0].rig.outline
-    alike = shown.table.take(rows)
-    fine, coarse = fine_cells(outline, alike), coarse_cells(outline, alike)
+    similar = shown.table.take(rows)
+    fine, coarse = fine_cells(outline, similar), coarse_cells(outline, similar)
     main = shown.comparisons[0]
-    held = [fixed_covariates(model, alike) for model in shown.models]
+    fixed = [fixed_covariates(model, similar) for model in shown.models]
     velocity, duration = condition.velocity, condition.duration
-    panels = [Panel(m.name, push_map(m, velocity, duration, fine, h)) for m, h in zip(shown.models, held, strict=True)]
-    same = predicted_at_windows(outline, alike, main.mean[rows], main.variance[rows], coarse)
+    panels = [Panel(m.name, push_map(m, velocity, duration, fine, h)) for m, h in zip(shown.models, fixed, strict=True)]
+    same = predicted_at_windows(outline, similar, main.mean[rows], main.variance[rows], coarse)
     return [
         *panels,
         Panel(f"{main.model}, at the\nrecorded windows", same),
-        Panel("recorded\n(digits: pushes)", recorded_map(outline, alike, main.mean[rows], coarse), counted=True),
+        Panel("recorded\n(digits: pushes)", recorded_map(outline, similar, main.mean[rows], coarse), counted=True),
     ]
 
 
 def _mean_caption(condition: Condition, recorded: PushMap) -> str:
     windows = recorded.windows if recorded.windows is not None else np.zeros((1, 1), np.int64)
     filled = windows >= FEWEST
-    typical = f"; the median shown cell holds {np.median(windows[filled]):.0f}" if filled.any() else ""
+    typical = f", median {np.median(windows[filled]):.0f} windows" if filled.any() else ""
     return (
-        f"Mean outcome over contact and push angle, {_of_condition(condition)} All panels of a row share their "
-        f"colours. The maps of the models are evaluated at cell centres; the two panels on the right average the same "
-        f"windows in the same cells, so they may be compared cell by cell. Grey and hatched: fewer than {FEWEST} "
-        f"windows in the cell ({filled.sum()} of {filled.size} cells are shown{typical}), or outside the domain of "
-        f"the training pushes. Digits: how many pushes the windows of a cell come from."
+        f"Mean outcome by contact and push angle. The two panels on the right show the same windows in the same cells: "
+        f"where their colours agree, the predicted mean is right. {_of_condition(condition)} The models' own maps are "
+        f"evaluated at cell centres. Digits: number of pushes in a cell. Grey, hatched: fewer than {FEWEST} windows in "
+        f"the cell ({filled.sum()} of {filled.size} cells are shown{typical}), or outside the training pushes."
     )
 
 
 def _sd_caption(condition: Condition, main: str) -> str:
     return (
-        f"Standard deviation of the outcome, {_of_condition(condition)} Predicted: of an observed outcome, process "
-        f"noise and the model's own uncertainty together. Recorded: root mean square of the observed outcome less "
-        f"the mean that {main} predicts for that very window, which is what its sd speaks of; so the variation of "
-        f"the inputs within a cell does not count as noise, and an error of the mean does. Windows of one push err "
-        f"alike: a recorded cell is worth about as many measurements as the pushes written into it, and from k of "
-        f"them it is uncertain by about 1/√(2k), 50 % for two and 25 % for eight."
+        f"Standard deviation (sd) of the outcome by contact and push angle. Where the two panels on the right agree, "
+        f"the predicted uncertainty is right. {_of_condition(condition)} Predicted: sd of an observed outcome, that is "
+        f"process noise and model uncertainty. Recorded: root mean square deviation from what {main} predicts for each "
+        f"window. So an error of the mean counts, and the variation of the inputs within a cell does not. Errors in "
+        f"a push are correlated: a cell of k pushes has an uncertainty of about 1/√(2k), 50 % for two pushes and 25 % "
+        f"for eight."
     )
 
 
-def _held_caption(shown: Validation, condition: Condition) -> str:
-    """At which covariates the maps of extended models are drawn; empty if none is extended."""
-    alike, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
-    told = [fixed_covariates_text(model, fixed_covariates(model, alike)) for model in shown.models]
+def _fixed_caption(shown: Validation, condition: Condition) -> str:
+    """The covariates at which the maps of extended models are drawn, empty without such models."""
+    similar, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
+    sentences = [fixed_covariates_text(model, fixed_covariates(model, similar)) for model in shown.models]
     extended = [model.name for model in shown.models if isinstance(model.predictor, ExtendedPredictor)]
     if extended and (sides := fold_order(outline)) > 1:
-        told.append(f"Effects may differ between sides: of the outline's {sides} alike parts, the first is drawn.")
-    return "".join(f" {text}" for text in told if text)
+        sentences.append(f"Effects may differ between sides: the first of the {sides} equal sides is drawn.")
+    return "".join(f" {text}" for text in sentences if text)
 
 
 def _of_condition(condition: Condition) -> str:
     return (
-        f"windows near {condition.velocity * 1e3:.3g} mm/s only (± 10 %, the commonest speed: "
-        f"{condition.rows.sum()} of {condition.rows.size} windows), {condition.duration:.3g} s long."
+        f"Only windows at {condition.velocity * 1e3:.3g} mm/s (± 10 %), the most common speed, and of "
+        f"{condition.duration:.3g} s are shown ({condition.rows.sum()} of {condition.rows.size} windows)."
     )
 
 
@@ -164,31 +163,32 @@ def _example_alt(count: int) -> str:
 
 def _example_caption(model: str) -> str:
     return (
-        f"{model}: {EXAMPLES} windows at most, spread over contact and angle, each of another push, chosen by their "
-        f"inputs alone. Left: the slider at the start (grey), observed (orange) and predicted (blue, dashed), pushed "
-        f"to the right. Middle: predicted 95 % ellipse and the observed outcome in the push frame. Right: the 95 % "
-        f"interval of the turn. Grey dots: outcomes of windows with nearby inputs (a tenth of the folded outline, "
-        f"10°, 10 % of speed), moved by the difference of the predicted means, so that they scatter only by what "
-        f"the mean leaves unexplained; windows with at least {ENOUGH} such neighbours are preferred."
+        f"Up to {EXAMPLES} windows of {model}, each of another push: about 95 % of the dots should lie in ellipses. "
+        f"Left: the slider before (grey), after (orange) and as predicted (blue, dashed); the pusher moves to the "
+        f"right. Middle: predicted 95 % ellipse and observed outcome in the push frame. Right: 95 % interval of the "
+        f"rotation. Grey dots: windows with similar inputs (a tenth of the outline, 10°, 10 % of the speed). Each is "
+        f"shifted by the difference of the predicted means, so it shows the unexplained part only. The windows are "
+        f"chosen by their inputs alone; those with at least {ENOUGH} similar windows are preferred."
     )
 
 
 TRACK_CAPTION = (
-    "Whole pushes from above, the centre of the slider, its track laid to the right. Each ellipse is "
-    "predicted from the observed pose at its window's start and should hold the next observed point in 95 % of cases. "
-    "Shown are long pushes: the one that turns the slider most clockwise, a middling one, and the most "
+    "Whole pushes from above: the path of the slider's centre, turned so that it goes to the right. About 95 % of the "
+    "observed points should lie in their ellipses. Each ellipse is predicted from the observed pose at the start of "
+    "its window. Shown are three long pushes: the largest clockwise rotation, the median, the largest "
     "counter-clockwise."
 )
 CALIBRATION_CAPTION = (
-    "Left: share of outcomes inside the central predicted interval against the share it should hold; shaded: 95 % "
-    "by resampling whole pushes. Above the diagonal the predicted scatter is too wide, below too narrow. Right: "
-    "probability integral transform; grey band: where 95 % of the bars of a calibrated prediction would lie if windows "
-    "were independent. Windows of one push are not, so bars leave the band more often than that. A hump means too "
-    "wide, a trough too narrow, a slope a shifted mean. All by the moment-matched Gaussian."
+    "A calibrated model has coverage on the diagonal and bars in the grey band. Left: share of outcomes inside the "
+    "predicted central interval, against its nominal share. Above the diagonal the predicted uncertainty is too "
+    "large, below it too small. Shaded: 95 % interval from resampling whole pushes. Right: probability integral "
+    "transform (PIT), the predicted probability of a smaller outcome. A hump: the predicted uncertainty is too large. "
+    "A trough: it is too small. A slope: the mean is biased. The band contains 95 % of the bars if windows are "
+    "independent. Windows of one push are not, so more bars lie outside. All for the predicted Gaussian."
 )
 RESIDUAL_CAPTION = (
-    "Above: predicted against observed, with the predicted 95 % interval of every window (grey) about the diagonal. "
-    "Below: residuals in units of the predicted sd in the order of time, windows in grey (those beyond the frame at "
-    "its edge), means of pushes in colour; the band holds 95 % if all is well. Trend: change of the residual from the "
-    "first to the last window, with its 95 % interval by resampling pushes; an interval without zero is a drift."
+    "A trend whose interval excludes zero is a drift. Top: observed against predicted outcome, with the predicted 95 % "
+    "interval (grey). Bottom: residuals in units of the predicted sd, over time. Grey: windows, clipped at the frame; "
+    "colour: means of pushes. The band contains 95 % of the windows of a calibrated model. Trend: change of the "
+    "residual from the first to the last window, with its 95 % interval from resampling whole pushes."
 )

@@ -1,4 +1,4 @@
-"""Which windows to show as examples, and which windows are like them."""
+"""Choose windows to show as examples, and the windows with similar inputs."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ ENOUGH = 5  # neighbours, of at least two pushes, make a window a good example
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A window (row of the table), the outcomes (m, 3) of windows with nearby inputs, and of how many pushes they are.
+    """A window (row of the table), and the outcomes (m, 3) of windows with similar inputs, of that many pushes.
 
-    Those outcomes are moved by the difference of the predicted means, so that only what the mean does not explain
-    tells them apart.
+    The outcomes are shifted by the difference of the predicted means, so that they show the unexplained part only.
     """
 
     row: int
@@ -32,7 +31,7 @@ class Example:
 
 
 def examples(outline: Outline, table: PushTable, comparison: Comparison, count: int) -> list[Example]:
-    """Up to `count` windows spread over contact and angle, of different pushes, with company where there is any."""
+    """Choose up to `count` windows of different pushes, spread over contact and angle; prefer those with neighbours."""
     where = _scaled_inputs(outline, table)
     near = [_near(outline, table, where, row) for row in range(len(table))]
     pushes = [len(set(table.push_id[rows].tolist())) for rows in near]
@@ -43,7 +42,7 @@ def examples(outline: Outline, table: PushTable, comparison: Comparison, count: 
 
 
 def spread_rows(points: Array, push_id: np.ndarray, count: int) -> IntArray:
-    """Indices of up to `count` points (n, 2) far from each other, each of another push, by the second column."""
+    """Indices of up to `count` points (n, 2) of different pushes, far from each other, sorted by the second column."""
     span = np.maximum(np.ptp(points, axis=0), 1e-12)
     scaled = (points - points.min(axis=0)) / span
     chosen = [int(np.argmin(np.linalg.norm(scaled - 0.5, axis=1)))]
@@ -58,7 +57,7 @@ def spread_rows(points: Array, push_id: np.ndarray, count: int) -> IntArray:
 
 
 def _scaled_inputs(outline: Outline, table: PushTable) -> Array:
-    """Contact (none on a circle), angle and log speed (n, 3); a unit apart is as far as counts as near."""
+    """Contact (zero on a circle), angle and log speed (n, 3), scaled so that similar windows are at most 1 apart."""
     velocity, contact, angle = table.inputs.T
     along = arc_length(outline, contact) / (NEAR_CONTACT * sector_length(outline))
     if outline.rotational_symmetry == 0:
@@ -68,7 +67,7 @@ def _scaled_inputs(outline: Outline, table: PushTable) -> Array:
 
 def _near(outline: Outline, table: PushTable, where: Array, row: int) -> IntArray:
     apart = np.abs(where - where[row])
-    if outline.semi_axes is not None:  # the way along a smooth outline is closed
+    if outline.semi_axes is not None:  # the arc length of a smooth outline is periodic
         apart[:, 0] = np.minimum(apart[:, 0], 1.0 / NEAR_CONTACT - apart[:, 0])
     same_duration = np.isclose(table.duration, table.duration[row], rtol=NEAR_SPEED)
     like = np.all(apart <= 1.0, axis=1) & same_duration

@@ -1,4 +1,4 @@
-"""Colour maps of mean or standard deviation over contact and angle, predicted beside recorded."""
+"""Colour maps of mean or standard deviation by contact and angle, predicted next to recorded."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
-CLIPPED = 3.0  # % of a panel's values at either end that may lie beyond the colour scale
-ONE_SIGNED = 0.1  # values reach at most so far (relative) to the other side of zero
+CLIPPED = 3.0  # % of a panel's values that may exceed the colour scale at each end
+ONE_SIGNED = 0.1  # largest share of the other sign in a scale of one sign
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A column of the picture: a title, a map, and whether the number of pushes is written into its cells."""
+    """A column of the figure: title, map, and whether cells show the number of pushes."""
 
     title: str
     map: PushMap
@@ -34,7 +34,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class ColourScale:
-    """One for all panels of a row: limits in shown units, name of the colour map, which ends are cut off."""
+    """The colour scale of a row: limits in shown units, name of the colour map, which ends are clipped."""
 
     low: float
     high: float
@@ -61,7 +61,7 @@ def paint_maps(figure: Figure, outline: Outline, panels: Sequence[Panel], quanti
 def paint_panel(
     ax: Axes, outline: Outline, shown: PushMap, values: Array, scale: ColourScale, counted: bool
 ) -> ScalarMappable:
-    """One map: values (A, C) in shown units; what is not known is grey and hatched."""
+    """Paint one map of values (A, C) in shown units; unknown cells are grey and hatched."""
     contact, angle = shown.cells.contact * 1e3, np.degrees(shown.cells.angle)
     ax.set_facecolor(EMPTY)
     ax.patch.set_hatch("////")
@@ -80,7 +80,7 @@ def paint_panel(
 
 
 def colour_scale(panels: Sequence[Array]) -> ColourScale:
-    """From zero, or symmetric about it where values have both signs; stray cells do not stretch it."""
+    """A scale from zero, or symmetric about zero for values of both signs; outlying cells are clipped."""
     known = [values[np.isfinite(values)] for values in panels if np.isfinite(values).any()]
     if not known:
         return ColourScale(0.0, 1.0, "viridis", "neither")
@@ -95,18 +95,18 @@ def colour_scale(panels: Sequence[Array]) -> ColourScale:
 
 
 def contact_label(outline: Outline) -> str:
-    """What the contact axis shows."""
+    """The label of the contact axis."""
     order = fold_order(outline)
     if outline.semi_axes is None and order == len(outline.vertices):
-        return f"contact, along the edge counter-clockwise (mm; all {order} edges folded into one)"
+        return f"contact along the edge, counter-clockwise (mm; all {order} edges shown as one)"
     if order > 1:
-        return f"contact, along the outline counter-clockwise (mm; {order} alike parts folded into one)"
-    alike = "; to the models all are alike" if outline.rotational_symmetry == 0 else ""
-    return f"contact, along the outline counter-clockwise from its first vertex (mm{alike})"
+        return f"contact along the outline, counter-clockwise (mm; {order} equal parts shown as one)"
+    alike = "; equal for the models" if outline.rotational_symmetry == 0 else ""
+    return f"contact along the outline, counter-clockwise from its first vertex (mm{alike})"
 
 
 def inner_corners(outline: Outline) -> Array:
-    """Where the edges of a sector meet, m along it."""
+    """Positions (m along a sector) where its edges meet."""
     starts = outline.edge_starts * outline.perimeter
     length = sector_length(outline)
     return starts[(starts > 1e-6 * length) & (starts < (1.0 - 1e-6) * length)]
@@ -119,7 +119,7 @@ def _norm(scale: ColourScale) -> Normalize:
 
 
 def _write_counts(ax: Axes, shown: PushMap, values: Array, image: ScalarMappable) -> None:
-    """The number of pushes in every cell that is shown, dark on light and light on dark."""
+    """Write the number of pushes into every known cell, dark on light and light on dark."""
     contact, angle = shown.cells.contact * 1e3, np.degrees(shown.cells.angle)
     for row, column in np.argwhere(np.isfinite(values)):
         brightness = np.dot(image.to_rgba(values[row, column])[:3], (0.3, 0.6, 0.1))

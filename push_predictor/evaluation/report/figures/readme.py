@@ -1,4 +1,4 @@
-"""The picture of the README: predicted scatter, recorded scatter, ellipses over outcomes."""
+"""The figure of the README: predicted sd, recorded sd, and ellipses with outcomes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIZE = (11.0, 3.4)
-SHOWN_OUTPUT = 2  # dtheta: its scatter depends on the push most visibly
+SHOWN_OUTPUT = 2  # dtheta: its noise depends most on the push
 EXAMPLES = 5
 EXAMPLE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8a6d00")
 
 
 def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
-    """Predicted sd of dtheta, recorded, and 95 % ellipses over outcomes, at the commonest speed; returns out_png.
+    """Draw predicted and recorded sd of dtheta and 95 % ellipses at the most common speed; return out_png.
 
     Raises PushPredictorError if matplotlib is not installed, TableError for a table without rows.
     """
@@ -50,7 +50,7 @@ def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, 
     columns = zip((left, middle), (predicted, recorded), values, ("predicted", "recorded"), strict=True)
     for ax, shown, value, title in columns:
         image = paint_panel(ax, outline, shown, value, scale, counted=False)
-        ax.set_title(f"{title} scatter at {velocity * 1e3:.0f} mm/s")
+        ax.set_title(f"{title} sd at {velocity * 1e3:.0f} mm/s")
         ax.set_xlabel("contact along the outline (mm)")
     if held:
         at = ", ".join(f"{name} {value:.3g}" for name, value in held.items())

@@ -1,4 +1,4 @@
-"""Predicted against observed, and the residuals in the order of time: is something drifting?"""
+"""Observed against predicted outcomes, and residuals over time, which show a drift."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CENTRAL = 1.96  # sd that hold 95 % of a Gaussian
+CENTRAL = 1.96  # sd: half the width of the central 95 % of a Gaussian
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """When each window (n,) happened, and the name of that axis."""
+class TimeAxis:
+    """The time (n,) of each window, and the label of the axis."""
 
     place: Array
     label: str
@@ -31,20 +31,20 @@ class Course:
 
 @dataclass(frozen=True)
 class Trend:
-    """Change of the standardised residual over the whole course, with its 95 % interval by resampling pushes."""
+    """Change of the standardised residual over the whole time, with its 95 % interval from resampling pushes."""
 
     change: float
     low: float
     high: float
 
 
-def course_of(comparison: Comparison, windows: Sequence[PushWindow] | None) -> Course:
-    """Minutes since the first window where the windows are known, else the number of the push."""
+def time_axis(comparison: Comparison, windows: Sequence[PushWindow] | None) -> TimeAxis:
+    """Minutes since the first window if the windows are known, else the number of the push."""
     if windows:
         start = np.array([window.start for window in windows], dtype=np.int64)
-        return Course((start - start.min()) / 60e9, "time since the first window (min)")
+        return TimeAxis((start - start.min()) / 60e9, "time since the first window (min)")
     number = {push: k for k, push in enumerate(dict.fromkeys(comparison.push_id.tolist()))}
-    return Course(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "number of the push")
+    return TimeAxis(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "number of the push")
 
 
 def standardised_residuals(comparison: Comparison) -> Array:
@@ -53,7 +53,7 @@ def standardised_residuals(comparison: Comparison) -> Array:
 
 
 def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
-    """Straight line through residuals (n,); None where there are fewer than three pushes or all happen at once."""
+    """Fit a line to residuals (n,); None for fewer than three pushes or if all have the same time."""
     if len(set(push_id.tolist())) < 3 or not np.ptp(place) > 0.0:
         return None
     change = _change(np.ones((1, len(place))), place, residual)[0]
@@ -62,16 +62,16 @@ def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
     return Trend(float(change), float(low), float(high))
 
 
-def paint_residuals(figure: Figure, comparison: Comparison, course: Course) -> None:
-    """Per output, above: predicted against observed; below: the standardised residual in the order of time."""
+def paint_residuals(figure: Figure, comparison: Comparison, axis: TimeAxis) -> None:
+    """Per output, top: observed against predicted; bottom: the standardised residual over time."""
     axes = figure.subplots(2, 3, height_ratios=(1.25, 1.0))
     residual = standardised_residuals(comparison)
     reach = max(3.0, float(np.percentile(np.abs(residual), 99.5)) * 1.1)
     for k in range(3):
         _paint_scatter(axes[0, k], comparison, k)
-        _paint_course(axes[1, k], course, residual[:, k], comparison.push_id, k, reach)
+        _paint_over_time(axes[1, k], axis, residual[:, k], comparison.push_id, k, reach)
     axes[1, 0].set_ylabel("residual / predicted sd")
-    axes[1, 1].set_xlabel(course.label)
+    axes[1, 1].set_xlabel(axis.label)
 
 
 def _paint_scatter(ax: Axes, comparison: Comparison, k: int) -> None:
@@ -89,22 +89,22 @@ def _paint_scatter(ax: Axes, comparison: Comparison, k: int) -> None:
     ax.locator_params(nbins=6)
 
 
-def _paint_course(ax: Axes, course: Course, residual: Array, push_id: np.ndarray, k: int, reach: float) -> None:
+def _paint_over_time(ax: Axes, axis: TimeAxis, residual: Array, push_id: np.ndarray, k: int, reach: float) -> None:
     grid(ax)
     ax.axhspan(-CENTRAL, CENTRAL, color="0.2", alpha=0.08, linewidth=0.0)
     ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
-    ax.plot(course.place, np.clip(residual, -reach, reach), "o", color="0.55", markersize=2.0, mew=0.0, alpha=0.7)
-    place, mean = _per_push(course.place, residual, push_id)
+    ax.plot(axis.place, np.clip(residual, -reach, reach), "o", color="0.55", markersize=2.0, mew=0.0, alpha=0.7)
+    place, mean = _per_push(axis.place, residual, push_id)
     ax.plot(place, mean, "o", color=COLOURS[k], markersize=4.0, mew=0.0)
-    found = trend(course.place, residual, push_id)
-    ax.set_title(_told(found), fontsize=8.0)
+    found = trend(axis.place, residual, push_id)
+    ax.set_title(_title(found), fontsize=8.0)
     ax.set_ylim(-1.05 * reach, 1.05 * reach)
 
 
-def _told(found: Trend | None) -> str:
+def _title(found: Trend | None) -> str:
     if found is None:
         return "too few pushes for a trend"
-    return f"trend {found.change:+.2f} [{found.low:+.2f}, {found.high:+.2f}] sd".replace("-", "−")
+    return f"trend {found.change:+.2f} sd (95 % CI {found.low:+.2f} to {found.high:+.2f})".replace("-", "−")
 
 
 def _per_push(place: Array, residual: Array, push_id: np.ndarray) -> tuple[Array, Array]:

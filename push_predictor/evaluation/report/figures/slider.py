@@ -1,4 +1,4 @@
-"""The slider before and after a window, drawn in the push frame: the pusher moves to the right from the origin."""
+"""The slider before and after a window, in the push frame: the pusher moves to the right from the origin."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-VISIBLE = 0.2  # of the slider's size: how far the largest motion may be drawn
+VISIBLE = 0.2  # of the slider's size: the largest motion drawn
 
 
 def paint_slider(ax: Axes, rig: Rig, inputs: Array, predicted: Array, observed: Array, enlarged: float) -> None:
-    """Outline at the start (thin), predicted and observed after the window, with the motion drawn so much larger."""
+    """Draw the outline at the start (thin), observed and predicted after the window, with the motion magnified."""
     pose = start_pose(rig.outline, inputs)
     shape = _closed(rig.outline)
     for motion, colour, width, style in (
@@ -35,7 +35,7 @@ def paint_slider(ax: Axes, rig: Rig, inputs: Array, predicted: Array, observed: 
 
 
 def start_pose(outline: Outline, inputs: Array) -> Array:
-    """Pose (3,) of the slider in a push frame with the contact point at its origin; inputs as a model takes them."""
+    """Pose (3,) of the slider in the push frame with the contact point at the origin; inputs (3,) of a model."""
     contact, angle = inputs[1:2], float(inputs[2])
     normal = outline.inward_normal(contact)[0]
     heading = -(np.arctan2(normal[1], normal[0]) + angle)
@@ -63,5 +63,5 @@ def _paint_pusher(ax: Axes, rig: Rig, inputs: Array, pose: Array) -> None:
     tail, tip = -5.0 * rig.pusher_radius - rig.pusher_radius * normal[0], -2.0 * rig.pusher_radius
     height = -rig.pusher_radius * normal[1] * 1e3
     arrow = {"arrowstyle": "-|>", "color": "0.35", "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
-    ax.update_datalim([(tail * 1e3, height)])  # an arrow alone does not widen the limits
+    ax.update_datalim([(tail * 1e3, height)])  # an arrow does not extend the limits
     ax.annotate("", (tip * 1e3, height), (tail * 1e3, height), arrowprops=arrow)

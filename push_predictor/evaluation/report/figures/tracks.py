@@ -1,4 +1,4 @@
-"""Whole pushes seen from above: where the slider's centre went, and where each window's prediction put it."""
+"""Whole pushes from above: the path of the slider's centre, and the prediction of each window."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AROUND = 0.04
 
 
 def chosen_pushes(windows: Sequence[PushWindow], count: int = MOST) -> list[list[int]]:
-    """Rows of up to `count` pushes with the most windows, of those the ones that turn the slider most differently."""
+    """Rows of up to `count` long pushes, spread over the rotation of the slider."""
     rows: dict[str, list[int]] = {}
     for row, window in enumerate(windows):
         rows.setdefault(window.push_id, []).append(row)
@@ -35,7 +35,7 @@ def chosen_pushes(windows: Sequence[PushWindow], count: int = MOST) -> list[list
 
 
 def paint_tracks(figure: Figure, windows: Sequence[PushWindow], comparison: Comparison) -> None:
-    """A panel per push, turned so that the centre of the slider goes from the origin to the right."""
+    """One panel per push, turned so that the slider's centre moves from the origin to the right."""
     pushes = chosen_pushes(windows)
     axes = figure.subplots(len(pushes), 1, squeeze=False)[:, 0]
     for number, (ax, rows) in enumerate(zip(axes, pushes, strict=True)):
@@ -46,13 +46,15 @@ def paint_tracks(figure: Figure, windows: Sequence[PushWindow], comparison: Comp
 
 def _paint_track(ax: Axes, windows: Sequence[PushWindow], comparison: Comparison, rows: Sequence[int]) -> None:
     track = np.array([windows[0].slider_start[:2], *[window.slider_end[:2] for window in windows]])
-    origin, way = track[0], track[-1] - track[0]
-    turn = -np.arctan2(way[1], way[0])
+    origin, path = track[0], track[-1] - track[0]
+    turn = -np.arctan2(path[1], path[0])
     grid(ax)
     for number, (window, row) in enumerate(zip(windows, rows, strict=True)):
         start = rotate(window.slider_start[:2] - origin, turn)
-        mean, covariance = _seen(start, window.push_heading + turn, comparison.mean[row], comparison.covariance[row])
-        paint_ellipse(ax, mean, covariance, None if number else "predicted from each window's start, 95 %")
+        mean, covariance = _in_track_frame(
+            start, window.push_heading + turn, comparison.mean[row], comparison.covariance[row]
+        )
+        paint_ellipse(ax, mean, covariance, None if number else "predicted from the start of each window, 95 %")
     seen = rotate(track - origin, turn) * UNITS[0]
     ax.plot(*seen.T, "-", color=OBSERVED, linewidth=0.8)
     ax.plot(*seen[1:].T, "D", color=OBSERVED, markersize=3.5, label="observed")
@@ -66,12 +68,12 @@ def _paint_track(ax: Axes, windows: Sequence[PushWindow], comparison: Comparison
 def _title(windows: Sequence[PushWindow], comparison: Comparison, rows: Sequence[int]) -> str:
     hits = sum(bool(inside(comparison.mean[r], comparison.covariance[r], comparison.observed[[r]])[0]) for r in rows)
     turned = np.degrees(sum(window.displacement[2] for window in windows))
-    text = f"{windows[0].velocity * 1e3:.0f} mm/s, turned by {turned:+.0f}°: {hits} of {len(rows)} inside"
+    text = f"{windows[0].velocity * 1e3:.0f} mm/s, rotation {turned:+.0f}°: {hits} of {len(rows)} inside"
     return text.replace("-", "−")
 
 
-def _seen(start: Array, heading: float, mean: Array, covariance: Array) -> tuple[Array, Array]:
-    """Predicted mean and covariance, turned from the push frame into one in which the push heads that way."""
+def _in_track_frame(start: Array, heading: float, mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Predicted mean and covariance, rotated from the push frame into one in which the push has that heading."""
     cos, sin = np.cos(heading), np.sin(heading)
     turn = np.array([[cos, -sin], [sin, cos]])
     return start + turn @ mean[:2], turn @ covariance[:2, :2] @ turn.T

@@ -1,0 +1,83 @@
+"""The sentences at the top of a validation report: error, calibration, comparison, use of training pushes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from push_predictor.evaluation.report.tables import interval_of, paired_difference, row_weights
+from push_predictor.evaluation.validation import Comparison, trained_on
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.reporting.html import number
+from push_predictor.types import Array
+
+LEVEL = 0.95
+SYMBOLS = ("Δx", "Δy", "Δθ")
+
+
+def error_sentence(metrics: Mapping[str, Any]) -> str:
+    """Which share of the variation of the outcomes the model does not predict, with its interval."""
+    total, interval = metrics["nmse"]["total"], metrics["interval"]["nmse"]
+    if total is None:
+        return f"{metrics['model']}: the outcomes do not vary, so the NMSE is undefined."
+    ends = "" if interval is None else f" (95 % CI {_rounded(interval['low'])} to {_rounded(interval['high'])})"
+    return (
+        f"{metrics['model']} predicts these pushes with a total NMSE of {_rounded(total)}{ends}: "
+        f"0 is perfect, 3 is no better than the mean outcome."
+    )
+
+
+def calibration_sentence(comparison: Comparison) -> str:
+    """Whether the predicted 95 % intervals contain 95 % of the outcomes, by output."""
+    inside = np.abs(comparison.observed - comparison.mean) <= ndtri(0.5 + LEVEL / 2.0) * np.sqrt(comparison.variance)
+    shares = ", ".join(
+        f"{100.0 * share:.0f} % of {name}" for name, share in zip(SYMBOLS, inside.mean(axis=0), strict=True)
+    )
+    verdicts = _verdicts(interval_of(inside.astype(np.float64), row_weights(comparison)))
+    return f"Its 95 % intervals contain {shares}{verdicts}."
+
+
+def comparison_sentence(main: Comparison, other: Comparison) -> str:
+    """Which of two models has the better NLPD on the same windows, with the interval of the difference."""
+    value, low, high = paired_difference(main, other)[1]
+    if not np.isfinite([low, high]).all():
+        return f"{other.model}: its NLPD differs by {_rounded(value)} nats per window; one push gives no interval."
+    if low <= 0.0 <= high:
+        ends = f"{_rounded(value)} nats per window (95 % CI {_rounded(low)} to {_rounded(high)})"
+        return f"{other.model} and {main.model} cannot be distinguished: the NLPD differs by {ends}."
+    verdict, more = ("worse", "higher") if low > 0.0 else ("better", "lower")
+    nearest, farthest = sorted((abs(low), abs(high)))
+    ends = f"95 % CI {_rounded(nearest)} to {_rounded(farthest)}"
+    return (
+        f"{other.model} is {verdict} than {main.model}: "
+        f"its NLPD is {_rounded(abs(value))} nats per window {more} ({ends})."
+    )
+
+
+def training_sentence(models: Sequence[PushModel], table: PushTable) -> tuple[str, bool]:
+    """How many of the pushes were used for training, and whether any was."""
+    used = {model.name: len(trained_on(model, table)) for model in models}
+    pushes = f"{len(table.pushes)} {'push' if len(table.pushes) == 1 else 'pushes'}"
+    if not any(used.values()):
+        return "No push was used for training: whole pushes are held out.", False
+    names = ", ".join(f"{count} for {name}" for name, count in used.items() if count)
+    return f"Some of these {pushes} were used for training ({names}): the scores of these models are optimistic.", True
+
+
+def _rounded(value: float) -> str:
+    return number(value, 3, zeros=True)
+
+
+def _verdicts(ends: Array) -> str:
+    """For each output that is miscalibrated beyond chance: too narrow or too wide; ends (2, 3)."""
+    low, high = ends
+    narrow = [name for name, end in zip(SYMBOLS, high, strict=True) if end < LEVEL]
+    wide = [name for name, end in zip(SYMBOLS, low, strict=True) if end > LEVEL]
+    found = (("too narrow", narrow), ("too wide", wide))
+    if parts := [f"{verdict} for {', '.join(names)}" for verdict, names in found if names]:
+        return f": they are {' and '.join(parts)}"
+    return ": no miscalibration beyond chance" if np.isfinite(ends).all() else ""
