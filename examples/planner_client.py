@@ -18,7 +18,7 @@ from std_msgs.msg import Header
 
 from msg_adapters.predictions import PushQuery, RefusedError, prediction_from_response, query_to_batch_request
 from push_predictor.geometry.frames import quaternion_of_yaw
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.planning.repertoire import StraightPushes
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushStep

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor.errors import PushPredictorError, RequestError
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
 from push_predictor.types import Array
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch

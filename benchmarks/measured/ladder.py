@@ -24,7 +24,6 @@ from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanisms import LIBRARY
-from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.importers import import_source
@@ -168,7 +167,6 @@ def _judged(model: PushModel, found: SelectedTerm, rest: PushTable, gate: PushTa
     best = found.best
     evidence = evidence_of(model, rest)
     after = extend(model, evidence, [candidate(evidence, best.mechanism, best.covariate, best.basis)])
-    assert isinstance(after.predictor, ExtendedPredictor)
     effect, (_, nlpd) = after.predictor.effects[-1], gain(model, after, gate)
     refused = "" if nlpd.high < 0.0 else "no gain at the gate"
     if not _plausible(effect, rest):

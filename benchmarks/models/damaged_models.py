@@ -19,7 +19,8 @@ import numpy as np
 
 from benchmarks.models.made_up_models import drifting_effect, extended_model, made_up_table, square_rig
 from push_predictor.errors import ModelFileError
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 

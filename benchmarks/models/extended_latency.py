@@ -24,7 +24,9 @@ from benchmarks.models.made_up_models import (
     made_up_table,
 )
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import ExtendedPredictor, Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import Moments
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -59,14 +61,15 @@ def main() -> None:
 
 def _before(model: PushModel) -> Ask:
     """The table for the base, and arrays for the effects."""
-    if not isinstance(predictor := model.predictor, ExtendedPredictor):
+    predictor = model.predictor
+    if not predictor.effects:
         return model.predict_rows
     base = tabulate(model.base)
 
     def predict_rows(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
         found = base.predict_rows(inputs, duration)
-        moments = found.mean, found.covariance, found.process_covariance
-        return Prediction(*predictor.extended(moments, Push(inputs, duration, covariates)), found.in_domain)
+        moments = Moments(found.mean, found.covariance, found.process_covariance)
+        return Prediction(*predictor.with_effects(moments, Push(inputs, duration, covariates)), found.in_domain)
 
     return predict_rows
 

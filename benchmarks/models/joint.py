@@ -25,9 +25,9 @@ from push_predictor.evaluation.estimate import Estimate, of_draws
 from push_predictor.evaluation.metrics import joint_nlpd
 from push_predictor.evaluation.splits import FOLDS, push_bootstrap
 from push_predictor.evaluation.validation import by_push
-from push_predictor.models.correlation import Correlation
-from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors.correlation import Correlation
+from push_predictor.models.predictors.correlation_fit import fit_correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.load import load_data, load_rig_for

@@ -10,7 +10,8 @@ from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -56,5 +57,4 @@ def drifting_effect(mechanism: str | None, *size: float) -> Effect:
 
 def extended_model(base: PushModel, *effects: Effect) -> PushModel:
     """The base with these effects."""
-    assert not isinstance(base.predictor, ExtendedPredictor)
-    return replace(base, predictor=ExtendedPredictor(base.predictor, square_physics(), effects, np.ones(3)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor.base, square_physics(), effects, np.ones(3)))

@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.planning.planner_table import Regime, Runs, table
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model

@@ -41,7 +41,7 @@ def recorded_windows(
 
 def window_options(model: PushModel) -> WindowOptions:
     """Windows of the length that a learnt model was trained on; 0.2 s for the analytical one."""
-    if model.kind == "analytical":
+    if not model.predictor.learnt:
         return WindowOptions()
     return WindowOptions(duration=float(model.training.duration[0]))
 

@@ -14,30 +14,12 @@ from push_predictor.models.effects.covariate_range import CovariateRange, range_
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import (
-    AnalyticalPredictor,
-    ExtendedPredictor,
-    GaussianProcessPredictor,
-    Scaling,
-    scaled_features,
-)
+from push_predictor.models.predictors import Moments, Predictor
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_pushes
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
-from push_predictor.types import Array, BoolArray
-
-__all__ = [
-    "KINDS",
-    "AnalyticalPredictor",
-    "ExtendedPredictor",
-    "GaussianProcessPredictor",
-    "Prediction",
-    "Provenance",
-    "PushModel",
-    "Scaling",
-    "scaled_features",
-]
+from push_predictor.types import Array, BoolArray, IntArray
 
 KINDS = ("vhgp", "gp", "analytical")
 DURATION_TOLERANCE = 0.1  # a learnt model answers for durations this close (relative) to those it was trained on
@@ -64,7 +46,7 @@ class PushModel:
     name: str
     kind: str
     rig: Rig
-    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor
+    predictor: Predictor
     training: PushTable
     provenance: Provenance
 
@@ -110,8 +92,19 @@ class PushModel:
 
     @cached_property
     def base(self) -> PushModel:
-        """The model without its effects; itself, where it has none."""
-        return replace(self, predictor=self.predictor.base) if isinstance(self.predictor, ExtendedPredictor) else self
+        """The model without its effects; itself if it has none."""
+        return replace(self, predictor=self.predictor.base) if self.predictor.effects else self
+
+    def held_out_moments(self, block: IntArray | None = None) -> Moments:
+        """Moments at the n training rows, each predicted without the rows of its block; hyperparameters are kept.
+
+        block (n,): number of each row's block; None for leave-one-push-out. An analytical base was not fitted as a
+        function of the inputs, so its moments are those of `predict_rows`.
+        """
+        rows = self.training
+        if block is None:
+            block = np.unique(rows.push_id, return_inverse=True)[1]
+        return self.predictor.held_out_moments(Push(rows.inputs, rows.duration, rows.covariates), block)
 
     def exact_log_density(self, table: PushTable) -> Array | None:
         """Log density (n, 3) of a table's outcomes under the exact predictive, None where that is the Gaussian."""
@@ -133,7 +126,7 @@ class PushModel:
         Raises KeyError where one is missing.
         """
         seen = np.ones(len(push.inputs), dtype=np.bool_)
-        if self.covariate_ranges and isinstance(self.predictor, ExtendedPredictor):
+        if self.covariate_ranges:
             covariates = self.predictor.completed(push).covariates
             for name, known in self.covariate_ranges.items():
                 seen &= known.holds(covariates[name])
@@ -145,11 +138,11 @@ class PushModel:
 
         The model's own inputs have `in_domain`.
         """
-        if not isinstance(self.predictor, ExtendedPredictor):
+        if not self.predictor.covariates:
             return {}
         rows = self.training
         known = self.predictor.completed(Push(rows.inputs, rows.duration, rows.covariates)).covariates
-        return {name: range_of(name, known[name]) for name in self.predictor.takes if name not in INPUTS}
+        return {name: range_of(name, known[name]) for name in self.predictor.covariates if name not in INPUTS}
 
     @cached_property
     def training_mean(self) -> Array:
@@ -159,7 +152,7 @@ class PushModel:
     @cached_property
     def duration_range(self) -> tuple[float, float]:
         """Durations (s) that this model answers for."""
-        if self.kind == "analytical":
+        if not self.predictor.learnt:
             return 0.0, float("inf")
         durations = self.training.duration
         return (1.0 - DURATION_TOLERANCE) * durations.min(), (1.0 + DURATION_TOLERANCE) * durations.max()

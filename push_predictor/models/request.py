@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.pushes import Pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -110,7 +109,7 @@ def _check(
     low, high = model.duration_range
     near = "{:.3g} to {:.3g} s, near what {} was trained on"
     _require("duration", duration, (duration >= low) & (duration <= high), near, low, high, model.name)
-    if not isinstance(model.predictor, GaussianProcessPredictor):
+    if model.predictor.integrates:
         most = "at most {:.3g} m/s for {:g} s: a path of {:g} m"
         within = velocity * duration <= FARTHEST
         _require("velocity", velocity, within, most, FARTHEST / duration, duration, FARTHEST)

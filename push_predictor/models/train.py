@@ -10,23 +10,16 @@ import numpy as np
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
-from push_predictor.models.correlation_fit import fit_correlation
 from push_predictor.models.features import push_features
-from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
+from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
+from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
-from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
-from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
+from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
-from push_predictor.models.push_model import (
-    KINDS,
-    AnalyticalPredictor,
-    GaussianProcessPredictor,
-    Provenance,
-    PushModel,
-    Scaling,
-    scaled_features,
-)
+from push_predictor.models.predictors import AnalyticalPredictor, GaussianProcessPredictor, Predictor, Scaling
+from push_predictor.models.predictors.correlation_fit import fit_correlation
+from push_predictor.models.push_model import KINDS, Provenance, PushModel
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
@@ -48,7 +41,7 @@ class TrainingOptions:
 
     n_train: draw this many rows at random with default_rng(seed). None takes all rows up to 1000; of more, it draws
     1000 evenly over the pushes. fit: estimate friction and pressure of an analytical model; otherwise the textbook's
-    values are used. kernels: of a learned model. inducing: number of inducing inputs of a VHGP. None trains a dense
+    values are used. kernels: of a learnt model. inducing: number of inducing inputs of a VHGP. None trains a dense
     VHGP on up to MOST_DENSE_ROWS rows, and beyond that a sparse one with DEFAULT_INDUCING.
     """
 
@@ -88,14 +81,28 @@ def train_model(
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     inducing = inducing_inputs(kind, len(rows), options.inducing)
     with one_blas_thread():
-        predictor: GaussianProcessPredictor | AnalyticalPredictor = (
+        predictor: Predictor = (
             _analytical(rows, rig, options.fit)
             if kind == "analytical"
-            else _learned(rows, rig, kind, options.kernels, inducing, watch)
+            else _learnt(rows, rig, kind, options.kernels, inducing, watch)
         )
     watch(f"trained {kind} on {len(rows)} windows of {len(rows.pushes)} pushes", 1.0)
     provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
     return PushModel(name, kind, rig, predictor, rows, provenance)
+
+
+def retrain_model(model: PushModel, table: PushTable) -> PushModel:
+    """The model without effects, trained again on a table.
+
+    A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. An analytical one
+    keeps its friction and pressure, and its covariance is estimated again. Raises TrainingError for too few rows.
+    """
+    name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
+    if isinstance(predictor := model.predictor, GaussianProcessPredictor):
+        options = TrainingOptions(seed=seed, kernels=predictor.regressions[0].parameters.choice)
+        return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
+    provenance = Provenance(sources, len(table.pushes), seed, __version__)
+    return PushModel(name, model.kind, model.rig, _with_covariance(predictor.physics, table), table, provenance)
 
 
 def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | None:
@@ -128,13 +135,12 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
 
 
-def _learned(
+def _learnt(
     rows: PushTable, rig: Rig, kind: str, kernels: KernelChoice, inducing: int | None, watch: Watch
 ) -> GaussianProcessPredictor:
     scaling = _scaling(rows, rig)
-    features = scaled_features(rig, scaling, rows.inputs)
-    scaled = (rows.outcomes - scaling.outcome_mean) / scaling.outcome_sd
-    regressions: list[GaussianProcess | VHGP | SparseVHGP] = []
+    features, scaled = scaling.features(rig.outline, rows.inputs), scaling.outcomes(rows.outcomes)
+    regressions: list[Regression] = []
     for output, column in zip(OUTPUTS, scaled.T, strict=True):
         watch(f"train {kind}: {output}", 0.3 * len(regressions))
         regressions.append(_regression(features, column, kind, kernels, inducing))
@@ -143,9 +149,7 @@ def _learned(
     return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
 
 
-def _regression(
-    features: Array, column: Array, kind: str, kernels: KernelChoice, inducing: int | None
-) -> GaussianProcess | VHGP | SparseVHGP:
+def _regression(features: Array, column: Array, kind: str, kernels: KernelChoice, inducing: int | None) -> Regression:
     if kind == "gp":
         return fit_gp(features, column, kernels)
     if inducing is None:
@@ -179,5 +183,10 @@ def _analytical(rows: PushTable, rig: Rig, fit: bool) -> AnalyticalPredictor:
     physics = AnalyticalPush(rig.outline, rig.pusher_radius)
     if fit:
         physics = fit_analytical(physics, rows.inputs, rows.duration, rows.outcomes)
+    return _with_covariance(physics, rows)
+
+
+def _with_covariance(physics: AnalyticalPush, rows: PushTable) -> AnalyticalPredictor:
+    """The analytical predictor with the covariance of its residuals on these rows."""
     residuals = rows.outcomes - physics.displacement(rows.inputs, rows.duration)
     return AnalyticalPredictor(physics, residuals.T @ residuals / len(residuals))

@@ -13,7 +13,7 @@ from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import checked_rate
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import Stop, run

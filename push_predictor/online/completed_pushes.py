@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array

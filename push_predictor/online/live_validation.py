@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.evaluation.validation import Comparison, comparison_of, metrics_json
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.push_model import PushModel
 from push_predictor.online.files.row_file import RowFile
 from push_predictor.online.files.window_log import Refusal, write_window_log
 from push_predictor.online.files.window_rows import WindowRows

@@ -21,9 +21,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.optimize import nnls
 
-from push_predictor.models.gaussian_process.cross_validation import moments_left_out
-from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import PushTable
@@ -77,7 +74,7 @@ def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
 def whitened_residuals(model: PushModel) -> Array:
     """Residuals (n, 3) of the training rows in units of the root of the covariance predicted without their pushes."""
     rows = model.training
-    mean, covariance, _ = _moments_unseen(model, Push(rows.inputs, rows.duration, rows.covariates))
+    mean, covariance, _ = model.held_out_moments()
     # A covariance without noise has no inverse.
     return np.asarray((np.linalg.pinv(root_of(covariance)) @ (rows.outcomes - mean)[:, :, None])[:, :, 0])
 
@@ -90,16 +87,6 @@ def root_of(covariance: Array) -> Array:
     values, vectors = np.linalg.eigh(covariance / (sd[:, :, None] * sd[:, None, :]))
     roots = np.sqrt(np.maximum(values, 0.0))  # below zero by rounding
     return np.asarray(sd[:, :, None] * ((vectors * roots[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
-
-
-def _moments_unseen(model: PushModel, push: Push) -> tuple[Array, Array, Array]:
-    """The model's moments at its training rows, by a learnt base without their pushes."""
-    predictor = model.predictor
-    base = predictor.base if isinstance(predictor, ExtendedPredictor) else predictor
-    if not isinstance(base, GaussianProcessPredictor):
-        return predictor.moments(push)
-    moments = moments_left_out(base, np.unique(model.training.push_id, return_inverse=True)[1])
-    return predictor.extended(moments, push) if isinstance(predictor, ExtendedPredictor) else moments
 
 
 def _way_between(table: PushTable, first: IntArray, second: IntArray) -> Array:

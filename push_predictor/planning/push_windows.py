@@ -36,7 +36,7 @@ def windows_of(model: PushModel, duration: float) -> PushWindows:
     usual = float(np.median(model.training.duration))
     if duration > MOST_WINDOWS * usual:
         raise RequestError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
-    if model.kind == "analytical":
+    if not model.predictor.learnt:
         count = max(1, round(duration / usual))
         return PushWindows(count, duration / count, duration / count, 1.0)
     low, high = model.duration_range

@@ -20,7 +20,7 @@ import numpy as np
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.types import Array, BoolArray, IntArray
 
 SIGMA = np.sqrt(6.0) * np.concatenate([np.eye(6), -np.eye(6)])  # (12, 6), mean 0, covariance 1

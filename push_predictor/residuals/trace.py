@@ -16,7 +16,6 @@ import numpy as np
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.rig import Rig
@@ -265,7 +264,7 @@ def _extension(context: _Context, motion: MotionFinding) -> _Extension:
     candidates = [term.best for term in motion.terms if not term.own]
     after = extend(refit, evidence, candidates) if candidates else refit
     predictor = after.predictor
-    new = predictor.effects[-len(candidates) :] if candidates and isinstance(predictor, ExtendedPredictor) else ()
+    new = predictor.effects[-len(candidates) :] if candidates else ()
     added = iter(new)
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(estimated_effects(evidence, [t.best])[0][0] if t.own else next(added) for t in motion.terms)

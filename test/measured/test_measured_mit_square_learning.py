@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from likelihoods import log_marginal_likelihood
 from mit_square_fits import fit_scaled, load_square, mean_scores, random_split
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -79,4 +80,4 @@ def test_gp_finds_as_good_a_likelihood_as_scikit_learn(measured_data: Path) -> N
         kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
         theirs = GaussianProcessRegressor(kernel, alpha=0.0).fit(ours.inputs, ours.outputs)
         assert isinstance(ours, GaussianProcess)
-        assert ours.log_marginal_likelihood >= theirs.log_marginal_likelihood_value_ - 0.01
+        assert log_marginal_likelihood(ours) >= theirs.log_marginal_likelihood_value_ - 0.01

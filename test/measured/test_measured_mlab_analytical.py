@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support_points import support_of_points
 
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
-from push_predictor.models.mechanics.limit_surface import Support, support_of_points, uniform_support
+from push_predictor.models.mechanics.limit_surface import Support, uniform_support
 
 TRIANGLE = Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))
 SUPPORT_POINTS = {  # mm in the frame of the right angle, and load shares, as the data's description gives them

@@ -15,19 +15,17 @@ from synthetic import square_rig
 
 from push_predictor.errors import ModelFileError
 from push_predictor.evaluation.metrics import joint_nlpd
-from push_predictor.models import correlation_fit
-from push_predictor.models.correlation import Correlation, correlated, correlations, covariances
-from push_predictor.models.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, scaled_features
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, correlation_fit
+from push_predictor.models.predictors.correlation import Correlation, correlated, correlations, covariances
+from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONGEST, fit_correlation
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -117,7 +115,7 @@ def test_many_points_are_asked_in_parts(monkeypatch: pytest.MonkeyPatch, model: 
     correlation = correlation_of(model)
     asked = np.random.default_rng(1).standard_normal((500, 2))
     whole = correlation.at(asked)
-    monkeypatch.setattr("push_predictor.models.correlation._WEIGHTS_AT_ONCE", 7 * len(correlation.features))
+    monkeypatch.setattr("push_predictor.models.predictors.correlation._WEIGHTS_AT_ONCE", 7 * len(correlation.features))
     assert correlation.at(asked) == pytest.approx(whole, abs=1e-12)
 
 
@@ -178,7 +176,7 @@ def test_no_correlation_is_found_where_there_is_none() -> None:
     scaling, found = model.predictor.scaling, 0
     for seed in range(20):
         table = pushes(240, seed, 0.0)
-        features = scaled_features(model.rig, scaling, table.inputs)
+        features = scaling.features(model.rig.outline, table.inputs)
         scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
         regressions = tuple(
             GaussianProcess(features, column, r.parameters)
@@ -199,12 +197,12 @@ def test_no_residual_counts_for_more_than_is_expected_of_it(model: PushModel) ->
     assert lengths.max() == pytest.approx(LONGEST, rel=1e-6) and lengths.min() < 1.0
 
 
-# --- left out -------------------------------------------------------------------------------------------------------
+# --- held out -------------------------------------------------------------------------------------------------------
 
 
-def test_left_out_is_what_the_other_blocks_say(model: PushModel) -> None:
+def test_held_out_correlation_is_that_of_the_other_blocks(model: PushModel) -> None:
     correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH % 5
-    found = correlation.left_out(correlation.features, block)
+    found = correlation.held_out(correlation.features, block)
     for number in range(5):
         out = block == number
         others = Correlation(
@@ -224,21 +222,21 @@ def test_of_many_rows_it_keeps_some(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     found = correlation_of(load_model(tmp_path / "m"))
     assert isinstance(model.predictor, GaussianProcessPredictor)
     everywhere, block = model.predictor.regressions[0].inputs, np.arange(len(model.training)) // PER_PUSH
-    assert np.array_equal(found.left_out(everywhere, block), correlation.left_out(everywhere, block))
+    assert np.array_equal(found.held_out(everywhere, block), correlation.held_out(everywhere, block))
     own = correlation.rows[7]
     others = block[correlation.rows] != block[own]
     expected = replace(correlation, features=correlation.features[others], residuals=correlation.residuals[others])
-    assert found.left_out(everywhere, block)[own] == pytest.approx(expected.at(everywhere[[own]])[0], abs=1e-12)
+    assert found.held_out(everywhere, block)[own] == pytest.approx(expected.at(everywhere[[own]])[0], abs=1e-12)
 
 
-def test_moments_left_out_are_full_ones(model: PushModel) -> None:
+def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
     assert isinstance(model.predictor, GaussianProcessPredictor)
     correlation, block = correlation_of(model), np.arange(len(model.training)) // PER_PUSH
-    mean, total, process = moments_left_out(model.predictor, block)
-    plain = moments_left_out(alone(model), block)
+    mean, total, process = model.held_out_moments(block)
+    plain = replace(model, predictor=alone(model)).held_out_moments(block)
     assert np.array_equal(mean, plain[0])
     sd = np.sqrt(np.diagonal(plain[2], axis1=1, axis2=2))
-    assert process == pytest.approx(correlated(sd, correlation.left_out(correlation.features, block)), rel=1e-9)
+    assert process == pytest.approx(correlated(sd, correlation.held_out(correlation.features, block)), rel=1e-9)
     assert np.all(np.linalg.eigvalsh(total - process) > 0.0)
     assert np.abs(total[:, 0, 2]).max() > 0.0
 

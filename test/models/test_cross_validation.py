@@ -1,4 +1,4 @@
-"""What a regression says of its own rows without their block, against the regression that never had them."""
+"""Leave-block-out predictions in closed form, against regressions that never had the block."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from synthetic import square_rig
 
-from push_predictor.models.gaussian_process.cross_validation import left_out, moments_left_out
 from push_predictor.models.gaussian_process.gp import GaussianProcess, fit_gp
 from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
@@ -21,7 +20,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 BLOCKS = 6
-TO = 1e-2  # nats, to which the noise of rows left over is solved for
+TO = 1e-2  # nats, to which the noise of the remaining rows is solved for
 FIELDS = ("mean", "variance", "log_noise_mean", "log_noise_variance")
 
 
@@ -46,7 +45,7 @@ def conditioned(regression: GaussianProcess | VHGP, inputs: Array, outputs: Arra
 
 
 def refitted(regression: GaussianProcess | VHGP, block: IntArray) -> dict[str, Array]:
-    """The same, from regressions that are solved for anew on the rows of the other blocks."""
+    """The same, from regressions that are solved again on the rows of the other blocks."""
     found = {name: np.empty(len(block)) for name in FIELDS}
     for number in range(BLOCKS):
         out = block == number
@@ -58,10 +57,10 @@ def refitted(regression: GaussianProcess | VHGP, block: IntArray) -> dict[str, A
 
 
 @pytest.mark.parametrize("n", [120, 400], ids=["dense", "low rank"])
-def test_a_gp_without_a_block_is_the_gp_that_never_had_it(n: int) -> None:
+def test_held_out_gp_equals_gp_conditioned_on_other_blocks(n: int) -> None:
     inputs, outputs, block = rows(n)
     regression = fit_gp(inputs, outputs)
-    found, expected = left_out(regression, block), refitted(regression, block)
+    found, expected = regression.held_out(block), refitted(regression, block)
     for name in FIELDS:
         np.testing.assert_allclose(getattr(found, name), expected[name], rtol=1e-5, atol=1e-8)
 
@@ -69,10 +68,10 @@ def test_a_gp_without_a_block_is_the_gp_that_never_had_it(n: int) -> None:
 @pytest.mark.parametrize(
     "choice", [KernelChoice(), KernelChoice("matern52", noise_nugget=True)], ids=["plain", "nugget"]
 )
-def test_a_vhgp_without_a_block_is_nearly_the_one_solved_for_without_it(choice: KernelChoice) -> None:
+def test_held_out_vhgp_is_close_to_vhgp_solved_on_other_blocks(choice: KernelChoice) -> None:
     inputs, outputs, block = rows(300)
     regression = fit_vhgp(inputs, outputs, choice, most_iterations=15)
-    found, expected = left_out(regression, block), refitted(regression, block)
+    found, expected = regression.held_out(block), refitted(regression, block)
     sd = np.sqrt(expected["variance"] + np.exp(expected["log_noise_mean"]))
     own = regression.predict(inputs)
     for name, unit, most in (("mean", sd, 0.05), ("log_noise_mean", 1.0, 0.1)):
@@ -84,16 +83,16 @@ def test_a_vhgp_without_a_block_is_nearly_the_one_solved_for_without_it(choice: 
         assert np.mean((ratio > 0.7) & (ratio < 1.4)) > 0.95, name
 
 
-def test_left_out_residuals_are_as_large_as_those_of_new_rows() -> None:
+def test_held_out_residuals_are_as_large_as_those_of_new_rows() -> None:
     inputs, outputs, block = rows(300)
     regression = fit_vhgp(inputs, outputs, most_iterations=15)
     new_inputs, new_outputs, _ = rows(2000, seed=1)
-    old, new = left_out(regression, block), regression.predict(new_inputs)
+    old, new = regression.held_out(block), regression.predict(new_inputs)
     size = np.std((outputs - old.mean) / np.sqrt(old.outcome_variance))
     assert size == pytest.approx(np.std((new_outputs - new.mean) / np.sqrt(new.outcome_variance)), rel=0.1)
 
 
-def test_the_moments_of_a_body_are_those_of_its_regressions_in_si_units() -> None:
+def test_held_out_moments_of_predictor_are_those_of_its_regressions_in_si_units() -> None:
     rng, n = np.random.default_rng(3), 80
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-0.9, 0.9, n)])
     outcomes = rng.standard_normal((n, 3)) * [1e-3, 1e-3, 1e-2] + [4e-3, 0.0, 0.0]
@@ -103,7 +102,7 @@ def test_the_moments_of_a_body_are_those_of_its_regressions_in_si_units() -> Non
     ).predictor
     assert isinstance(predictor, GaussianProcessPredictor)
     block = np.arange(n) // 4 % BLOCKS
-    found = moments_left_out(predictor, block)
+    found = predictor.held_out_moments(Push(inputs, np.full(n, 0.2), {}), block)
     for number in range(BLOCKS):
         out = block == number
         without = tuple(conditioned(r, r.inputs[~out], r.outputs[~out]) for r in predictor.regressions)

@@ -23,7 +23,9 @@ from push_predictor.models.effects.covariate_range import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import KINDS, ExtendedPredictor, Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
@@ -339,7 +341,7 @@ DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "number": (lambda e: e.update(coefficients=[float("nan")]), r"effect 1: coefficients \[nan\], 1 finite numbers"),
     "size": (lambda e: e.update(coefficients=[1.0, 2.0]), r"effect 1: coefficients \[1.0, 2.0\], 1 finite numbers"),
     "absent": (lambda e: e.pop("outcome_scale"), "effect 1: 'outcome_scale'"),
-    "driver": (lambda e: e["form"].update(drivers=["moon"]), "covariate moon, which the training rows do not hold"),
+    "driver": (lambda e: e["form"].update(drivers=["moon"]), "covariate moon, which the training rows lack"),
 }
 
 

@@ -12,10 +12,8 @@ from sparse_rows import PARAMETERS, rows
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.gaussian_process.cross_validation import left_out
 from push_predictor.models.gaussian_process.kernels import KernelChoice
 from push_predictor.models.gaussian_process.sparse.bound import SparseProblem
-from push_predictor.models.gaussian_process.sparse.cross_validation import sparse_left_out
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.sparse.inducing import inducing_rows
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
@@ -93,22 +91,22 @@ def test_one_input_is_predicted_as_in_a_batch(fitted: SparseVHGP) -> None:
         assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-7)
 
 
-def test_left_out_it_says_what_a_dense_model_does_left_out() -> None:
+def test_held_out_predictions_equal_those_of_a_dense_model() -> None:
     dense, sparse = dense_and_sparse(300)
     block = np.random.default_rng(0).integers(0, 40, size=300)
-    of_dense, of_sparse = left_out(dense, block), sparse_left_out(sparse, block)
+    of_dense, of_sparse = dense.held_out(block), sparse.held_out(block)
     for name in ("mean", "variance", "log_noise_mean", "log_noise_variance"):
         np.testing.assert_allclose(getattr(of_sparse, name), getattr(of_dense, name), atol=1e-4, err_msg=name)
 
 
-def test_left_out_a_row_does_not_know_itself() -> None:
-    """A value that no other row would expect moves what is predicted where it is, but not with the row left out."""
+def test_held_out_prediction_does_not_depend_on_the_row_itself() -> None:
+    """A wrong value moves the prediction at its row, but not the held-out one."""
     _, sparse = dense_and_sparse(300)
     wrong = sparse.outputs.copy()
     wrong[7] += 3.0
     chosen = sparse.inducing_signal, sparse.inducing_noise
     told = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
-    one, other = (sparse_left_out(model, np.arange(300)).mean[7] for model in (sparse, told))
+    one, other = (model.held_out(np.arange(300)).mean[7] for model in (sparse, told))
     assert one == pytest.approx(other, abs=1e-9)
     assert told.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
 

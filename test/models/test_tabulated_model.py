@@ -14,10 +14,11 @@ from synthetic import triangle
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.correlation import Correlation
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import GaussianProcessPredictor
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.predictors.correlation import Correlation
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along

@@ -16,7 +16,7 @@ from msg_adapters.markers import CHI2_95_OF_TWO, MAGNIFICATION, NORMAL_95, magni
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import displaced
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.validator.window_markers import LIMIT, error_in_sd, window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow

@@ -27,7 +27,7 @@ from msg_adapters.residuals import ValidatedWindow, residual_to_message
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
 
 CORRELATIONS = st.floats(-0.95, 0.95)

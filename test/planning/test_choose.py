@@ -11,7 +11,7 @@ from scipy.stats import norm
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.planning.choose import choose_push
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.repertoire import Repertoire, StraightPushes, push_grid, repertoire

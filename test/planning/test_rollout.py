@@ -19,7 +19,8 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import AnalyticalPredictor, ExtendedPredictor, Provenance, PushModel
+from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
+from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.train import train_model
 from push_predictor.planning.particles import Deviations
 from push_predictor.planning.persistence import INDEPENDENT, Persistence, fit_persistence, persistence_of, root_of
@@ -343,8 +344,9 @@ def test_a_singular_covariance_of_the_start_is_accepted() -> None:
 
 @dataclass(eq=False)
 class Attentive:
-    """A body that needs covariates, and remembers what it was given."""
+    """A predictor that needs covariates, and remembers what it was given."""
 
+    learnt, integrates, effects, covariates = False, True, (), ()
     needs: tuple[str, ...]
     seen: list[Push] = field(default_factory=list)
 
@@ -357,7 +359,7 @@ class Attentive:
 
 def test_covariates_of_the_pose_are_those_of_each_sample() -> None:
     predictor = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))
-    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a body of the test's own
+    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
     start = np.array([0.1, 0.2, 3.1])
     rolled = rollout(model, start, CERTAIN, [[0.02, 0.125, 0.3, 0.2]] * 2, 3, persistence=INDEPENDENT)
     first, second = (push.covariates for push in predictor.seen)
@@ -374,7 +376,7 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
     form, size = DriverBasis("constant"), np.array([0.4, 0.2])
     effect = Effect("anisotropic_friction", "push_heading", form, size, np.zeros((2, 2)), np.ones(3))
     physics = AnalyticalPush(base.rig.outline, RADIUS)
-    model = replace(base, predictor=ExtendedPredictor(base.predictor, physics, (effect,), np.ones(3)))
+    model = replace(base, predictor=ExtendedPredictor(base.predictor.base, physics, (effect,), np.ones(3)))
     assert model.needs == ("slider_heading",)
     moved = []
     for heading in (0.0, 0.8):
@@ -393,7 +395,7 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
 
 def test_a_covariate_that_no_pose_tells_is_refused_by_name() -> None:
     predictor = Attentive(("slider_heading", "elapsed_time"))
-    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a body of the test's own
+    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
     with pytest.raises(RequestError, match=r"made.*this one needs elapsed_time$"):
         rollout(model, AT_REST, CERTAIN, [PUSH], 3)
 

@@ -20,7 +20,8 @@ from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter, WorldPush, slider_after
@@ -256,7 +257,7 @@ def leaning(covariate: str) -> PushModel:
     form = DriverBasis("linear", (covariate,), (0.0,), (1.0,))
     effect = Effect("contact_friction", covariate, form, np.array([0.1]), np.array([[1e-4]]), np.ones(3))
     training = replace(base.training, covariates={covariate: np.linspace(-4.0, 4.0, len(base.training))})
-    predictor = ExtendedPredictor(base.predictor, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
+    predictor = ExtendedPredictor(base.predictor.base, AnalyticalPush(base.rig.outline, RADIUS), (effect,), np.ones(3))
     return replace(base, predictor=predictor, training=training)
 
 

@@ -23,7 +23,7 @@ from rclpy.qos import (
 )
 from ros_harness import REPOSITORY, free_domain, node_process, ros_context, wait_until
 
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.validator.window_markers import window_markers
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.windows.push_window import PushWindow

@@ -11,7 +11,8 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 
 NOISE = np.array([1e-4, 1e-4, 3e-3])
@@ -52,4 +53,4 @@ def grain(size: float) -> Effect:
 
 
 def extended(base: PushModel, *effects: Effect, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> PushModel:
-    return replace(base, predictor=ExtendedPredictor(base.predictor, physics(), effects, np.array(scale)))
+    return replace(base, predictor=ExtendedPredictor(base.predictor.base, physics(), effects, np.array(scale)))

@@ -13,7 +13,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
@@ -102,7 +102,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
     evidence = evidence_of(model, analysis)
     candidates = [candidate(evidence, e.mechanism, e.covariate, e.basis) for e in effects]
     after = extend(refit, evidence, candidates) if effects else refit
-    terms = after.predictor.effects if isinstance(after.predictor, ExtendedPredictor) else ()
+    terms = after.predictor.effects
     nmse, nlpd = gain(refit, after, held, model.training_mean) if terms else (Gain(0.0, 0.0, 0.0),) * 2
     before, again, last = (compared(m, held, model.training_mean) for m in (model, refit, after))
     return Trace(

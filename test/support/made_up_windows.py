@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.windows.push_window import PushWindow
 
 BEGIN = 1_700_000_000_000_000_000

@@ -25,11 +25,9 @@ from push_predictor.evaluation.alarm.evidence import (
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.splits import push_folds
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import FEWEST_STEPS, LONGEST_STEP
-from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array
@@ -119,7 +117,7 @@ def calibrate(model: PushModel) -> Calibration:
         raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
     mean, covariance = held_out_moments(model)
     mechanisms = tuple(mechanism for mechanism in LIBRARY if _computable(mechanism, table))
-    blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, _physics(model), np.empty(0))
+    blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, model.base.predictor.physics, np.empty(0))
     rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
     parts = _parts(blank, table, mean, covariance)
     known = replace(blank, alike=np.array([_alike(*part, rows) for part in parts]))
@@ -128,14 +126,8 @@ def calibrate(model: PushModel) -> Calibration:
 
 def held_out_moments(model: PushModel) -> tuple[Array, Array]:
     """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their fold of pushes."""
-    table = model.training
-    push = Push(table.inputs, table.duration, table.covariates)
-    base, folds = model.base.predictor, push_folds(table, FOLDS)
-    moments = moments_left_out(base, folds) if isinstance(base, GaussianProcessPredictor) else base.moments(push)
-    mean, covariance, _ = (
-        model.predictor.extended(moments, push) if isinstance(model.predictor, ExtendedPredictor) else moments
-    )
-    return mean, covariance
+    moments = model.held_out_moments(push_folds(model.training, FOLDS))
+    return moments.mean, moments.covariance
 
 
 def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, covariance: Array) -> dict[str, Array]:
@@ -156,13 +148,6 @@ def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, c
             own = part.push_id == push
             found[push] = _scores(calibration, [(along[own], reach[own]) for along, reach in parts])
     return found
-
-
-def _physics(model: PushModel) -> AnalyticalPush:
-    predictor = model.base.predictor
-    if isinstance(predictor, AnalyticalPredictor):
-        return predictor.physics
-    return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
 
 
 def _computable(mechanism: Mechanism, table: PushTable) -> bool:

@@ -94,4 +94,4 @@ BASES: dict[str, Callable[[DriverBasis, list[Array], int], Array]] = {
 
 def columns_of(basis: DriverBasis) -> int:
     """Number of columns of a basis."""
-    return basis.values({name: np.zeros(1) for name in basis.drivers}, 1).shape[1]
+    return int(basis.values({name: np.zeros(1) for name in basis.drivers}, 1).shape[1])

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, blas
 
 from push_predictor.errors import TrainingError
+from push_predictor.models.gaussian_process.cross_validation import held_out_errors
 from push_predictor.models.gaussian_process.descent import Cost, Descent, part_of_rows
 from push_predictor.models.gaussian_process.kernels import (
     DEFAULT_CHOICE,
@@ -19,7 +20,7 @@ from push_predictor.models.gaussian_process.kernels import (
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.ridge import factorise
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.
 _LENGTHSCALE_BOUNDS = (np.log(1e-2), np.log(1e3))
@@ -42,6 +43,11 @@ class GpParameters:
     family: KernelFamily = "squared_exponential"
 
     @property
+    def choice(self) -> KernelChoice:
+        """The kernels that these are hyperparameters of."""
+        return KernelChoice(self.family)
+
+    @property
     def kernel(self) -> ArdKernel:
         """Kernel of f."""
         return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)
@@ -55,17 +61,13 @@ class GpParameters:
 class GaussianProcess:
     """A Gaussian process conditioned on inputs (n, D) and outputs (n,), both standardised by the caller."""
 
+    gaussian = True  # predictive distribution
+
     def __init__(self, inputs: Array, outputs: Array, parameters: GpParameters) -> None:
         self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
         noise = np.full(len(outputs), parameters.noise_variance)
         self._posterior = KernelPosterior(parameters.kernel.matrix(inputs), noise)
         self._weights = self._posterior.weights(outputs)
-
-    @property
-    def log_marginal_likelihood(self) -> float:
-        """Log p(outputs | inputs), nats."""
-        constant = len(self.outputs) * np.log(2.0 * np.pi)
-        return -0.5 * float(self.outputs @ self._weights + self._posterior.log_determinant + constant)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """The function and the noise at inputs (m, D)."""
@@ -76,6 +78,18 @@ class GaussianProcess:
         variance = np.maximum(kernel.variance - self._posterior.explained_variance(cross), smallest)
         log_noise = np.full(len(cross), 2.0 * self.parameters.log_noise_sd)
         return LatentPrediction(cross @ self._weights, variance, log_noise, np.zeros(len(cross)))
+
+    def held_out(self, block: IntArray) -> LatentPrediction:
+        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
+
+        block (n,): number of each row's block.
+        """
+        kernel, noise, n = self.parameters.kernel, self.parameters.noise_variance, len(self.outputs)
+        ridge = factorise(kernel.matrix(self.inputs), smooth=kernel.smooth).regularise(np.full(n, 1.0 / noise))
+        errors, variance = held_out_errors(ridge.precision(), ridge.residual(self.outputs / noise), block)
+        smallest = np.finfo(float).eps * kernel.variance
+        log_noise = np.full(n, 2.0 * self.parameters.log_noise_sd)
+        return LatentPrediction(self.outputs - errors, np.maximum(variance - noise, smallest), log_noise, np.zeros(n))
 
 
 def fit_gp(

@@ -21,11 +21,6 @@ class KernelPosterior:
         regularised.flat[:: len(regularised) + 1] += noise_variances
         self._factor = cholesky_in_place(regularised)
 
-    @property
-    def log_determinant(self) -> float:
-        """Log det(K + noise)."""
-        return 2.0 * float(np.log(np.diagonal(self._factor)).sum())
-
     def weights(self, values: Array) -> Array:
         """(K + noise)^-1 values, shape (n,): the posterior mean at x* is k(x*, X) times this."""
         half = blas.dtrsv(self._factor, values, lower=1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.cross_validation import held_out_errors
 from push_predictor.models.gaussian_process.gp import GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
@@ -17,11 +18,13 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_fit import maximise_bound
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 
 class VHGP:
     """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound."""
+
+    gaussian = False  # predictive distribution
 
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
@@ -47,6 +50,23 @@ class VHGP:
             np.maximum(variance, self.parameters.jitter),
             self.parameters.noise_mean + of_noise @ self._noise_weights,
             np.maximum(log_noise_variance, self.parameters.nugget + np.finfo(float).eps * noise.variance),
+        )
+
+    def held_out(self, block: IntArray) -> LatentPrediction:
+        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
+
+        block (n,): number of each row's block.
+        """
+        bound = Bound.tied(VhgpProblem.of(self.inputs, self.outputs, self.parameters), self.site_precisions)
+        errors, variance = held_out_errors(bound.signal.ridge.precision(), bound.alpha, block)
+        of_noise, noise_variance = held_out_errors(bound.noise_ridge.precision(), bound.mean_weights, block)
+        site_variance = 1.0 / bound.site_precisions
+        smallest = self.parameters.nugget + np.finfo(float).eps * self.parameters.noise.variance
+        return LatentPrediction(
+            self.outputs - errors,
+            np.maximum(variance - bound.noise_level, self.parameters.jitter),
+            bound.noise_mean + bound.mean_weights * site_variance - of_noise,
+            np.maximum(noise_variance - site_variance, smallest),
         )
 
 

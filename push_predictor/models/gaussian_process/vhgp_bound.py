@@ -200,15 +200,6 @@ def sites_from(precisions: Array, noise_mean: Array) -> Sites:
     return Sites(np.maximum(precisions, _SMALLEST_PRECISION), precisions * noise_mean + precisions - 0.5)
 
 
-def bound_and_gradient(
-    inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array
-) -> tuple[float, Array, Array]:
-    """F with b = Lambda - 1/2, dF/d(site_precisions) (n,) and dF/d(parameters.to_vector())."""
-    problem = VhgpProblem.of(inputs, outputs, parameters)
-    bound = Bound.tied(problem, site_precisions)
-    return bound.value, bound.site_gradient(), bound.hyperparameter_gradient(tied=True)
-
-
 def _subtract_square(matrix: Array, vector: Array, sign: float = 1.0) -> None:
     """Subtract sign vector vector' in place."""
     blas.dger(-sign, vector, vector, a=matrix.T, overwrite_a=1)

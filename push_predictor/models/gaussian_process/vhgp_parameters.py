@@ -35,7 +35,7 @@ class VhgpParameters:
 
     @property
     def choice(self) -> KernelChoice:
-        """What these are hyperparameters of."""
+        """The kernels that these are hyperparameters of."""
         return KernelChoice(self.family, self.log_nugget_sd is not None)
 
     @property

@@ -54,23 +54,6 @@ def uniform_support(outline: Outline) -> Support:
     return Support((float(x), float(y)), length)
 
 
-def support_of_points(points: Array) -> Support:
-    """The support of a slider that stands on points (k, 3: x, y in m in the body frame, load share).
-
-    Load shares are scaled to sum to 1; centre = load-weighted mean, c = load-weighted mean distance from it.
-    Raises RigError for another shape, values that are not finite, a negative share, or no extent.
-    """
-    points = np.asarray(points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.all(np.isfinite(points)):
-        raise RigError(f"support_points: {points.tolist()} is not accepted, give rows of [x, y, load share]")
-    places, load = points[:, :2], points[:, 2]
-    if np.any(load < 0.0) or np.sum(load) <= 0.0:
-        raise RigError(f"support_points: load shares {load.tolist()} are not accepted, give some >= 0")
-    centre = np.average(places, axis=0, weights=load)
-    length = np.average(np.linalg.norm(places - centre, axis=1), weights=load)
-    return Support((float(centre[0]), float(centre[1])), float(length))
-
-
 def body_twist(
     contact_point: Array, inward_normal: Array, pusher_velocity: Array, support: Support, friction: float
 ) -> tuple[Array, IntArray]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.models.correlation import Correlation
+from push_predictor.models.predictors.correlation import Correlation
 from push_predictor.types import Array, IntArray
 
 _RESIDUALS, _ROWS = "correlation_residuals", "correlation_rows"

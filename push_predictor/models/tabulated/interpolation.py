@@ -73,7 +73,7 @@ class TensorSpline:
         values = self._grid[tuple(index)]
         for weight in weights:
             values = np.dot(weight, values.reshape(4, -1))
-        return values
+        return np.asarray(values)
 
     def __call__(self, points: Array, box: IntArray | int) -> Array:
         """Values (n, K) at points (n, D) within the axes, each in its box (n,), or all in one."""

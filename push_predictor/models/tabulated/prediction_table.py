@@ -16,13 +16,13 @@ from math import exp, sqrt
 import numpy as np
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.models.correlation import Correlation, correlations, covariances
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
-from push_predictor.models.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.push_model import GaussianProcessPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors.correlation import Correlation, correlations, covariances
 from push_predictor.models.tabulated.grid_posterior import GridPosterior, GridRegression, grid_regression, weighted_sums
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
+from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
 from push_predictor.models.tabulated.push_chart import Chart, Whole
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.table_sides import Side, table_sides

@@ -9,7 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.features import push_features
-from push_predictor.models.push_model import DOMAIN_MARGIN, GaussianProcessPredictor, Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push_model import DOMAIN_MARGIN, PushModel
 from push_predictor.models.tabulated.prediction_table import PredictionTable, tabulate
 from push_predictor.models.tabulated.push_chart import Chart, push_chart
 from push_predictor.types import Array, BoolArray

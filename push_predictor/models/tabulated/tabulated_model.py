@@ -16,15 +16,10 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.mechanics.analytical_scalar import single_push
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.push_model import (
-    AnalyticalPredictor,
-    ExtendedPredictor,
-    GaussianProcessPredictor,
-    Prediction,
-    PushModel,
-)
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import GaussianProcessPredictor, Moments
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
@@ -80,10 +75,11 @@ class TabulatedModel:
         if self.domain is None:
             return self._quick.predict_rows(inputs, duration, covariates)
         prediction, predictor = self._of_base(self.domain, inputs, duration), self._quick.predictor
-        if not isinstance(predictor, ExtendedPredictor):
+        if not predictor.effects:
             return prediction
         push = Push(inputs, duration, covariates or {})
-        moments = predictor.extended((prediction.mean, prediction.covariance, prediction.process_covariance), push)
+        base = Moments(prediction.mean, prediction.covariance, prediction.process_covariance)
+        moments = predictor.with_effects(base, push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
     def predict_one(self, push: PushRequest) -> Prediction:
@@ -100,7 +96,7 @@ class TabulatedModel:
     @cached_property
     def _quick(self) -> PushModel:
         """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""
-        return replace(self.model, predictor=_quick_body(self.model.predictor))
+        return replace(self.model, predictor=self.model.predictor.with_scalar_mechanics())
 
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         base = self.model.base
@@ -131,17 +127,6 @@ def tabulate(model: PushModel) -> TabulatedModel:
             return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "
     return TabulatedModel(model, f"exact: {how}too far off")
-
-
-def _quick_body(
-    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor,
-) -> GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor:
-    if isinstance(predictor, GaussianProcessPredictor):
-        return predictor
-    quick = replace(predictor, physics=single_push(predictor.physics))
-    if isinstance(quick, ExtendedPredictor) and isinstance(quick.base, AnalyticalPredictor):
-        return replace(quick, base=replace(quick.base, physics=single_push(quick.base.physics)))
-    return quick
 
 
 def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:

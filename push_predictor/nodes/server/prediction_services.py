@@ -18,7 +18,7 @@ from msg_adapters.predictions import (
     query_from_batch_request,
 )
 from push_predictor.errors import PushPredictorError, RequestError
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import check_request, check_requests
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel

@@ -7,7 +7,7 @@ from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.alarms import alarm_to_message
 from push_predictor.evaluation.alarm.evidence import AlarmState
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.validator.status import alarm_text
 from push_predictor.nodes.validator.window_markers import window_markers

@@ -13,7 +13,8 @@ from msg_adapters import MessageError
 from msg_adapters.predictions import RefusedError, prediction_from_response, query_to_request
 from push_predictor.evaluation.alarm.evidence import with_alarm
 from push_predictor.evaluation.offline import window_options
-from push_predictor.models.push_model import Prediction, PushModel
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.nodes.validator.residual_recorder import residual_message, write_residuals
 from push_predictor.online.alarm_process import AlarmProcess

@@ -8,7 +8,7 @@ from visualization_msgs.msg import MarkerArray
 from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers, prediction_markers, push_markers
 from push_predictor.geometry.frames import to_world
 from push_predictor.geometry.touch import covariance_in_world, displaced
-from push_predictor.models.push_model import Prediction
+from push_predictor.models.prediction import Prediction
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array

@@ -10,7 +10,6 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.features import EDGE_SPACING, push_features
-from push_predictor.models.predictors import AnalyticalPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -43,7 +42,7 @@ def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
     most = len(table.pushes) // PUSHES_PER_COLUMN
     bases = (_of_degree(outline, table.inputs, degree) for degree in DEGREES)
     columns, without_speed = next((b for b in bases if b[0].shape[1] <= most), _of_degree(outline, table.inputs, 1))
-    learnt = not isinstance(base.predictor, AnalyticalPredictor)
+    learnt = base.predictor.learnt
     speed = _log_speed(base.training.inputs)
     return InputsBasis(
         columns,

@@ -10,7 +10,6 @@ import numpy as np
 from push_predictor.models.effects.effect import generic_responses, mechanism_named
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor, with_independent_outputs
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
@@ -59,16 +58,14 @@ def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | No
     one by one. A strong correlation of the outputs would give the largest weight to small parts of the residual: in one
     recording, the second order of an effect was found before the effect itself.
     """
-    predictor = with_independent_outputs(model.predictor)
+    predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
     return Evidence(table, table.outcomes - mean, whitener_of(covariance), physics or physics_of(model))
 
 
 def physics_of(model: PushModel) -> AnalyticalPush:
     """The analytical model of a push model's slider: its own, or the textbook's for a learnt one."""
-    if isinstance(model.predictor, AnalyticalPredictor | ExtendedPredictor):
-        return model.predictor.physics
-    return AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
+    return model.predictor.physics
 
 
 def push_order(table: PushTable) -> IntArray:

@@ -10,18 +10,14 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import Cross
-from push_predictor.models.push_model import (
-    AnalyticalPredictor,
-    ExtendedPredictor,
-    GaussianProcessPredictor,
-    PushModel,
-)
+from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import retrain_model
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.extension.coefficients import estimated_effects
-from push_predictor.residuals.extension.refit import base_predictor, retrained, with_predictor
+from push_predictor.residuals.extension.refit import with_predictor
 
 
 def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate]) -> PushModel:
@@ -30,15 +26,15 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     evidence: of the deployed model, which was not trained on these pushes. A base that was trained on them has absorbed
     part of the effects, so its own residuals would make them too small. Raises TrainingError for too few rows.
     """
-    learnt = base.kind != "analytical"
+    learnt = base.predictor.learnt
     own_inputs = inputs_basis(base, evidence.table).columns if learnt else None
     effects, cross = estimated_effects(evidence, candidates, own_inputs)
     predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
     table, push = evidence.table, Push(evidence.table.inputs, evidence.table.duration, evidence.table.covariates)
     shift, _ = predictor.shift(push)
     if learnt:
-        trained = retrained(base.base, table, table.outcomes - shift)
-        return with_predictor(trained, table, replace(predictor, base=base_predictor(trained)))
+        trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
+        return with_predictor(trained, table, predictor.with_base(trained.predictor.base))
     mean, covariance, _ = predictor.base.moments(push)
     residual = table.outcomes - mean - shift
     scale = np.sqrt(np.mean(residual**2, axis=0) / np.diagonal(covariance, axis1=1, axis2=2).mean(axis=0))
@@ -46,14 +42,9 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
 
 
 def _with_effects(
-    predictor: GaussianProcessPredictor | AnalyticalPredictor | ExtendedPredictor,
-    physics: AnalyticalPush,
-    effects: tuple[Effect, ...],
-    cross: Cross,
+    predictor: Predictor, physics: AnalyticalPush, effects: tuple[Effect, ...], cross: Cross
 ) -> ExtendedPredictor:
     """The predictor with these effects after those that it has, unscaled."""
-    if not isinstance(predictor, ExtendedPredictor):
-        return ExtendedPredictor(predictor, physics, effects, np.ones(3), cross)
     had = len(predictor.effects)
     moved = {(had + i, had + j): shared for (i, j), shared in cross.items()}
     return ExtendedPredictor(

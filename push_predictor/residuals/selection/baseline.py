@@ -12,10 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.gaussian_process.cross_validation import moments_left_out
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, with_independent_outputs
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
@@ -24,7 +21,7 @@ from push_predictor.residuals.evidence.drivers import LOCAL, RIG_PROPERTIES
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for, inputs_basis
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.evidence.standardised import Evidence, push_order, whitened_response, whitener_of
+from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
 from push_predictor.residuals.selection.screening import TINY, Scores, raw_scores
 from push_predictor.types import Array
 
@@ -87,13 +84,8 @@ class Baseline:
 
 def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
     """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps."""
-    table, predictor = with_inputs(model.training), with_independent_outputs(model.predictor)
-    push = Push(table.inputs, table.duration, table.covariates)
-    base = predictor.base if isinstance(predictor, ExtendedPredictor) else predictor
-    moments = (
-        moments_left_out(base, push_order(table)) if isinstance(base, GaussianProcessPredictor) else base.moments(push)
-    )
-    mean, covariance, _ = predictor.extended(moments, push) if isinstance(predictor, ExtendedPredictor) else moments
+    table, predictor = with_inputs(model.training), model.predictor.with_independent_outputs()
+    mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
     return Baseline(evidence, inputs_basis(model, table))
 

@@ -10,7 +10,7 @@ from scipy.stats import shapiro
 from push_predictor.evaluation.metrics import gaussian_nlpd
 from push_predictor.evaluation.unimodality import dip, holm, p_values, power, uniform_dips
 from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
-from push_predictor.models.push_model import GaussianProcessPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.fits.fit import Fit, trained
@@ -71,10 +71,7 @@ def log_densities(pushes: PushSet, fit: Fit, inputs: Array, outcomes: Array) -> 
     predictor = trained(pushes, fit).predictor
     if not isinstance(predictor, GaussianProcessPredictor):
         raise TypeError(f"{fit.kind}: only learnt models have latent predictions")
-    scaled, latent = (
-        (outcomes - predictor.scaling.outcome_mean) / predictor.scaling.outcome_sd,
-        predictor.latent(inputs),
-    )
+    scaled, latent = predictor.scaling.outcomes(outcomes), predictor.latent(inputs)
     gaussian, exact = (
         np.column_stack([density(p, scaled[:, k]) for k, p in enumerate(latent)]) - np.log(predictor.scaling.outcome_sd)
         for density in (gaussian_log_density, exact_log_density)

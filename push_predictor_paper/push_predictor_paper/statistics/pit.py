@@ -11,7 +11,8 @@ from push_predictor.evaluation.push_scores import PushScores, pooled, push_score
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.quadrature import exact_cdf
-from push_predictor.models.push_model import GaussianProcessPredictor, PushModel
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
 from push_predictor_paper.data.corpus import PushSet
@@ -64,8 +65,7 @@ def exact_pit(model: PushModel, table: PushTable) -> Array:
     """Probabilities (n, 3) of outcomes below a table's under the exact predictive; for a Gaussian one, `pit`'s."""
     if not isinstance(model.predictor, GaussianProcessPredictor):
         return pit(compare(model, table))
-    scaling = model.predictor.scaling
-    scaled = (table.outcomes - scaling.outcome_mean) / scaling.outcome_sd
+    scaled = model.predictor.scaling.outcomes(table.outcomes)
     latent = model.predictor.latent(table.inputs)
     return np.column_stack([exact_cdf(prediction, scaled[:, k]) for k, prediction in enumerate(latent)])
 

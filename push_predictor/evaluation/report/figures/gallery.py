@@ -28,7 +28,7 @@ from push_predictor.evaluation.report.maps import (
     recorded_map,
 )
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.push_model import ExtendedPredictor, PushModel
+from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting.canvas import Picture, draw
@@ -139,7 +139,7 @@ def _fixed_caption(shown: Validation, condition: Condition) -> str:
     """The covariates at which the maps of extended models are drawn, empty without such models."""
     similar, outline = shown.table.take(condition.rows), shown.models[0].rig.outline
     sentences = [fixed_covariates_text(model, fixed_covariates(model, similar)) for model in shown.models]
-    extended = [model.name for model in shown.models if isinstance(model.predictor, ExtendedPredictor)]
+    extended = [model.name for model in shown.models if model.predictor.effects]
     if extended and (sides := fold_order(outline)) > 1:
         sentences.append(f"Effects may differ between sides: the first of the {sides} equal sides is drawn.")
     return "".join(f" {text}" for text in sentences if text)

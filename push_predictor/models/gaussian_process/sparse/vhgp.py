@@ -15,6 +15,7 @@ from push_predictor.models.gaussian_process.gp import check_rows
 from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.sparse.bound import SparseBound, SparseProblem
+from push_predictor.models.gaussian_process.sparse.cross_validation import sparse_held_out_errors
 from push_predictor.models.gaussian_process.sparse.kernel import InducedRidge
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array, IntArray
@@ -59,6 +60,8 @@ class SparseVHGP:
     inputs of f and of g.
     """
 
+    gaussian = False  # predictive distribution
+
     def __init__(
         self,
         inputs: Array,
@@ -93,3 +96,21 @@ class SparseVHGP:
         variance = np.maximum(of_signal + parameters.jitter - explained, parameters.jitter)
         log_noise_variance = np.maximum(of_noise - told, _EPSILON * of_noise)
         return LatentPrediction(mean, variance, parameters.noise_mean + log_noise, log_noise_variance)
+
+    def held_out(self, block: IntArray) -> LatentPrediction:
+        """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
+
+        block (n,): number of each row's block.
+        """
+        bound, parameters = self.solved(), self.parameters
+        errors, variance = sparse_held_out_errors(bound.signal.ridge, bound.signal.alpha, block)
+        of_noise, noise_variance = sparse_held_out_errors(bound.noise_ridge, bound.mean_weights, block)
+        site_variance = 1.0 / bound.sites.precisions
+        variance += bound.problem.signal.missing - bound.signal.level
+        noise_variance += bound.problem.noise.missing - site_variance
+        return LatentPrediction(
+            self.outputs - errors,
+            np.maximum(variance, parameters.jitter),
+            bound.noise_mean + bound.mean_weights * site_variance - of_noise,
+            np.maximum(noise_variance, _EPSILON * parameters.noise.variance),
+        )

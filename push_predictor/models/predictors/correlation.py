@@ -1,7 +1,7 @@
-"""How the three outputs of a push go together, learnt from what left-out training pushes leave over.
+"""The correlation of the three outputs given the push, learnt from the residuals of held-out training pushes.
 
-The paper fits three independent outputs. Their residuals are correlated, and how depends on the push: off the centre a
-push that goes further turns further. With z_i the standardised left-out residuals at features x_i
+The paper fits three independent outputs. Their residuals are correlated, and how depends on the push: off the centre,
+a push that moves the slider further turns it further. With z_i the standardised held-out residuals at features x_i
 
     S(x) = shrinkage I + sum_i exp(-|x - x_i|^2 / (2 bandwidth^2)) z_i z_i',    C = diag(S)^-1/2 S diag(S)^-1/2
 
@@ -26,8 +26,10 @@ _WEIGHTS_AT_ONCE = 2_000_000  # 16 MB
 
 @dataclass(frozen=True, eq=False)
 class Correlation:
-    """features (n, D) standardised and residuals (n, 3) of training rows; bandwidth > 0 in units of the features,
-    shrinkage > 0 in rows. rows (n,): which of the training rows these are, None where they are all.
+    """A smoother of residuals over the features; see the module.
+
+    features (n, D) standardised and residuals (n, 3) of training rows; bandwidth > 0 in units of the features;
+    shrinkage > 0 in rows. rows (n,): which of the training rows these are, None for all of them.
     """
 
     features: Array
@@ -40,13 +42,11 @@ class Correlation:
         """Correlation matrices (m, 3, 3) at features (m, D)."""
         return correlations(self._sums(features, None), self.shrinkage)
 
-    def left_out(self, features: Array, block: IntArray) -> Array:
-        """What `at` would say of all N training rows, features (N, D), (N, 3, 3), had it not seen the block (N,) that
-        each of them is of.
-        """
-        return correlations(self.sums_left_out(features, block), self.shrinkage)
+    def held_out(self, features: Array, block: IntArray) -> Array:
+        """Correlations (N, 3, 3) at all N training rows, features (N, D), each from the rows of other blocks (N,)."""
+        return correlations(self.held_out_sums(features, block), self.shrinkage)
 
-    def sums_left_out(self, features: Array, block: IntArray) -> Array:
+    def held_out_sums(self, features: Array, block: IntArray) -> Array:
         """The weighted sums of `products` over the rows of all other blocks, (N, 6)."""
         return self._sums(features, block)
 
@@ -92,8 +92,8 @@ def covariances(latent: Array, process: Array, correlation: Array | None) -> tup
     """Covariance matrices (n, 3, 3) of outcomes and of the process, from the variances (n, 3) of the latent functions
     and of the process and correlation matrices (n, 3, 3), None where the outputs are independent.
 
-    What the model is unsure of is correlated as the noise is that it comes from, so that outcome less process is a
-    covariance too.
+    The model's uncertainty has the correlation of the noise that causes it, so that outcome minus process is also a
+    covariance.
     """
     if correlation is None:
         return _diagonal(latent + process), _diagonal(process)

@@ -1,0 +1,25 @@
+"""What a push model predicts with: learnt (Gaussian processes), analytical, or either of them extended by effects.
+
+Callers use the protocol `Predictor` and need not know the class. This folder may import from gaussian_process,
+mechanics, mechanisms and effects.
+"""
+
+from __future__ import annotations
+
+from push_predictor.models.predictors.analytical_predictor import AnalyticalPredictor
+from push_predictor.models.predictors.extended_predictor import ExtendedPredictor
+from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.models.predictors.scaling import Scaling
+
+__all__ = [
+    "AnalyticalPredictor",
+    "BasePredictor",
+    "Cross",
+    "ExtendedPredictor",
+    "GaussianProcessPredictor",
+    "Moments",
+    "Predictor",
+    "Scaling",
+    "Shift",
+]

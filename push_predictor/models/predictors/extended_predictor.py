@@ -1,0 +1,109 @@
+"""A base predictor extended by effects that it lacks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.analytical_scalar import single_push
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.recordings.table import INPUTS
+from push_predictor.types import Array, IntArray
+
+SIDE = "edge"
+GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedPredictor:
+    """A base with effects: each shifts the mean and adds its own uncertainty to the covariance.
+
+    physics: the analytical model from which the effects' responses are computed. scale (3,): factor on the base's
+    standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see Predictor; pairs that it lacks are
+    independent. Without it, two effects with correlated covariates would seem far less certain than their sum is.
+    """
+
+    base: BasePredictor
+    physics: AnalyticalPush
+    effects: tuple[Effect, ...]
+    scale: Array
+    cross: Cross = field(default_factory=dict)
+
+    @property
+    def learnt(self) -> bool:
+        """See Predictor."""
+        return self.base.learnt
+
+    @property
+    def integrates(self) -> bool:
+        """See Predictor: responses of effects are derivatives of integrated mechanics."""
+        return True
+
+    @cached_property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor."""
+        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.needs))
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor."""
+        return tuple(name for name in self.covariates if name not in GIVEN_BY_INPUTS)
+
+    def completed(self, push: Push) -> Push:
+        """See Predictor."""
+        given = dict(zip(INPUTS, push.inputs.T, strict=True))
+        if SIDE in self.covariates:
+            given[SIDE] = self.physics.outline.edge(push.inputs[:, 1])[0].astype(np.float64)
+        own = {name: column for name, column in given.items() if name in self.covariates}
+        return replace(push, covariates={**push.covariates, **own}) if own else push
+
+    def moments(self, push: Push) -> Moments:
+        """See Predictor."""
+        return self.with_effects(self.base.moments(push), push)
+
+    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
+        """See Predictor; the effects are those estimated from all rows."""
+        return self.with_effects(self.base.held_out_moments(rows, block), rows)
+
+    def with_effects(self, moments: Moments, push: Push) -> Moments:
+        """See Predictor."""
+        mean, total, process = moments
+        shift, uncertainty = self.shift(push)
+        factor = np.outer(self.scale, self.scale)
+        return Moments(mean + shift, total * factor + uncertainty, process * factor)
+
+    def shift(self, push: Push) -> Shift:
+        """See Predictor."""
+        shift, uncertainty = np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3))
+        push = self.completed(push)
+        designs = [effect.design(self.physics, push) for effect in self.effects]
+        for effect, design in zip(self.effects, designs, strict=True):
+            shift = shift + design @ effect.coefficients
+            uncertainty = uncertainty + design @ effect.covariance @ design.transpose(0, 2, 1)
+        for (i, j), covariance in self.cross.items():
+            shared = designs[i] @ covariance @ designs[j].transpose(0, 2, 1)
+            uncertainty = uncertainty + shared + shared.transpose(0, 2, 1)
+        return Shift(shift, uncertainty)
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Predictor."""
+        if self.base.gaussian:
+            return None
+        return self.base.shifted_log_density(push, outcomes, self.shift(push), self.scale)
+
+    def with_base(self, base: BasePredictor) -> Predictor:
+        """See Predictor."""
+        return replace(self, base=base)
+
+    def with_independent_outputs(self) -> Predictor:
+        """See Predictor."""
+        return replace(self, base=self.base.with_independent_outputs())
+
+    def with_scalar_mechanics(self) -> Predictor:
+        """See Predictor."""
+        return replace(self, physics=single_push(self.physics), base=self.base.with_scalar_mechanics())

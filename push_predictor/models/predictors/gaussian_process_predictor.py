@@ -1,0 +1,119 @@
+"""The learnt predictor: three Gaussian process regressions and the correlation of their outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.quadrature import exact_log_density
+from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors.correlation import Correlation, covariances
+from push_predictor.models.predictors.predictor import Moments, Shift
+from push_predictor.models.predictors.scaling import Scaling
+from push_predictor.models.predictors.without_effects import WithoutEffects
+from push_predictor.recordings.rig import Rig
+from push_predictor.types import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianProcessPredictor(WithoutEffects):
+    """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV).
+
+    correlation: of the outputs given the push; None where they are independent.
+    """
+
+    rig: Rig
+    scaling: Scaling
+    regressions: tuple[Regression, ...]
+    correlation: Correlation | None = None
+
+    @property
+    def learnt(self) -> bool:
+        """See Predictor."""
+        return True
+
+    @property
+    def gaussian(self) -> bool:
+        """See BasePredictor: with known noise."""
+        return any(regression.gaussian for regression in self.regressions)
+
+    @property
+    def integrates(self) -> bool:
+        """See Predictor."""
+        return False
+
+    @property
+    def physics(self) -> AnalyticalPush:
+        """See Predictor: the textbook's."""
+        return AnalyticalPush(self.rig.outline, self.rig.pusher_radius)
+
+    @property
+    def outcomes(self) -> Array:
+        """The outcomes (n, 3) that it was trained on, SI."""
+        scaled = np.column_stack([regression.outputs for regression in self.regressions])
+        return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
+
+    def moments(self, push: Push) -> Moments:
+        """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
+        features = self.scaling.features(self.rig.outline, push.inputs)
+        latent = [regression.predict(features) for regression in self.regressions]
+        return self._moments_of(latent, self.correlation.at(features) if self.correlation else None)
+
+    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
+        """See Predictor. The correlation at a row is that of the other blocks' rows."""
+        latent = [regression.held_out(block) for regression in self.regressions]
+        features = self.regressions[0].inputs
+        return self._moments_of(latent, self.correlation.held_out(features, block) if self.correlation else None)
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Predictor."""
+        return None if self.gaussian else self._log_density(self.latent(push.inputs), outcomes)
+
+    def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
+        """See BasePredictor: the latent function is shifted and less certain, its noise is scaled."""
+        if self.gaussian:
+            return None
+        sd = self.scaling.outcome_sd
+        mean, variance = shift.mean / sd, np.diagonal(shift.covariance, axis1=1, axis2=2) / sd**2
+        latent = [
+            replace(
+                p,
+                mean=p.mean + mean[:, k],
+                variance=p.variance * scale[k] ** 2 + variance[:, k],
+                log_noise_mean=p.log_noise_mean + 2.0 * np.log(scale[k]),
+            )
+            for k, p in enumerate(self.latent(push.inputs))
+        ]
+        return self._log_density(latent, outcomes)
+
+    def latent(self, inputs: Array) -> list[LatentPrediction]:
+        """Per output, the latent predictions in standardised units."""
+        features = self.scaling.features(self.rig.outline, inputs)
+        return [regression.predict(features) for regression in self.regressions]
+
+    def with_independent_outputs(self) -> GaussianProcessPredictor:
+        """See Predictor."""
+        return replace(self, correlation=None)
+
+    def with_scalar_mechanics(self) -> GaussianProcessPredictor:
+        """See Predictor: it computes no mechanics."""
+        return self
+
+    def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
+        """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""
+        sd = self.scaling.outcome_sd
+        mean = np.column_stack([p.mean for p in latent]) * sd + self.scaling.outcome_mean
+        of_function = np.column_stack([p.variance for p in latent]) * sd**2
+        of_process = np.column_stack([p.process_variance for p in latent]) * sd**2
+        return Moments(mean, *covariances(of_function, of_process, correlation))
+
+    def _log_density(self, latent: Sequence[LatentPrediction], outcomes: Array) -> Array:
+        """Log density (n, 3) of outcomes (n, 3) under latent predictions in standardised units, one per output."""
+        scaled = self.scaling.outcomes(outcomes)
+        columns = [exact_log_density(p, scaled[:, k]) for k, p in enumerate(latent)]
+        return np.column_stack(columns) - np.log(self.scaling.outcome_sd)

@@ -1,0 +1,111 @@
+"""The protocol of all predictors: what a push model asks of the mathematics behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol, TypeAlias
+
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import Push
+from push_predictor.types import Array, IntArray
+
+Cross: TypeAlias = Mapping[tuple[int, int], Array]
+
+
+class Moments(NamedTuple):
+    """Moments of n outcomes: mean (n, 3), covariance (n, 3, 3) of an outcome, process_covariance (n, 3, 3)."""
+
+    mean: Array
+    covariance: Array
+    process_covariance: Array
+
+
+class Shift(NamedTuple):
+    """What effects add to n predictions: mean (n, 3), and its covariance (n, 3, 3)."""
+
+    mean: Array
+    covariance: Array
+
+
+class Predictor(Protocol):
+    """Predicts the outcome of pushes. Every predictor is a base, learnt or analytical, with any number of effects."""
+
+    @property
+    def base(self) -> BasePredictor:
+        """The predictor without its effects."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects that extend the base."""
+
+    @property
+    def cross(self) -> Cross:
+        """For effects i < j that were estimated jointly: the covariance (coefficients of i, coefficients of j)."""
+
+    @property
+    def physics(self) -> AnalyticalPush:
+        """Mechanics from which the responses of effects are computed: its own, or the textbook's if learnt."""
+
+    @property
+    def learnt(self) -> bool:
+        """Whether the base was fitted as a function of its inputs, so that its training data bound its domain."""
+
+    @property
+    def integrates(self) -> bool:
+        """Whether predicting integrates mechanics, which takes longer the further the push."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the covariates that every push must bring."""
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """Names of the covariates that the effects depend on, each once; some follow from the push's inputs."""
+
+    def completed(self, push: Push) -> Push:
+        """The pushes with those of `covariates` that follow from their inputs."""
+
+    def moments(self, push: Push) -> Moments:
+        """Moments of the outcomes of n pushes."""
+
+    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
+        """Moments at the n training rows, each predicted without the rows of its block; hyperparameters are kept.
+
+        block (n,): number of each row's block.
+        """
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """Log density (n, 3) of outcomes under the exact predictive, or None where that is a Gaussian."""
+
+    def with_effects(self, moments: Moments, push: Push) -> Moments:
+        """Moments of the base, from `moments` or a table, with the effects added."""
+
+    def shift(self, push: Push) -> Shift:
+        """The sum of the effects at n pushes."""
+
+    def with_base(self, base: BasePredictor) -> Predictor:
+        """The same effects on another base."""
+
+    def with_independent_outputs(self) -> Predictor:
+        """The same predictor without the correlation of its outputs; an analytical base keeps its covariance."""
+
+    def with_scalar_mechanics(self) -> Predictor:
+        """The same predictor, faster for single pushes: it computes their mechanics in plain numbers."""
+
+
+class BasePredictor(Predictor, Protocol):
+    """A predictor without effects, which effects can extend."""
+
+    @property
+    def gaussian(self) -> bool:
+        """Whether the exact predictive is the Gaussian of its moments."""
+
+    def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
+        """Like `exact_log_density` with a shift added and the base's standard deviations multiplied by scale (3,)."""
+
+    def with_independent_outputs(self) -> BasePredictor:
+        """See Predictor."""
+
+    def with_scalar_mechanics(self) -> BasePredictor:
+        """See Predictor."""

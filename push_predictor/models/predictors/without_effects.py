@@ -1,0 +1,58 @@
+"""The part of the predictor protocol that all predictors without effects share."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+
+Self = TypeVar("Self")
+
+
+class WithoutEffects:
+    """A predictor that is its own base."""
+
+    @property
+    def base(self: Self) -> Self:
+        """See Predictor: itself."""
+        return self
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """See Predictor: none."""
+        return ()
+
+    @property
+    def cross(self) -> Cross:
+        """See Predictor: none."""
+        return {}
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor: none."""
+        return ()
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor: none."""
+        return ()
+
+    def completed(self, push: Push) -> Push:
+        """See Predictor."""
+        return push
+
+    def with_effects(self, moments: Moments, push: Push) -> Moments:
+        """See Predictor."""
+        return moments
+
+    def shift(self, push: Push) -> Shift:
+        """See Predictor: zero."""
+        return Shift(np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3)))
+
+    def with_base(self, base: BasePredictor) -> Predictor:
+        """See Predictor."""
+        return base

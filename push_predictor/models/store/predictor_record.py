@@ -1,0 +1,144 @@
+"""How predictors are written into a model file: a JSON record each, and arrays that it shares with the training rows.
+
+`predictor_record` writes by the class of the predictor, `predictor_of` reads by the keys of the record and the model's
+kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.limit_surface import Support
+from push_predictor.models.predictors import (
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    Predictor,
+    Scaling,
+)
+from push_predictor.models.store.correlation_record import correlation_of, correlation_record
+from push_predictor.models.store.effects_record import cross_of, cross_record, effects_of, effects_record
+from push_predictor.models.store.regression_record import put_regression, regression_of, regression_record
+from push_predictor.models.store.table_record import finite
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable
+
+LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
+BASE_OUTCOMES = "base_outcomes"
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a predictor's record does not repeat: the model's kind and rig, training rows, and the file's arrays."""
+
+    kind: str
+    rig: Rig
+    training: PushTable
+    arrays: Mapping[str, np.ndarray]
+
+
+@singledispatch
+def predictor_record(predictor: Predictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The record of a predictor; larger parts are put among the arrays."""
+    raise TypeError(f"{type(predictor).__name__}: no record is defined for this class")
+
+
+@predictor_record.register
+def _extended_record(predictor: ExtendedPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    if isinstance(predictor.base, GaussianProcessPredictor):
+        arrays[BASE_OUTCOMES] = predictor.base.outcomes  # those of the training rows minus the effects
+    return {
+        "base": predictor_record(predictor.base, arrays),
+        "physics": _physics_record(predictor.physics),
+        "effects": effects_record(predictor.effects, arrays),
+        "scale": predictor.scale.tolist(),
+        **({"cross": cross_record(predictor.cross, arrays)} if predictor.cross else {}),
+    }
+
+
+@predictor_record.register
+def _analytical_record(predictor: AnalyticalPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    return {**_physics_record(predictor.physics), "covariance": predictor.covariance.tolist()}
+
+
+@predictor_record.register
+def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    for k, regression in enumerate(predictor.regressions):
+        put_regression(regression, k, arrays)
+    return {
+        "scaling": {key: np.asarray(value).tolist() for key, value in vars(predictor.scaling).items()},
+        "regressions": [regression_record(regression) for regression in predictor.regressions],
+        **({"correlation": correlation_record(predictor.correlation, arrays)} if predictor.correlation else {}),
+    }
+
+
+def _physics_record(physics: AnalyticalPush) -> dict[str, Any]:
+    support = physics.support
+    return {
+        "contact_friction": physics.contact_friction,
+        "centre": list(support.centre),
+        "length": support.length,
+    }
+
+
+def predictor_of(record: dict[str, Any], source: Source) -> Predictor:
+    """The predictor of a record. Raises KeyError, TypeError, or ValueError for what no predictor has."""
+    return _extended(record, source) if "effects" in record else _base(record, source)
+
+
+def _base(record: dict[str, Any], source: Source) -> AnalyticalPredictor | GaussianProcessPredictor:
+    return _analytical(record, source.rig) if source.kind == "analytical" else _learnt(record, source)
+
+
+def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
+    effects, scale = effects_of(record["effects"], source.arrays), np.array(record["scale"], dtype=np.float64)
+    if scale.shape != (3,) or not np.all(np.isfinite(scale)) or np.any(scale <= 0.0):
+        raise ValueError(f"scale {record['scale']!r}, three finite numbers above 0 are needed")
+    rows = source.training
+    if source.kind != "analytical":
+        rows = replace(rows, outcomes=finite(source.arrays, BASE_OUTCOMES))
+    base = _base(record["base"], replace(source, training=rows))
+    cross = cross_of(record.get("cross", []), effects, source.arrays)
+    predictor = ExtendedPredictor(base, _physics(record["physics"], source.rig), effects, scale, cross)
+    if missing := [name for name in predictor.needs if name not in source.training.covariates]:
+        raise ValueError(f"an effect needs the covariate {missing[0]}, which the training rows lack")
+    return predictor
+
+
+def _physics(record: dict[str, Any], rig: Rig) -> AnalyticalPush:
+    x, y = record["centre"]
+    support = Support((float(x), float(y)), float(record["length"]))
+    reach = float(np.abs(rig.outline.vertices).max())
+    largest = max(abs(support.centre[0]), abs(support.centre[1]), support.length, rig.pusher_radius)
+    if not (largest < LARGEST_RATIO * reach and support.length > reach / LARGEST_RATIO):
+        raise ValueError("support or pusher are out of all proportion to the outline")  # integration would never end
+    return AnalyticalPush(rig.outline, rig.pusher_radius, float(record["contact_friction"]), support)
+
+
+def _analytical(record: dict[str, Any], rig: Rig) -> AnalyticalPredictor:
+    physics = _physics(record, rig)
+    covariance = np.array(record["covariance"], dtype=np.float64)
+    np.linalg.cholesky(covariance)  # raises for a damaged one
+    return AnalyticalPredictor(physics, covariance)
+
+
+def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:
+    found = dict(record["scaling"])
+    columns = tuple(int(c) for c in found.pop("columns"))
+    scaling = Scaling(columns, **{key: np.array(value, dtype=np.float64) for key, value in found.items()})
+    features = scaling.features(source.rig.outline, source.training.inputs)
+    outcomes = scaling.outcomes(source.training.outcomes)
+    regressions = [
+        regression_of(parameters, source.kind, features, outcomes[:, k], k, source.arrays)
+        for k, parameters in enumerate(record["regressions"])
+    ]
+    if len(regressions) != outcomes.shape[1]:
+        raise ValueError(f"{len(regressions)} regressions, three are needed")
+    correlation = correlation_of(record["correlation"], features, source.arrays) if "correlation" in record else None
+    return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation)

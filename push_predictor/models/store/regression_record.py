@@ -1,0 +1,62 @@
+"""How a regression is written into a model file: hyperparameters in the record, site precisions as an array.
+
+Its matrices are not stored. They follow from the training rows, the hyperparameters and the site precisions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, FAMILIES
+from push_predictor.models.gaussian_process.regression import Regression
+from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
+from push_predictor.models.gaussian_process.vhgp import VHGP
+from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
+from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
+from push_predictor.types import Array
+
+
+def regression_record(regression: Regression) -> dict[str, Any]:
+    """The hyperparameters; those that format 1 lacks are omitted if they have the values it took for granted."""
+    values = dict(vars(regression.parameters))
+    if values["family"] == DEFAULT_CHOICE.family:
+        del values["family"]
+    chosen = {key: value for key, value in values.items() if value is not None}
+    return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
+
+
+def put_regression(regression: Regression, output: int, arrays: dict[str, np.ndarray]) -> None:
+    """Put what an output's regression has of arrays among those of the file."""
+    if isinstance(regression, VHGP | SparseVHGP):
+        arrays[f"site_precisions_{output}"] = regression.site_precisions
+    if isinstance(regression, SparseVHGP):
+        put_inducing(regression, output, arrays)
+
+
+def regression_of(
+    record: dict[str, Any], kind: str, features: Array, outcomes: Array, output: int, arrays: Mapping[str, np.ndarray]
+) -> Regression:
+    """The regression of one output on standardised features (n, D) and outcomes (n,). Raises ValueError."""
+    values, sites = _hyperparameters(record), arrays.get(f"site_precisions_{output}")
+    if kind == "gp":
+        return GaussianProcess(features, outcomes, GpParameters(**values))
+    if sites is None or sites.shape != outcomes.shape or not np.all(np.isfinite(sites)) or np.any(sites < 0.0):
+        raise ValueError(f"site precisions are missing or not {len(outcomes)} finite numbers from 0 on")
+    if has_inducing(output, arrays):
+        return sparse_regression(features, outcomes, VhgpParameters(**values), sites, output, arrays)
+    return VHGP(features, outcomes, VhgpParameters(**values), sites)
+
+
+def _hyperparameters(record: dict[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = dict(record)
+    family = values.pop("family", DEFAULT_CHOICE.family)
+    if family not in FAMILIES:
+        raise ValueError(f"kernel family {family!r}, known are {', '.join(FAMILIES)}")
+    values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in values.items()}
+    if not all(np.all(np.isfinite(value)) for value in values.values()):
+        raise ValueError("a hyperparameter is not finite")
+    return {**values, "family": family}
