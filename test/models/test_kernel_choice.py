@@ -33,7 +33,7 @@ from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_noise
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store import model_file
+from push_predictor.models.store import model_file, regression_record
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
@@ -292,7 +292,7 @@ def test_a_family_that_is_not_known_is_refused(
     models: dict[KernelChoice, PushModel], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save_model(models[KernelChoice("matern52")], tmp_path / "m")
-    monkeypatch.setattr(model_file, "FAMILIES", ("squared_exponential",))
+    monkeypatch.setattr(regression_record, "FAMILIES", ("squared_exponential",))
     with pytest.raises(ModelFileError, match="kernel family 'matern52', known are squared_exponential"):
         load_model(tmp_path / "m")
 

@@ -1,0 +1,74 @@
+"""Model files of every format, as the releases that introduced the format wrote them, still give their predictions.
+
+Each file in model_files/ was written by the last release that had its format as the newest, from 24 simulated windows;
+predictions.json contains what that release predicted.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
+
+FILES = Path(__file__).parent / "model_files"
+FORMATS = range(1, FORMAT_VERSION + 1)
+INPUTS = np.array([[0.02, 0.1, 0.0], [0.02, 0.35, -0.4], [0.02, 0.8, 0.5]])
+DURATION = np.full(3, 0.2)
+COVARIATES = {"elapsed_time": np.array([0.0, 10.0, 20.0])}
+PREDICTORS = {
+    1: GaussianProcessPredictor,
+    2: GaussianProcessPredictor,
+    3: ExtendedPredictor,
+    4: ExtendedPredictor,
+    5: GaussianProcessPredictor,
+}
+
+
+def file_of(version: int) -> Path:
+    return FILES / f"format_{version}.pushmodel"
+
+
+def header_of(path: Path) -> dict[str, object]:
+    with np.load(path) as archive:
+        header: dict[str, object] = json.loads(archive["header"].tobytes())
+    return header
+
+
+@pytest.mark.parametrize("version", FORMATS)
+def test_file_has_the_format_in_its_name(version: int) -> None:
+    assert is_model_file(file_of(version)) and header_of(file_of(version))["format_version"] == version
+
+
+@pytest.mark.parametrize("version", FORMATS)
+def test_model_of_every_format_predicts_what_it_did(version: int) -> None:
+    model = load_model(file_of(version))
+    assert isinstance(model.predictor, PREDICTORS[version])
+    expected = json.loads((FILES / "predictions.json").read_text())[f"format_{version}"]
+    found = model.predict_rows(INPUTS, DURATION, COVARIATES)
+    np.testing.assert_allclose(found.mean, expected["mean"], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, expected["covariance"], rtol=1e-6, atol=1e-13)
+    np.testing.assert_allclose(found.process_covariance, expected["process_covariance"], rtol=1e-6, atol=1e-13)
+
+
+@pytest.mark.parametrize("version", FORMATS)
+def test_model_is_saved_in_the_format_it_was_loaded_from(version: int, tmp_path: Path) -> None:
+    model, path = load_model(file_of(version)), tmp_path / "again.pushmodel"
+    save_model(model, path)
+    before, after = header_of(file_of(version)), header_of(path)
+    assert {**after, "written_by": before["written_by"]} == before
+
+
+def test_parts_of_each_format_are_loaded() -> None:
+    second, third, fourth, fifth = (load_model(file_of(version)).predictor for version in (2, 3, 4, 5))
+    assert isinstance(second, GaussianProcessPredictor)
+    assert {regression.parameters.choice.family for regression in second.regressions} == {"matern52"}
+    assert isinstance(third.base, AnalyticalPredictor)
+    assert [effect.mechanism for effect in third.effects] == ["contact_friction"] and not third.cross
+    assert [effect.mechanism for effect in fourth.effects] == ["contact_friction", "pusher_radius"]
+    assert list(fourth.cross) == [(0, 1)]
+    assert isinstance(fifth, GaussianProcessPredictor) and fifth.correlation is not None
