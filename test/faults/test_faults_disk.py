@@ -1,4 +1,4 @@
-"""A disk that is full while something is written: the old file stays, nothing lies beside it, the error names the path.
+"""A disk that fills up during writing: the old file stays, no other file remains, the error names the path.
 
 The limit on the size of a file (RLIMIT_FSIZE) makes a write fail half-way, as a full disk does.
 """
@@ -59,7 +59,7 @@ def drifting(place: Path, tmp_path: Path) -> Path:
 
 @contextmanager
 def full_disk(most: int = 200) -> Iterator[None]:
-    """No file can become larger than so many bytes."""
+    """Limit the size of files, in bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
     try:
@@ -82,7 +82,7 @@ def model() -> PushModel:
 
 
 def bag(path: Path, count: int, compression: str = "none") -> None:
-    """More than a chunk, so that the disk is written to while messages come."""
+    """More than one chunk, so that the disk is written to while messages are added."""
     with BagWriter(path, compression=compression) as writer:
         writer.add_topic("x", FLOAT64.name, FLOAT64.definition)
         for stamp in range(count):
@@ -115,7 +115,7 @@ def test_the_old_file_stays_and_the_error_names_the_path(
     name: str, earlier: bool, model: PushModel, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, write = tmp_path / "out" / name, WRITERS[name]
-    monkeypatch.setattr(trace_report, "_parts", lambda folder, trace: ["<p>a page</p>" * 100])  # pictures take seconds
+    monkeypatch.setattr(trace_report, "_parts", lambda folder, trace: ["<p>a page</p>" * 100])  # figures take seconds
     path.parent.mkdir()
     if earlier:
         write(path, 0, model, recording)
@@ -125,13 +125,13 @@ def test_the_old_file_stays_and_the_error_names_the_path(
     assert str(path) in str(caught.value)
     assert contents(tmp_path) == before
     assert all(not entry.name.startswith(".") for entry in tmp_path.rglob("*"))
-    write(path, 1, model, recording)  # there is room again
+    write(path, 1, model, recording)  # the disk has room again
     assert path.exists()
 
 
 @pytest.mark.parametrize("most", [0, 3000, 1 << 20, (1 << 20) + 100, (1 << 21) + 500])
-def test_a_bag_is_whole_wherever_the_disk_is_full(most: int, tmp_path: Path) -> None:
-    """In the header, in a chunk, between chunks, in the summary."""
+def test_a_bag_is_whole_wherever_the_disk_fills_up(most: int, tmp_path: Path) -> None:
+    """The limit lies in the header, in a chunk, between chunks, in the summary."""
     bag(tmp_path / "b", 8)
     before = contents(tmp_path)
     with full_disk(most), pytest.raises(RecordingError, match=f"{tmp_path}/b: cannot be written \\(File too large\\)"):
@@ -139,9 +139,7 @@ def test_a_bag_is_whole_wherever_the_disk_is_full(most: int, tmp_path: Path) -> 
     assert contents(tmp_path) == before
 
 
-def test_a_disk_that_says_so_only_when_synchronised_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_error_reported_only_by_fsync_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As network file systems do."""
     (tmp_path / "f").write_bytes(b"old")
 
@@ -154,7 +152,7 @@ def test_a_disk_that_says_so_only_when_synchronised_loses_nothing(
     assert contents(tmp_path) == {"f": b"old"}
 
 
-def test_links_stay_links_devices_stay_devices_and_names_may_be_long(tmp_path: Path) -> None:
+def test_writing_keeps_links_and_devices_and_accepts_long_names(tmp_path: Path) -> None:
     (tmp_path / "f").write_bytes(b"old")
     (tmp_path / "link").symlink_to("f")
     write_whole(tmp_path / "link", b"new")
@@ -178,7 +176,7 @@ def test_links_stay_links_devices_stay_devices_and_names_may_be_long(tmp_path: P
         ["simulate", "--shape", "rect1", "--surface", "abs", "--pushes", "1", "--speed", "0.02", "--out", "{out}/bag"],
     ],
 )
-def test_a_command_ends_with_one_line(
+def test_a_command_on_a_full_disk_ends_with_one_line(
     arguments: list[str], model: PushModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from push_predictor.recordings.rig import save_rig
@@ -192,9 +190,9 @@ def test_a_command_ends_with_one_line(
     arguments = [word.format(**{"in": inside, "out": out}) for word in arguments]
     with full_disk():
         status = main(arguments)
-    said = capsys.readouterr().err
-    assert status == 1 and said.count("\n") == 1, said
-    assert arguments[-1] in said and "File too large" in said
+    text = capsys.readouterr().err
+    assert status == 1 and text.count("\n") == 1, text
+    assert arguments[-1] in text and "File too large" in text
     assert not list(out.iterdir())
 
 
@@ -203,13 +201,13 @@ def test_a_command_ends_with_one_line(
 
 class Pipe:
     def __init__(self) -> None:
-        self.said: list[Any] = []
+        self.sent: list[Any] = []
 
     def send(self, what: Any) -> None:
-        self.said.append(what)
+        self.sent.append(what)
 
 
-def test_a_trace_tells_which_result_could_not_be_written(
+def test_a_trace_reports_which_result_could_not_be_written(
     model: PushModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -222,12 +220,12 @@ def test_a_trace_tells_which_result_could_not_be_written(
     task = trace_process.TraceTask((tmp_path / "bag",), tmp_path / "m", (), 0.01, place)
     pipe = Pipe()
     with full_disk():
-        trace_process._run(pipe, task)  # type: ignore[arg-type]  # a pipe that can be looked at
-    assert pipe.said[-1] == trace_process.Failed(f"[Errno 27] File too large: '{tmp_path}/result/trace.json'")
+        trace_process._run(pipe, task)  # type: ignore[arg-type]  # a pipe that records what it sends
+    assert pipe.sent[-1] == trace_process.Failed(f"[Errno 27] File too large: '{tmp_path}/result/trace.json'")
     assert not list(place.iterdir())
 
 
-def test_a_server_with_a_full_disk_says_so_and_goes_on(place: Path, drifting: Path) -> None:
+def test_a_server_with_a_full_disk_reports_it_and_continues(place: Path, drifting: Path) -> None:
     before = contents(drifting)
     with server_of(place / "deployed.pushmodel") as server:
         answer = list(server.push().mean)

@@ -1,4 +1,4 @@
-"""A server, a validator, a planner, a replay that is killed: who notices, what is left on disk, what goes on."""
+"""A killed server, validator, planner or replay: the others notice and continue, and files stay usable."""
 
 from __future__ import annotations
 
@@ -64,17 +64,17 @@ def kill(process: NodeProcess) -> None:
     process.wait()
 
 
-def residuals_heard(node: Any) -> list[PushResidual]:
-    heard: list[PushResidual] = []
-    node.create_subscription(PushResidual, "push_residual", heard.append, 1000)
-    return heard
+def residuals_received(node: Any) -> list[PushResidual]:
+    received: list[PushResidual] = []
+    node.create_subscription(PushResidual, "push_residual", received.append, 1000)
+    return received
 
 
 # --- predict_server --------------------------------------------------------------------------------------------------
 
 
 class Planning(threading.Thread):
-    """A planner that asks again and again; what came of it, and how long each answer took."""
+    """A planner that sends requests one after another, its answers and how long each took."""
 
     def __init__(self, inputs: np.ndarray) -> None:
         super().__init__(daemon=True)
@@ -94,19 +94,19 @@ class Planning(threading.Thread):
         self.join(30.0)
 
 
-def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_missed(
+def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
     domain: int, model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
     inputs = load_model(model).training.inputs[:20]
     with ros_context(domain) as node, validator(domain, model, tmp_path) as process:
-        status, heard = Status(node), residuals_heard(node)
+        status, received = Status(node), residuals_received(node)
         status.wait_for_first()
         planner = Planning(inputs)
         with server(domain, model) as first:
             assert wait_until(lambda: len(planner.answers) >= 10, 60.0)
             status.wait_for_server()
             with replaying(domain, rate=2.0):
-                assert wait_until(lambda: len(heard) >= 10, 60.0)
+                assert wait_until(lambda: len(received) >= 10, 60.0)
                 kill(first)
                 status.wait_for_message(f"predict_push: no answer within {TIMEOUT:g} s", 30.0)
                 with server(domain, model):
@@ -117,14 +117,14 @@ def test_validator_and_planner_notice_a_killed_server_go_on_and_say_what_was_mis
                     logged = process.wait_for_text(WRITTEN, 120.0)
     assert "Requests sent again:" in logged and "given up: 0" in logged
     assert_same_as_offline(tmp_path, model)
-    said = capfd.readouterr().err
-    assert "predict_push_batch: no response within 0.5 s, sending the request again" in said
-    assert "predict_push_batch: responds again after" in said and "requests had no response" in said
+    text = capfd.readouterr().err
+    assert "predict_push_batch: no response within 0.5 s, sending the request again" in text
+    assert "predict_push_batch: responds again after" in text and "requests had no response" in text
     assert any(taken > TIMEOUT for taken, _ in planner.answers[5:])  # a request bridged the gap
     assert all(np.array_equal(mean, planner.answers[0][1]) for _, mean in planner.answers)
 
 
-def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
+def test_a_planner_gives_up_after_its_patience_with_a_reason(domain: int):
     with ros_context(domain) as node, PlannerClient(0.2, timeout=0.2, patience=0.5) as client:
         with pytest.raises(
             SystemExit, match=r"predict_push_batch: no such service within 0.5 s. Is predict_server running"
@@ -139,16 +139,16 @@ def test_a_planner_gives_up_in_words_when_its_patience_is_over(domain: int):
             client.predict(np.array([[0.02, 0.1, 0.0]]))
 
 
-def test_answers_to_others_do_not_crowd_out_ones_own(domain: int):
-    """The middleware hands a client the answers to all of them: here 300, while it has no time to look."""
+def test_answers_to_other_clients_do_not_crowd_out_the_validators(domain: int):
+    """The middleware delivers the answers to all clients: here 300, while the executor does not run."""
     with ros_context(domain) as node:
         node.create_service(PredictPush, "predict_push", lambda request, response: response)
         other = node.create_client(PredictPush, "predict_push")
         with ros_context(domain) as busy:
             ours = PredictionClient(busy, timeout=60.0)
-            # Two clients known to the server, `other` and ours: to one that it does not know it would not answer.
+            # The server must have discovered both clients, `other` and ours, before it can answer them.
             assert wait_until(lambda: ours.server_is_there and node.count_clients("predict_push") == 2)
-            busy.executor.shutdown()  # nobody looks
+            busy.executor.shutdown()  # nobody takes answers
             answers: list[PredictPush.Response] = []
             ours.ask(PredictPush.Request(), answers.append)
             ours.work()
@@ -165,19 +165,19 @@ def test_answers_to_others_do_not_crowd_out_ones_own(domain: int):
 # --- push_validator and push_replay ----------------------------------------------------------------------------------
 
 
-def test_a_killed_validator_leaves_what_it_measured_the_next_one_keeps_it_and_outlives_its_replay(
+def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
     domain: int, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     windows, comparison = validate_recording(load_model(model), HEXAGON)
     expected = {(w.push_id, w.index): (w, mean) for w, mean in zip(windows, comparison.mean, strict=True)}
     with ros_context(domain) as node, server(domain, model):
-        heard = residuals_heard(node)
+        received = residuals_received(node)
         with validator(domain, model, tmp_path) as process:
             Status(node).wait_for_server()
             with replaying(domain, rate=2.0) as replay:
-                assert wait_until(lambda: len(heard) >= 20, 60.0)
+                assert wait_until(lambda: len(received) >= 20, 60.0)
                 kill(process)
-                published = len(heard)
+                published = len(received)
                 replay.stop()
         left = read_table(tmp_path / "residuals.csv")
         assert not (tmp_path / "validation.json").exists()
@@ -191,31 +191,31 @@ def test_a_killed_validator_leaves_what_it_measured_the_next_one_keeps_it_and_ou
             assert push_predictor(["info", str(tmp_path / name)]) == 0
         assert f"rows        {len(left)}" in capsys.readouterr().out
 
-        # The next one finds what is left; its replay is killed, which has nothing to write.
+        # The next validator finds the files; its replay, which has nothing to write, is killed.
         with validator(domain, model, tmp_path) as process:
-            status, before = Status(node), len(heard)
+            status, before = Status(node), len(received)
             status.wait_for_server()
             with replaying(domain, rate=2.0) as replay:
-                assert wait_until(lambda: len(heard) >= before + 20, 60.0)
+                assert wait_until(lambda: len(received) >= before + 20, 60.0)
                 kill(replay)
-            said = status.wait_for_message("No data for 5 s.", 60.0)
-            assert "Call `~/finish` to write the results." in said and status.values["state"] == "validating"
+            text = status.wait_for_message("No data for 5 s.", 60.0)
+            assert "Call `~/finish` to write the results." in text and status.values["state"] == "validating"
             assert finish(node).success
             (kept,) = tmp_path.glob("cut_off_*")
             assert f"are saved in {kept}. It has no validation.json" in process.text()
     assert {path.name for path in kept.iterdir()} == {"pushes.csv", "pushes.rig.yaml", "residuals.csv"}
     assert len(read_table(kept / "residuals.csv")) == len(left)
-    assert not (tmp_path / "residuals.csv").exists()  # now there is the bag
+    assert not (tmp_path / "residuals.csv").exists()  # replaced by the bag
     assert 20 <= json.loads((tmp_path / "validation.json").read_text())["n_test"] < len(windows)
 
 
-def test_a_score_that_came_to_its_end_is_not_put_aside(tmp_path: Path):
+def test_a_completed_run_is_not_put_aside(tmp_path: Path):
     (tmp_path / "pushes.csv").write_text("complete")
     assert put_aside(tmp_path) is None and (tmp_path / "pushes.csv").exists()
 
 
-def test_lines_are_there_in_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A disk that takes the half of the third line."""
+def test_lines_are_appended_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The disk accepts half of the third line."""
     path, written = tmp_path / "lines", []
 
     def write(descriptor: int, data: bytes) -> int:

@@ -1,4 +1,4 @@
-"""Many clients, many hours: the benchmarks in their short form, and the parts that keep memory flat."""
+"""Many clients and many hours: the benchmarks in their short form, and constant memory."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 # --- many clients ----------------------------------------------------------------------------------------------------
 
 
-def test_many_clients_beside_a_deaf_and_a_stopped_one_are_all_answered():
+def test_all_clients_are_answered_in_spite_of_a_deaf_and_a_stopped_one():
     """The long form: 50 clients, 10 minutes."""
     done = benchmark("load", "--clients", "6", "--minutes", "0.05", "--every", "1")
-    told = done.stdout + done.stderr
-    assert done.returncode == 0, told
+    text = done.stdout + done.stderr
+    assert done.returncode == 0, text
     for service in ("predict_push", "predict_push_batch"):
-        line = next(line for line in told.splitlines() if line.startswith(f"{service} "))
+        line = next(line for line in text.splitlines() if line.startswith(f"{service} "))
         asked, answered = map(int, re.findall(r"asked (\d+), answered (\d+)", line)[0])
         assert asked == answered > 0 and "p99" in line and "lost without an error 0" in line
-    served = int(re.findall(r"it answered (\d+)", told)[0])
-    answered = sum(map(int, re.findall(r"answered (\d+): p50", told)))
-    assert served > answered  # also what the deaf and the stopped one asked, as far as it had left them
-    (grown,) = re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", told)
-    assert max(map(int, grown)) <= 0, told
+    served = int(re.findall(r"it answered (\d+)", text)[0])
+    answered = sum(map(int, re.findall(r"answered (\d+): p50", text)))
+    assert served > answered  # also requests of the deaf and the stopped client
+    (grown,) = re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", text)
+    assert max(map(int, grown)) <= 0, text
 
 
-def test_answers_are_taken_though_the_executor_is_busy_with_samples():
-    """A turn of the executor hands over one answer; here it has no turn at all."""
+def test_answers_are_taken_while_the_executor_is_busy_with_samples():
+    """The executor delivers one answer a turn; here it gets no turn at all."""
     domain = free_domain()
     with ros_context(domain) as node:
         node.create_service(PredictPush, "predict_push", lambda request, response: response)
@@ -82,24 +82,24 @@ def test_answers_are_taken_though_the_executor_is_busy_with_samples():
 # --- many hours ------------------------------------------------------------------------------------------------------
 
 
-def test_no_node_opens_files_or_starts_threads_while_recorded_hours_pass():
-    """The long form: 24 recorded hours. Seconds are too few to judge memory by."""
+def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours():
+    """The long form: 24 recorded hours. A few seconds are too short for memory."""
     done = benchmark(
         "endurance", "--minutes", "0.2", "--every", "0.1", "--warm-up", "0.12", "--most-growth", "60",
         "--recording", "bags/hexagon_delrin",
     )  # fmt: skip
-    told = done.stdout + done.stderr
-    assert done.returncode == 0, told
-    hours, rate = map(float, re.findall(r"([\d.]+) recorded hours in \d+ s: rate (\d+)", told)[0])
-    assert hours > 0.0 and rate > 1.0 and "behind by" in told
+    text = done.stdout + done.stderr
+    assert done.returncode == 0, text
+    hours, rate = map(float, re.findall(r"([\d.]+) recorded hours in \d+ s: rate (\d+)", text)[0])
+    assert hours > 0.0 and rate > 1.0 and "behind by" in text
     for node in ("predict_server", "push_validator", "push_replay", "push_validator, child 1"):
-        (line,) = [line for line in told.splitlines() if line.startswith(f"{node} ") and "after warm-up" in line]
+        (line,) = [line for line in text.splitlines() if line.startswith(f"{node} ") and "after warm-up" in line]
         assert max(map(int, re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", line)[0])) <= 0
-    assert max(map(int, re.findall(r"(\d+) descriptors\n", told))) < 60  # one a window soon meets the limit, and stays
+    assert max(map(int, re.findall(r"(\d+) descriptors\n", text))) < 60  # one for each window would exceed it
 
 
 def test_a_window_and_its_answer_take_forty_bytes_of_memory():
-    """So a day of pushing without a break, 432 000 windows, takes less than 18 MB."""
+    """A day of pushing without a break, 432 000 windows, then takes less than 18 MB."""
     windows = made_up_windows(3000)
     model = train_model(windows_to_table(windows[:40]), square_rig(), "analytical", name="analytical")
     prediction = predict(model, windows[0])
@@ -115,7 +115,7 @@ def test_a_window_and_its_answer_take_forty_bytes_of_memory():
     assert np.array_equal(live.windows[1234].displacement, windows[1234].displacement)
 
 
-def test_rows_come_back_from_the_file_as_they_went_in():
+def test_a_row_file_returns_the_rows_that_were_appended():
     rows, expected = RowFile(), [bytes([k % 256]) * (k % 7) for k in range(500)]
     for row in expected:
         rows.append(row)
@@ -124,7 +124,7 @@ def test_rows_come_back_from_the_file_as_they_went_in():
         rows[500]
 
 
-def test_rows_that_the_disk_does_not_take_stay_in_memory(monkeypatch: pytest.MonkeyPatch):
+def test_rows_stay_in_memory_when_the_disk_is_full(monkeypatch: pytest.MonkeyPatch):
     real: Any = os.pwrite
 
     def full(descriptor: int, data: bytes, place: int) -> int:
@@ -139,7 +139,7 @@ def test_rows_that_the_disk_does_not_take_stay_in_memory(monkeypatch: pytest.Mon
     assert list(rows) == expected
 
 
-def test_a_file_of_rows_has_no_name_and_is_closed_with_its_owner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_row_file_has_no_name_and_is_closed_with_its_owner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(row_file.tempfile, "tempdir", str(tmp_path))
     before = len(os.listdir("/proc/self/fd"))
     rows = RowFile()

@@ -1,4 +1,4 @@
-"""Two robots in one domain: a server, a validator and a replay in each of two namespaces, and nothing crosses."""
+"""Two robots in one domain: server, validator and replay in two namespaces stay independent."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ CELLS = {"/cell1": HEXAGON, "/cell2": CIRCLE}
 
 
 @dataclass
-class Heard:
-    """What was published in one namespace."""
+class Received:
+    """The messages published in one namespace."""
 
     residuals: list[PushResidual] = field(default_factory=list)
     sliders: list[bytes] = field(default_factory=list)
@@ -41,11 +41,11 @@ class Heard:
 
 @dataclass
 class Both:
-    """What two cells that ran at the same time left: their files, what was heard, diagnostics by name, answers."""
+    """Two cells that ran at the same time: their files, messages, diagnostics by name, answers."""
 
     models: dict[str, Path]
     outputs: dict[str, Path]
-    heard: dict[str, Heard]
+    received: dict[str, Received]
     diagnostics: dict[str, dict[str, str]]
     answers: dict[str, list[PredictPush.Response]]
     listed: dict[str, list[str]]
@@ -53,24 +53,24 @@ class Both:
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
-    """Both cells ask for a model by the same name, each has its own under it; both replays play at once."""
+    """Both cells request a model by the same name, which is a different model in each; both replays run at once."""
     folder, domain = tmp_path_factory.mktemp("cells"), free_domain()
     models, outputs = _models(folder), {cell: folder / f"out_{cell.strip('/')}" for cell in CELLS}
-    found = Both(models, outputs, {cell: Heard() for cell in CELLS}, {}, {cell: [] for cell in CELLS}, {})
+    found = Both(models, outputs, {cell: Received() for cell in CELLS}, {}, {cell: [] for cell in CELLS}, {})
     with ExitStack() as stack:
         node = stack.enter_context(ros_context(domain))
         for cell in CELLS:
-            _listen(node, cell, found.heard[cell])
+            _listen(node, cell, found.received[cell])
         node.create_subscription(DiagnosticArray, "/diagnostics", lambda m: _note(found.diagnostics, m), 100)
         processes = [
             process for cell in CELLS for process in _started(stack, domain, cell, models[cell], outputs[cell])
         ]
-        # Made before those whose answers come first, so that none of them is asked twice.
+        # Created before the clients whose answers come first, so that no request is sent twice.
         clients = {cell: node.create_client(PredictPush, f"{cell}/predict_push") for cell in CELLS}
         for cell in CELLS:
             found.listed[cell] = call(node.create_client(ListModels, f"{cell}/list_models"), ListModels.Request()).names
         for cell, recording in CELLS.items():
-            paused = {"play.start_paused": True}  # until it knows who listens here
+            paused = {"play.start_paused": True}  # until it has discovered the subscribers here
             stack.enter_context(replaying(domain, "-r", f"__ns:={cell}", recording=recording, rate=10.0, **paused))
         for cell in CELLS:
             acquaint(node, f"{cell}/push_replay")
@@ -87,10 +87,10 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
 
 
 def _counted(both: Both, cell: str) -> bool:
-    """Were all residuals of a cell heard, and do its diagnostics tell of all windows and requests, by now?"""
+    """Whether all residuals of a cell were received, and its diagnostics count all windows and requests."""
     total = _windows(both, cell)
     judged = both.diagnostics[f"{cell}/push_validator"].get("robot windows") == str(total)
-    return judged and _served(both, cell) >= total + 40 and len(both.heard[cell].residuals) >= total
+    return judged and _served(both, cell) >= total + 40 and len(both.received[cell].residuals) >= total
 
 
 def _windows(both: Both, cell: str) -> int:
@@ -113,11 +113,11 @@ def _models(folder: Path) -> dict[str, Path]:
     return paths
 
 
-def _listen(node: Any, cell: str, heard: Heard) -> None:
+def _listen(node: Any, cell: str, received: Received) -> None:
     deep = QoSProfile(depth=10_000)
-    node.create_subscription(PushResidual, f"{cell}/push_residual", heard.residuals.append, deep)
-    node.create_subscription(PoseStamped, f"{cell}/slider/pose", heard.sliders.append, deep, raw=True)
-    node.create_subscription(String, f"{cell}/rig", heard.rigs.append, LATCHED)
+    node.create_subscription(PushResidual, f"{cell}/push_residual", received.residuals.append, deep)
+    node.create_subscription(PoseStamped, f"{cell}/slider/pose", received.sliders.append, deep, raw=True)
+    node.create_subscription(String, f"{cell}/rig", received.rigs.append, LATCHED)
 
 
 def _note(diagnostics: dict[str, dict[str, str]], message: DiagnosticArray) -> None:
@@ -135,7 +135,7 @@ def _request(k: int) -> PredictPush.Request:
     return PredictPush.Request(velocity=0.02, contact=0.02 * k, angle=0.01 * k, duration=0.2)
 
 
-def test_each_validator_judges_its_own_robot_by_its_own_server(both: Both):
+def test_each_validator_scores_its_own_robot_with_its_own_server(both: Both):
     for cell, recording in CELLS.items():
         assert_same_as_offline(both.outputs[cell], both.models[cell], recording)
 
@@ -149,27 +149,27 @@ def test_answers_come_from_the_server_of_the_namespace(both: Both):
         assert np.allclose(answered, means[cell], rtol=0.0, atol=1e-5)
         assert both.listed[cell] == ["robot"]
     first, second = means.values()
-    assert np.max(np.abs(first - second)) > 1e-3  # so it could not be the other's
+    assert np.max(np.abs(first - second)) > 1e-3  # so it is not the other server's
 
 
-def test_topics_are_those_of_the_namespace(both: Both):
+def test_each_topic_carries_the_data_of_its_namespace(both: Both):
     for cell, recording in CELLS.items():
         recorded = {bytes(m.data) for m in open_bag(recording).messages() if m.topic.endswith("slider/pose")}
-        assert both.heard[cell].sliders and recorded >= set(map(bytes, both.heard[cell].sliders))
-        assert {json.loads(rig.data)["shape"] for rig in both.heard[cell].rigs} == {load_rig_for([recording]).shape}
+        assert both.received[cell].sliders and recorded >= set(map(bytes, both.received[cell].sliders))
+        assert {json.loads(rig.data)["shape"] for rig in both.received[cell].rigs} == {load_rig_for([recording]).shape}
         windows = json.loads((both.outputs[cell] / "windows.json").read_text())["windows"]
-        published = {(m.push_id, m.window) for m in both.heard[cell].residuals}
+        published = {(m.push_id, m.window) for m in both.received[cell].residuals}
         assert published == {(w["push_id"], w["window"]) for w in windows}
         bag = open_bag(both.outputs[cell] / "residuals")
         assert {deserialize_message(m.data, PushResidual).push_id for m in bag.messages()} == {p for p, _ in published}
 
 
-def test_diagnostics_tell_the_robots_apart(both: Both):
+def test_diagnostics_distinguish_the_robots(both: Both):
     names = sorted(name.lstrip("/") for name in both.diagnostics)
     ends = ("push_predictor: predictions", "push_replay: replay", "push_validator")
     assert names == [f"{cell.strip('/')}/{end}" for cell in CELLS for end in ends]
     for cell in CELLS:
         total, judged = _windows(both, cell), both.diagnostics[f"{cell}/push_validator"]
         assert judged["robot windows"] == str(total)
-        # Each once, but for those to which the validator asked again after 2 s without an answer.
+        # Once each, except requests repeated after 2 s without an answer.
         assert total + 40 <= _served(both, cell) <= total + 40 + int(judged["timeouts"])

@@ -1,4 +1,4 @@
-"""Strangers on the network, and the health that nodes state: what happens with real nodes over DDS.
+"""Discovery, security and health of real nodes over DDS.
 
 Other machines are network namespaces joined by a cable; where these cannot be made, the test says so and is skipped.
 """
@@ -45,7 +45,7 @@ SHORT = {"play.playback_duration.sec": 1, "play.exclude_topics_to_filter": ["sur
 
 
 def refused(executable: str, **environment: str) -> str:
-    """What a node prints that ends with status 1 and one line."""
+    """The one line on stderr of a node that ends with status 1."""
     command = [sys.executable, "-m", f"push_predictor.nodes.{executable}"]
     parameters = ["--ros-args", "-p", f"recording:={BAG}"] if executable == "push_replay" else []
     done = subprocess.run(
@@ -67,14 +67,14 @@ ENFORCED = {"ROS_SECURITY_STRATEGY": "Enforce", "ROS_SECURITY_KEYSTORE": str(REP
 @pytest.mark.parametrize(
     ("executable", "given"), [("predict_server", {}), ("push_replay", ENFORCED), ("push_validator", {})]
 )
-def test_a_node_that_should_be_secured_and_cannot_be_refuses_to_start(executable: str, given: Mapping[str, str]):
-    """Where it is not enforced, rcl alone would go on without a word, open to everybody."""
-    said = refused(executable, ROS_SECURITY_ENABLE="true", **given)
-    assert "built without DDS security" in said and "ROS_SECURITY_ENABLE=true" in said
+def test_a_node_refuses_to_start_without_the_requested_security(executable: str, given: Mapping[str, str]):
+    """Unless security is enforced, rcl alone would start an unprotected node without a warning."""
+    text = refused(executable, ROS_SECURITY_ENABLE="true", **given)
+    assert "built without DDS security" in text and "ROS_SECURITY_ENABLE=true" in text
 
 
-def test_a_word_that_ros_takes_for_no_is_refused_too():
-    """To rcl `True` is not `true`: it would not even look for security."""
+def test_rejects_a_value_that_ros_would_read_as_false():
+    """rcl accepts only `true`: with `True` it would not enable security."""
     assert "ROS_SECURITY_ENABLE=True does not enable security" in refused("push_validator", ROS_SECURITY_ENABLE="True")
 
 
@@ -85,7 +85,7 @@ def test_a_word_that_ros_takes_for_no_is_refused_too():
     ("outside", "limited"),
     [({}, True), ({RANGE: ""}, True), ({RANGE: "SUBNET"}, False), ({"ROS_STATIC_PEERS": "10.0.0.1"}, False)],
 )
-def test_a_node_keeps_to_this_machine_unless_the_environment_tells_how_far_to_look(
+def test_discovery_is_limited_to_this_machine_unless_the_environment_sets_a_range(
     outside: Mapping[str, str], limited: bool, monkeypatch: pytest.MonkeyPatch
 ):
     for name in DISCOVERY:
@@ -102,7 +102,7 @@ def ip(*words: str) -> None:
 
 @contextmanager
 def two_machines() -> Iterator[tuple[str, str]]:
-    """Two network namespaces with a cable between them."""
+    """Two network namespaces joined by a cable."""
     names = [f"push{os.getpid()}{end}" for end in "ab"]
     try:
         for name in names:
@@ -125,7 +125,7 @@ def two_machines() -> Iterator[tuple[str, str]]:
 LOOK = """
 import sys, time, rclpy
 rclpy.init()
-node, end = rclpy.create_node("stranger"), time.monotonic() + float(sys.argv[1])
+node, end = rclpy.create_node("visitor"), time.monotonic() + float(sys.argv[1])
 while time.monotonic() < end and "push_validator" not in node.get_node_names():
     time.sleep(0.05)
 print("push_validator" in node.get_node_names())
@@ -135,7 +135,7 @@ print("push_validator" in node.get_node_names())
 def on(machine: str, environment: Mapping[str, str], *command: str, **how: Any) -> subprocess.Popen[str]:
     unset = [word for name in DISCOVERY for word in ("-u", name)]
     words = ["ip", "netns", "exec", machine, "env", *unset, *(f"{k}={v}" for k, v in environment.items()), *command]
-    # Without shared memory, which network namespaces have in common, and with it all tests in a domain of this number.
+    # Network namespaces share memory, and so would all tests in this domain: use UDP alone.
     alone = {**node_environment(DOMAIN), "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
     return subprocess.Popen(words, env=alone, cwd=REPOSITORY, text=True, **how)
 
@@ -144,21 +144,21 @@ DOMAIN = 57  # these machines have no other nodes
 
 
 def finds(machine: str, patience: float) -> bool:
-    """Does somebody on this machine, who looks as far as ROS does by default, find the validator?"""
-    stranger = on(machine, {}, sys.executable, "-c", LOOK, str(patience), stdout=subprocess.PIPE)
-    out, _ = stranger.communicate(timeout=60.0)
+    """Whether a node on this machine, with ROS's default range, discovers the validator."""
+    visitor = on(machine, {}, sys.executable, "-c", LOOK, str(patience), stdout=subprocess.PIPE)
+    out, _ = visitor.communicate(timeout=60.0)
     return "True" in out
 
 
 @pytest.mark.parametrize("asked", [{}, {RANGE: "SUBNET"}], ids=["as it is", "asked for the network"])
-def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[str, str], tmp_path: Path):
+def test_another_machine_discovers_a_node_only_on_request(asked: Mapping[str, str], tmp_path: Path):
     log = tmp_path / "log"
     with two_machines() as (here, there), log.open("w") as output:
         command = (sys.executable, "-m", "push_predictor.nodes.push_validator")
         node = on(here, asked, *command, stdout=output, stderr=output)
         try:
             assert wait_until(lambda: "Waiting for" in log.read_text()), log.read_text()
-            assert asked or finds(here, 25.0)  # who looks far on the same machine finds it in any case
+            assert asked or finds(here, 25.0)  # on the same machine any range discovers it
             assert finds(there, 25.0 if asked else 3.0) == bool(asked)
         finally:
             node.terminate()
@@ -171,30 +171,30 @@ def test_another_machine_finds_a_node_only_if_that_was_asked_for(asked: Mapping[
 
 @dataclass
 class Listener:
-    """When each node stated its health, by its own clock, and in which state it was."""
+    """When each node reported its health, by its own clock, and its state then."""
 
-    heard: dict[str, list[tuple[float, str]]] = field(default_factory=dict)
+    reports: dict[str, list[tuple[float, str]]] = field(default_factory=dict)
 
     def __call__(self, message: DiagnosticArray, info: Mapping[str, int]) -> None:
         for status in message.status:
             state = {pair.key: pair.value for pair in status.values}["state"]
             node = status.name.split(":")[0].strip("/")
-            self.heard.setdefault(node, []).append((1e-9 * info["source_timestamp"], state))
+            self.reports.setdefault(node, []).append((1e-9 * info["source_timestamp"], state))
 
     def in_state(self, node: str, state: str) -> list[float]:
-        return [when for when, said in self.heard.get(node, []) if said == state]
+        return [when for when, text in self.reports.get(node, []) if text == state]
 
 
 @dataclass(frozen=True)
 class Graph:
-    """The three nodes, idle and with /clock standing still."""
+    """The three nodes, idle while /clock stands still."""
 
     node: Node
     listener: Listener
 
     def change(self, transition: int) -> None:
         client = self.node.create_client(ChangeState, "/push_predictor/change_state")
-        acquaint(self.node, "/push_predictor")  # a transition that is asked for twice is refused
+        acquaint(self.node, "/push_predictor")  # a repeated transition is refused
         assert call(client, ChangeState.Request(transition=Transition(id=transition))).success
 
 
@@ -213,18 +213,18 @@ def graph() -> Iterator[Graph]:
         for executable, given in params.items():
             given = {"use_sim_time": True, **given}
             stack.enter_context(node_process(executable, domain=domain, params=given))
-        assert wait_until(lambda: set(listener.heard) == set(NODES.values())), listener.heard
+        assert wait_until(lambda: set(listener.reports) == set(NODES.values())), listener.reports
         yield Graph(node, listener)
 
 
 def assert_every_second(graph: Graph, node: str, state: str) -> None:
-    """Statements of this state, a second apart; the first may be late by what the change took."""
-    assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 8, 60.0), graph.listener.heard
+    """Assert reports of this state, one second apart; the first may be delayed by the transition."""
+    assert wait_until(lambda: len(graph.listener.in_state(node, state)) >= 8, 60.0), graph.listener.reports
     gaps = np.diff(graph.listener.in_state(node, state)[1:8])
     assert 0.75 < np.median(gaps) < 1.75, gaps
 
 
-def test_every_node_states_its_health_once_a_second_also_where_it_has_nothing_to_do(graph: Graph):
+def test_an_idle_node_reports_its_health_every_second(graph: Graph):
     assert_every_second(graph, "push_predictor", "unconfigured")
     assert_every_second(graph, "push_validator", "waiting for samples")
     assert_every_second(graph, "push_replay", "paused")
@@ -237,7 +237,7 @@ RULES = {
 
 
 def permissions(ns: str = "/") -> dict[str, dict[tuple[str, str], set[str]]]:
-    """By node: what config/sros2_policy.xml allows, {(what, how): full names}."""
+    """The permissions of config/sros2_policy.xml by node: {(kind, use): full names}."""
     root = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
     allowed: dict[str, dict[tuple[str, str], set[str]]] = {}
     for enclave in root.findall("enclaves/enclave"):
@@ -257,7 +257,7 @@ def full_name(name: str, node: str) -> str:
 
 
 def with_parts_of_actions(rules: Mapping[tuple[str, str], set[str]]) -> dict[str, set[str]]:
-    """By kind of entity, as the graph has them: an action is three services and two topics."""
+    """The permissions by kind of entity; an action is three services and two topics."""
     actions = rules.get(("actions", "execute"), set())
     topics = {f"{name}/_action/{part}" for name in actions for part in ("feedback", "status")}
     services = {f"{name}/_action/{part}" for name in actions for part in ("send_goal", "cancel_goal", "get_result")}
@@ -270,7 +270,7 @@ def with_parts_of_actions(rules: Mapping[tuple[str, str], set[str]]) -> dict[str
 
 
 def used(node: Node, name: str) -> dict[str, set[str]]:
-    """What a node of the graph has, by kind of entity."""
+    """The entities of a node, by kind."""
     found = {}
     for kind in ("publisher", "subscriber", "service", "client"):
         rows = getattr(node, f"get_{kind}_names_and_types_by_node")(name, "/")
@@ -278,8 +278,8 @@ def used(node: Node, name: str) -> dict[str, set[str]]:
     return found
 
 
-def test_the_policy_allows_what_each_node_does_and_nothing_else(graph: Graph):
-    """Introspection and simulated time are on, so that what comes with them counts too."""
+def test_the_policy_allows_exactly_what_each_node_uses(graph: Graph):
+    """Introspection and simulated time are on, so their entities are included."""
     graph.change(Transition.TRANSITION_CONFIGURE)
     assert wait_until(lambda: graph.node.count_services("/predict_push") > 0)
     allowed = permissions()
@@ -287,7 +287,7 @@ def test_the_policy_allows_what_each_node_does_and_nothing_else(graph: Graph):
     for name, rules in allowed.items():
         wanted = with_parts_of_actions(rules)
         wanted["subscriber"] -= set() if tf_is_there() else {"/tf", "/tf_static"}
-        if name == "push_validator":  # it listens to /clock itself where it dates scalar topics
+        if name == "push_validator":  # it subscribes to /clock itself to date scalar topics
             assert "/clock" in wanted["subscriber"]
         assert wait_until(lambda name=name, wanted=wanted: used(graph.node, name) == wanted, 30.0), (  # type: ignore[misc]  # bound at once
             name,
@@ -299,11 +299,11 @@ def tf_is_there() -> bool:
     return subprocess.run([sys.executable, "-c", "import tf2_ros"], capture_output=True).returncode == 0
 
 
-def test_health_is_stated_in_the_other_states_too(graph: Graph):
+def test_nodes_report_their_health_in_other_states_too(graph: Graph):
     assert_every_second(graph, "push_predictor", "inactive")
     assert call(graph.node.create_client(Resume, "/push_replay/resume"), Resume.Request()) is not None
     assert_every_second(graph, "push_replay", "finished")
 
 
-def test_the_harness_of_the_tests_keeps_to_this_machine():
+def test_the_test_harness_limits_discovery_to_this_machine():
     assert ros_harness.node_environment(1)[RANGE] == "LOCALHOST"

@@ -1,4 +1,4 @@
-"""All faults of the streams in turn, over DDS, in simulated time that jumps back: what push_validator makes of them."""
+"""Every fault of the streams, one after the other, sent to push_validator over DDS in simulated time."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PORTION = 10  # samples
 
 
 def clean(start: float) -> Recording:
-    """A push of a second, `start` s after the beginning."""
+    """A push of one second, `start` s after the beginning."""
     recording = translating_push(Push(0.5, 1.7))
     assert recording.wrench is not None
     streams = {name: getattr(recording, name) for name in TOPICS}
@@ -52,7 +52,7 @@ def with_slider(recording: Recording, order: np.ndarray) -> Recording:
 
 
 def altered(recording: Recording, sample: int, **values: float) -> Recording:
-    """One sample of the slider with other numbers."""
+    """The recording with one sample of the slider changed."""
     columns = {name: getattr(recording.slider, name).copy() for name in values}
     for name, value in values.items():
         columns[name][sample] = value
@@ -60,14 +60,14 @@ def altered(recording: Recording, sample: int, **values: float) -> Recording:
 
 
 def elsewhere(recording: Recording) -> Recording:
-    """The object and the tip are put 0.1 m to the side in mid push."""
+    """Slider and tip are moved 0.1 m to the side during a push."""
     late = np.arange(len(recording.slider)) > 110
     slider, pusher = (replace(s, x=s.x + 0.1 * late) for s in (recording.slider, recording.pusher))
     return replace(recording, slider=slider, pusher=pusher)
 
 
 def day() -> list[Recording]:
-    """What the sensors deliver, one push after another; at last the time jumps back to the beginning."""
+    """The recordings that the sensors publish, one push each; at last the time jumps back to the beginning."""
     n = np.arange(len(clean(0.0).slider))
     future = clean(30.0)
     stamp = future.slider.stamp.copy()
@@ -93,7 +93,7 @@ class Sensors:
         self._out: dict[str, Publisher] = {n: node.create_publisher(kinds[n], t, 5000) for n, t in TOPICS.items()}
         self._clock = node.create_publisher(Clock, "/clock", 10)
         for publisher in (*self._out.values(), self._clock):
-            assert wait_until(partial(_is_heard, publisher))
+            assert wait_until(partial(_has_subscriber, publisher))
 
     def send(self, recording: Recording, names: tuple[str, ...] = tuple(TOPICS), pause: float = 0.01) -> None:
         longest = max(len(getattr(recording, name)) for name in names)
@@ -106,7 +106,7 @@ class Sensors:
             time.sleep(pause)
 
 
-def _is_heard(publisher: Publisher) -> bool:
+def _has_subscriber(publisher: Publisher) -> bool:
     return bool(publisher.get_subscription_count() > 0)
 
 
@@ -121,7 +121,7 @@ def messages(stream: PoseStream | WrenchStream, part: slice) -> list[bytes]:
 
 
 def offline(recordings: list[Recording]) -> PushTable:
-    """The windows, as reading the recordings one after another finds them."""
+    """The windows that reading the recordings one after another finds."""
     finder = WindowFinder(square_rig())
     windows = []
     for recording in recordings:
@@ -133,7 +133,7 @@ def offline(recordings: list[Recording]) -> PushTable:
     return windows_to_table([*windows, *finder.finish()])
 
 
-def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) -> None:
+def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> None:
     model, rig, out = tmp_path / "model.pushmodel", tmp_path / "square.rig.yaml", tmp_path / "out"
     save_model(train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="any"), model)
     save_rig(square_rig(), rig)
@@ -153,19 +153,23 @@ def test_every_fault_is_counted_by_its_kind_and_makes_no_window(tmp_path: Path) 
         assert values["contact from"] == "geometry and force"
         expected = {"late": 1, "repeated": 3, "ahead": 1, "jumps": 1}
         assert {kind: int(values[f"slider {kind}"]) for kind in expected} == expected
-        assert {kind: int(values[f"streams {kind}"]) for kind in expected} == {**expected, "jumps": 2}, "the tip's too"
+        assert {kind: int(values[f"streams {kind}"]) for kind in expected} == {**expected, "jumps": 2}, (
+            "also of the tip"
+        )
         assert values["slider rejected not finite"] == "1"
-        assert values["streams resets"] == "8"  # one in mid push, and between the pushes
-        assert int(values["slider dropouts"]) >= 1 + 7  # and between the pushes, which lie 10 s apart
+        assert values["streams resets"] == "8"  # one during a push, and one between each two pushes
+        assert int(values["slider dropouts"]) >= 1 + 7  # and one between each two pushes, which lie 10 s apart
         assert "1 ahead (samples with a stamp ahead" in status.message
-        sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor is gone, the others go on
+        sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor stops, the others continue
         status.wait_for_message("No sample from the wrench for 2 s")
         assert process.stop() == 0, process.text()
     table = read_table(out / "pushes.csv")
     assert len(expected_rows) > 30 and len(table) == len(expected_rows)
     assert table.inputs == pytest.approx(expected_rows.inputs, abs=1e-9)
     assert table.outcomes == pytest.approx(expected_rows.outcomes, abs=1e-9)
-    assert table.outcomes == pytest.approx(np.tile([0.004, 0.0, 0.0], (len(table), 1)), abs=1e-9), "what the tip drove"
+    assert table.outcomes == pytest.approx(np.tile([0.004, 0.0, 0.0], (len(table), 1)), abs=1e-9), (
+        "the distance that the tip moved"
+    )
 
 
 def portion(slider: int, pusher: int) -> Samples:
@@ -178,32 +182,32 @@ def portion(slider: int, pusher: int) -> Samples:
     return Samples(replace(a, stamp=at[0]), replace(b, stamp=at[1]), none)
 
 
-@pytest.mark.parametrize(("lag", "told"), [(0, {}), (200, {}), (700, {"pusher": 0.7}), (-3000, {"pusher": -3.0})])
-def test_clocks_that_stay_apart_are_told_while_they_come(lag: int, told: dict[str, float]) -> None:
-    pace = StreamSync()
+@pytest.mark.parametrize(("lag", "expected"), [(0, {}), (200, {}), (700, {"pusher": 0.7}), (-3000, {"pusher": -3.0})])
+def test_reports_clocks_that_stay_apart(lag: int, expected: dict[str, float]) -> None:
+    sync = StreamSync()
     for k in range(LAGS - 1):
-        pace.note(portion(10 * k, 10 * k + lag))
-    assert pace.apart() == {} and not pace.problems(), "too early to tell"
-    pace.note(portion(10 * LAGS, 10 * LAGS + lag))
-    assert pace.apart() == pytest.approx(told, abs=0.011)
-    assert [("ahead of" if lag > 0 else "behind") in text for text in pace.problems()] == [True] * len(told)
+        sync.note(portion(10 * k, 10 * k + lag))
+    assert sync.apart() == {} and not sync.problems(), "too few portions"
+    sync.note(portion(10 * LAGS, 10 * LAGS + lag))
+    assert sync.apart() == pytest.approx(expected, abs=0.011)
+    assert [("ahead of" if lag > 0 else "behind") in text for text in sync.problems()] == [True] * len(expected)
 
 
-def test_a_stream_that_lags_now_and_then_is_not_apart() -> None:
-    pace = StreamSync()
+def test_an_occasional_lag_is_not_a_clock_offset() -> None:
+    sync = StreamSync()
     for k in range(2 * LAGS):
-        pace.note(portion(10 * k, 10 * k - (2000 if k % 10 else 0)))
-    assert pace.apart() == {}
+        sync.note(portion(10 * k, 10 * k - (2000 if k % 10 else 0)))
+    assert sync.apart() == {}
 
 
-def test_a_sensor_that_stops_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reports_a_sensor_that_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
-    pace = StreamSync()
-    pace.note(portion(0, 0))
+    sync = StreamSync()
+    sync.note(portion(0, 0))
     now[0] += 3.0
-    assert pace.silent() == [], "all have stopped: a pause"
+    assert sync.silent() == [], "all have stopped: a pause"
     none = rows(clean(0.0).pusher, np.arange(0))
-    pace.note(replace(portion(10, 10), pusher=none))
-    assert pace.silent() == ["pusher"]
-    assert "No sample from the pusher" in pace.problems()[0]
+    sync.note(replace(portion(10, 10), pusher=none))
+    assert sync.silent() == ["pusher"]
+    assert "No sample from the pusher" in sync.problems()[0]

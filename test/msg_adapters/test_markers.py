@@ -1,4 +1,4 @@
-"""What a window's markers say: where the pusher was, and where the outcome fell in the prediction, at two scales."""
+"""The markers of a window show the pusher, and the outcome relative to the prediction, at two scales."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def centre(marker: Marker) -> np.ndarray:
 
 @pytest.mark.parametrize("shape", ["rect1", "hex", "ellip2"])
 @pytest.mark.parametrize("contact", [0.03, 0.3, 0.77])
-def test_the_pusher_touches_the_slider_where_the_window_says_and_the_arrow_points_into_its_back(shape, contact):
+def test_the_pusher_touches_the_slider_at_the_contact_and_the_arrow_points_into_its_back(shape, contact):
     at = window(MEAN, contact=contact, shape=shape)
     shown = markers(at, shape)
     disc, (tail, head) = shown["pusher"], points(shown["push"])
@@ -77,7 +77,7 @@ def test_the_pusher_touches_the_slider_where_the_window_says_and_the_arrow_point
     assert np.allclose(head + 0.00475 * along, centre(disc))
 
 
-def test_an_outcome_as_predicted_lies_in_the_middle_of_everything():
+def test_an_outcome_equal_to_the_prediction_is_centred_in_all_markers():
     shown = markers(window(MEAN))
     middle = points(shown["predicted_ellipse"])[:-1].mean(axis=0)
     assert np.allclose(centre(shown["magnified_observed"]), middle, atol=1e-12)
@@ -93,8 +93,8 @@ def test_an_outcome_as_predicted_lies_in_the_middle_of_everything():
 
 @settings(max_examples=60, deadline=None)
 @given(ERRORS)
-def test_what_lies_inside_at_true_scale_lies_inside_enlarged(error):
-    """And inside means what the covariance says, for the centre and for the heading."""
+def test_true_and_enlarged_markers_agree_on_inside_or_outside(error):
+    """Inside is as the covariance defines it, for the centre and for the heading."""
     away = np.linalg.cholesky(COVARIANCE) @ np.array(error)
     shown = markers(window(MEAN + away))
     inside = away[:2] @ np.linalg.solve(COVARIANCE[:2, :2], away[:2]) / CHI2_95_OF_TWO
@@ -114,7 +114,7 @@ def test_what_lies_inside_at_true_scale_lies_inside_enlarged(error):
 
 
 @given(ERRORS)
-def test_the_label_tells_the_distance_and_is_red_beyond_the_limit(error):
+def test_the_label_shows_the_distance_and_is_red_beyond_the_limit(error):
     away = np.linalg.cholesky(COVARIANCE) @ np.array(error)
     distance = float(np.linalg.norm(error))
     assert error_in_sd(window(MEAN + away), predicted()) == pytest.approx(distance, rel=1e-6, abs=1e-9)
@@ -125,7 +125,7 @@ def test_the_label_tells_the_distance_and_is_red_beyond_the_limit(error):
     assert label.text.startswith("push-1.5, window 3\n20 mm/s, ")
 
 
-def test_turning_the_world_turns_all_but_the_label():
+def test_rotating_the_world_rotates_everything_but_the_label():
     turn, shift = 0.8, np.array([0.03, -0.02])
     at = window(MEAN + SD)
     moved = np.append(rotate(at.slider_start[:2], np.array(turn)) + shift, at.slider_start[2] + turn)
@@ -139,7 +139,7 @@ def test_turning_the_world_turns_all_but_the_label():
             assert np.allclose(centre(now), rotate(centre(then), np.array(turn)) + shift, atol=1e-12), name
 
 
-def test_a_heading_that_is_not_known_at_all_fills_the_dial_and_no_more():
+def test_an_unknown_heading_fills_the_dial_once():
     wide = np.diag([1e-8, 1e-8, 9.0])
     array = magnified_markers(np.zeros(3), wide, np.array([0.0, 0.0, 6.2]), 0.06, 0.0, "world", 0)
     band = next(points(marker) for marker in array.markers if marker.ns == "magnified_heading")
@@ -155,7 +155,7 @@ def axes():
     return made
 
 
-def test_the_canvas_draws_the_sizes_places_and_colours_of_the_message():
+def test_the_canvas_draws_sizes_positions_and_colours_of_the_message():
     made = axes()
     at = window(MEAN, start=(0.0, 0.0, 0.3))
     array = window_markers(rig(), at, predicted(), "world")
@@ -176,7 +176,7 @@ def test_the_canvas_draws_the_sizes_places_and_colours_of_the_message():
     assert [text.get_text() for text in made.texts] == [named["label"].text]
 
 
-def test_the_canvas_minds_a_marker_s_pose_and_refuses_what_it_does_not_know():
+def test_the_canvas_applies_a_markers_pose_and_rejects_unknown_markers():
     made, marker = axes(), Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD)
     marker.pose.position.x, marker.pose.orientation.z, marker.pose.orientation.w = 0.05, 1.0, 0.0  # half a turn
     marker.scale.x, marker.scale.y = 2.0, 1.0

@@ -1,4 +1,4 @@
-"""ROS messages and the library's types say the same thing, both ways, and bad messages are refused by field."""
+"""Conversions between ROS messages and the library's types lose nothing and reject bad values by field."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def test_a_stamp_survives_to_the_nanosecond(nanoseconds):
     assert stamp_to_ns(over_the_wire(ns_to_stamp(nanoseconds))) == nanoseconds
 
 
-def test_a_stamp_beyond_the_message_is_refused():
+def test_rejects_a_stamp_beyond_32_bit_seconds():
     with pytest.raises(MessageError, match="stamp"):
         ns_to_stamp(2**31 * 10**9)
 
 
-def test_a_message_error_is_one_of_the_package():
+def test_a_message_error_is_an_error_of_the_package():
     assert issubclass(MessageError, PushPredictorError)
 
 
@@ -96,7 +96,7 @@ def test_one_prediction_survives_bit_for_bit():
     assert np.array_equal(response.covariance, prediction.covariance[0].ravel())  # row-major
 
 
-def test_a_refusal_carries_its_reason_and_no_number():
+def test_a_refusal_contains_its_reason_and_no_number():
     from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
     half_written = PredictPush.Response()
@@ -110,7 +110,7 @@ def test_a_refusal_carries_its_reason_and_no_number():
 
 
 @given(st.integers(0, 4), st.integers(0, 3))
-def test_a_query_survives_with_its_covariates_push_by_push(count, width):
+def test_a_batch_query_survives_with_its_covariates(count, width):
     rng = np.random.default_rng(count * 10 + width)
     covariates = {f"c{k}": rng.normal(size=count) for k in range(width)}
     request = query_to_batch_request(PushQuery("m", rng.normal(size=(count, 3)), 0.2, covariates))
@@ -131,7 +131,7 @@ def test_one_push_survives_with_its_covariates():
 
 
 @pytest.mark.parametrize("field", ["contact", "angle"])
-def test_arrays_of_unequal_length_are_refused(field):
+def test_rejects_arrays_of_unequal_length(field):
     request = query_to_batch_request(PushQuery("", np.ones((3, 3)), 0.2, {}))
     setattr(request, field, [0.1, 0.2])
     with pytest.raises(RequestError, match=f"{field} length: 2 is not accepted, give 3"):
@@ -196,7 +196,7 @@ def test_a_residual_survives():
     np.testing.assert_array_equal(message.covariance, window.covariance.ravel())
 
 
-def test_a_covariance_that_is_none_is_refused():
+def test_rejects_a_covariance_that_is_not_positive_definite():
     with pytest.raises(MessageError, match=r"covariance.*positive definite"):
         residual_to_message(window_of(np.diag([1.0, 1.0, -1.0]), np.ones(3)))
 
@@ -225,7 +225,7 @@ def test_a_status_names_its_values():
     }
 
 
-def test_levels_rise():
+def test_levels_are_those_of_diagnostic_msgs():
     assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR, Level.STALE)] == [
         b"\0",
         b"\1",
@@ -253,7 +253,7 @@ def some_markers(mirror: float = 1.0) -> dict:
     return by_name(prediction_markers(vertices, *poses[:2], covariance, poses[2], "world", 5))
 
 
-def test_markers_lie_where_the_slider_is():
+def test_markers_have_the_slider_poses():
     markers = {name: over_the_wire(marker) for name, marker in some_markers().items()}
     for name, pose in {"start_outline": [0.1, 0.2], "predicted_outline": [0.11, 0.22]}.items():
         outline = points_of(markers[name])
@@ -288,7 +288,7 @@ def test_every_point_of_the_ellipse_has_the_same_mahalanobis_distance(sx, sy, co
     assert np.allclose(away[0], away[-1])
 
 
-def test_the_ellipse_holds_95_percent():
+def test_the_ellipse_contains_95_percent():
     covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
     draws = np.random.default_rng(0).multivariate_normal([0.0, 0.0], covariance, size=40_000)
     radius = np.einsum("ni,ij,nj->n", draws, np.linalg.inv(covariance), draws)

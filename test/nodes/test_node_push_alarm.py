@@ -1,4 +1,4 @@
-"""The alarm as others meet it: a replay with a change in it, a replay without, and what is left on disk."""
+"""The alarm through real nodes: a replay with a change, a replay without, and the files they leave."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ CHANGE_AT = 25
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def rubbed(moment: Moment) -> Array:
-    """The contact friction is doubled from one push on."""
+def doubled_friction(moment: Moment) -> Array:
+    """The contact friction, doubled from push CHANGE_AT on."""
     return np.where(moment.conditions.values["push_index"] >= CHANGE_AT, 0.25, 0.0)
 
 
@@ -49,17 +49,17 @@ def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A model, a recording like those it was trained on, and one in which something changes."""
+    """A model, a recording like those it was trained on, and one in which the friction changes."""
     folder = tmp_path_factory.mktemp("alarm")
     training = [record(folder / "training", seed=1, pushes=120)]
     model = train_model(load_data(training), load_rig_for(training), "gp", name="gp")
     save_model(model, folder / "gp.pushmodel")
-    changed = record(folder / "changed", seed=2, changes=Changes(contact_friction=rubbed))
+    changed = record(folder / "changed", seed=2, changes=Changes(contact_friction=doubled_friction))
     return {"model": folder / "gp.pushmodel", "clean": record(folder / "clean", seed=3), "changed": changed}
 
 
 class Outcome:
-    """What a replay through real nodes brings: alarms, diagnostics, files."""
+    """Alarms, diagnostics and files of a replay through real nodes."""
 
     def __init__(self, bench: dict[str, Path], recording: str, output: Path) -> None:
         domain = free_domain()
@@ -103,7 +103,7 @@ def offline(bench: dict[str, Path], recording: str) -> dict[str, object]:
     return alarm_json(alarm_state(calibrate(model), table, comparison.mean, comparison.covariance))
 
 
-def test_a_change_in_the_middle_of_a_replay_is_told_once(changed: Outcome, bench: dict[str, Path]):
+def test_a_change_during_a_replay_raises_one_alarm(changed: Outcome, bench: dict[str, Path]):
     (alarm,) = changed.alarms
     windows, _ = validate_recording(load_model(bench["model"]), bench["changed"])
     order = list(dict.fromkeys(window.push_id for window in windows))
@@ -111,7 +111,7 @@ def test_a_change_in_the_middle_of_a_replay_is_told_once(changed: Outcome, bench
     assert alarm.log10_evidence >= 2.0 and alarm.false_alarm_rate == 0.01
     stamp = alarm.header.stamp.sec * 10**9 + alarm.header.stamp.nanosec
     assert stamp == max(window.end for window in windows if window.push_id == alarm.push_id)
-    assert [late.push_id for late in changed.late] == [alarm.push_id], "one who comes later hears of it too"
+    assert [late.push_id for late in changed.late] == [alarm.push_id], "a later subscriber receives it too"
 
 
 def test_the_diagnostics_warn_with_push_and_evidence(changed: Outcome):
@@ -124,19 +124,19 @@ def test_the_diagnostics_warn_with_push_and_evidence(changed: Outcome):
 
 
 @pytest.mark.parametrize("recording", ["changed", "clean"])
-def test_the_result_says_what_is_found_offline(recording: str, bench: dict[str, Path], request):
+def test_the_alarm_in_the_result_equals_the_offline_alarm(recording: str, bench: dict[str, Path], request):
     found, expected = request.getfixturevalue(recording).result["alarm"], offline(bench, recording)
     assert found.pop("log10_evidence") == pytest.approx(expected.pop("log10_evidence"), abs=1e-6)
     assert found == expected
 
 
-def test_a_recording_like_those_trained_on_gives_no_alarm(clean: Outcome):
+def test_a_recording_without_a_change_raises_no_alarm(clean: Outcome):
     assert clean.alarms == clean.late == []
     assert clean.result["alarm"]["fired"] is False and clean.result["alarm"]["pushes"] == PUSHES
     assert clean.status.values["alarm"] == "quiet"
 
 
-def test_the_windows_are_on_disk_with_covariates_and_rig(changed: Outcome, bench: dict[str, Path]):
+def test_the_windows_are_saved_with_covariates_and_rig(changed: Outcome, bench: dict[str, Path]):
     table = load_data([changed.output / "pushes.csv"])
     windows, _ = validate_recording(load_model(bench["model"]), bench["changed"])
     expected = windows_to_table(windows)
@@ -148,7 +148,7 @@ def test_the_windows_are_on_disk_with_covariates_and_rig(changed: Outcome, bench
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, -0.5])
-def test_a_rate_that_is_none_is_refused_by_name(rate: float):
+def test_rejects_a_false_alarm_rate_outside_0_to_1_by_name(rate: float):
     with node_process("push_validator", domain=free_domain(), params={"false_alarm_rate": rate}) as process:
         assert process.wait(30.0) == 1
         assert "false_alarm_rate" in process.text() and "above 0 and below 1" in process.text()
@@ -165,7 +165,7 @@ def analytical(pushes: int) -> PushModel:
     return train_model(table, rig, "analytical", name="analytical")
 
 
-def test_a_model_of_too_few_pushes_gets_no_alarm_and_the_reason_is_told():
+def test_too_few_training_pushes_turn_the_alarm_off_with_a_reason():
     alarm = AlarmProcess(0.01, lambda state, end: pytest.fail("it must not fire"))
     alarm.prepare(analytical(pushes=5))
     assert alarm.busy and wait_until(lambda: (alarm.work(), not alarm.busy)[1], 60.0)
@@ -174,7 +174,7 @@ def test_a_model_of_too_few_pushes_gets_no_alarm_and_the_reason_is_told():
     assert not alarm.busy and alarm.json == {"fired": False, "off": alarm.off} and "at least 10" in alarm.off
 
 
-def test_a_process_that_is_killed_ends_the_alarm_not_the_node():
+def test_a_killed_alarm_process_does_not_end_the_node():
     alarm = AlarmProcess(0.01, lambda state, end: pytest.fail("it must not fire"))
     alarm.prepare(analytical(pushes=20))
     assert alarm._process is not None

@@ -1,4 +1,4 @@
-"""push_validator as others meet it: a process that watches topics, asks a server, writes a score."""
+"""push_validator as a process: it subscribes to topics, calls a server and writes scores."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Files of two models of the hexagon. That they are tried on their own training pushes does not matter here."""
+    """Files of two models of the hexagon, tested here on their own training pushes, which does not matter."""
     folder, data = tmp_path_factory.mktemp("models"), [HEXAGON]
     table, rig = load_data(data), load_rig_for(data)
     for kind in ("gp", "analytical"):
@@ -92,7 +92,7 @@ def count_of_windows(model: Path, recording: Path = HEXAGON) -> str:
 
 
 class Listener:
-    """What is published while a recording is validated."""
+    """Everything published during a validation."""
 
     def __init__(self, node: Any) -> None:
         self.residuals: list[PushResidual] = []
@@ -104,36 +104,36 @@ class Listener:
 
 @pytest.fixture(scope="module")
 def watched(models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Listener]:
-    """One recording at rate 10, judged for two models, with all that was published meanwhile."""
+    """Output folder and messages of one recording, replayed at rate 10 and validated for two models."""
     domain, out = free_domain(), tmp_path_factory.mktemp("watched")
     gp, analytical = models.values()
     served = {"models": [str(gp), str(analytical)]}
     with ros_context(domain) as node, node_process("predict_server", domain=domain, params=served):
-        heard = Listener(node)
+        received = Listener(node)
         with validator(domain, model=gp, compare=[str(analytical)], output=out) as process:
-            heard.status.wait_for_first()
+            received.status.wait_for_first()
             with replaying(domain, rate=10.0):
                 process.wait_for_text(WRITTEN, 60.0)
             judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
-            assert wait_until(lambda: len(heard.residuals) >= sum(judged) and len(heard.markers) >= judged[0])
-            heard.status.wait_for("state", "waiting for samples")
+            assert wait_until(lambda: len(received.residuals) >= sum(judged) and len(received.markers) >= judged[0])
+            received.status.wait_for("state", "waiting for samples")
             assert process.stop() == 0, process.text()
-    return out, heard
+    return out, received
 
 
-def test_a_replay_at_rate_10_gives_what_reading_the_recording_gives(watched, models: dict[str, Path]):
+def test_a_replay_at_rate_10_gives_the_result_of_reading_the_recording(watched, models: dict[str, Path]):
     out, _ = watched
     assert_same_as_offline(out, models["gp"])
     assert_same_as_offline(out, models["analytical"], suffix="_analytical")
 
 
-def test_every_residual_is_published_with_the_numbers_of_the_log(watched):
-    out, heard = watched
+def test_publishes_every_residual_with_the_numbers_of_the_log(watched):
+    out, received = watched
     logged = [
         (name, w) for name, suffix in (("gp", ""), ("analytical", "_analytical")) for w in windows_of(out, suffix)
     ]
-    published = {(m.model, m.push_id, m.window): m for m in heard.residuals}
-    assert len(heard.residuals) == len(published) == len(logged)
+    published = {(m.model, m.push_id, m.window): m for m in received.residuals}
+    assert len(received.residuals) == len(published) == len(logged)
     for name, entry in logged:
         message = published[name, entry["push_id"], entry["window"]]
         for field in ("velocity", "contact", "angle", "duration"):
@@ -144,10 +144,10 @@ def test_every_residual_is_published_with_the_numbers_of_the_log(watched):
         assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == entry["end"]
 
 
-def test_the_running_figures_end_at_those_of_the_result(watched):
-    out, heard = watched
+def test_running_scores_end_at_those_of_the_result(watched):
+    out, received = watched
     for name, suffix in (("gp", ""), ("analytical", "_analytical")):
-        result, values = json.loads((out / f"validation{suffix}.json").read_text()), heard.status.values
+        result, values = json.loads((out / f"validation{suffix}.json").read_text()), received.status.values
         assert values[f"{name} windows"] == str(result["n_test"])
         assert values[f"{name} pushes"] == str(result["n_pushes"])
         assert float(values[f"{name} nmse"]) == pytest.approx(result["nmse"]["total"], rel=1e-5)
@@ -155,16 +155,16 @@ def test_the_running_figures_end_at_those_of_the_result(watched):
         for level, shares in result["coverage"].items():
             for output, share in shares.items():
                 assert float(values[f"{name} coverage {level} {output}"]) == pytest.approx(share, abs=1e-5)
-    running = [int(values["gp windows"]) for _, _, values in heard.status.all if "gp windows" in values]
+    running = [int(values["gp windows"]) for _, _, values in received.status.all if "gp windows" in values]
     assert running == sorted(running)
 
 
-def test_the_ellipse_of_a_window_lies_around_its_predicted_centre(watched, models: dict[str, Path]):
-    _, heard = watched
+def test_the_ellipse_of_a_window_is_centred_at_the_prediction(watched, models: dict[str, Path]):
+    _, received = watched
     windows, comparison = validate_recording(load_model(models["gp"]), HEXAGON)
     by_end = {window.end: k for k, window in enumerate(windows)}
-    assert len(heard.markers) == len(windows)
-    for array in heard.markers:
+    assert len(received.markers) == len(windows)
+    for array in received.markers:
         markers = {marker.ns: marker for marker in array.markers}
         assert len(markers) == len(array.markers) == 12
         stamp = array.markers[0].header.stamp
@@ -180,13 +180,13 @@ def test_the_ellipse_of_a_window_lies_around_its_predicted_centre(watched, model
         assert np.allclose([observed.x, observed.y], windows[k].slider_end[:2], rtol=0.0, atol=1e-9)
 
 
-def test_the_recording_of_residuals_is_read_by_our_reader_and_by_rosbags(watched):
-    out, heard = watched
+def test_our_reader_and_rosbags_read_the_bag_of_residuals(watched):
+    out, received = watched
     bag = open_bag(out / "residuals")
     assert bag.topics == {"/push_residual": RESIDUAL_TYPE}
     ours = [deserialize_message(message.data, PushResidual) for message in bag.messages()]
     key = attrgetter("model", "push_id", "window")
-    assert sorted(ours, key=key) == sorted(heard.residuals, key=key)
+    assert sorted(ours, key=key) == sorted(received.residuals, key=key)
     ends = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in ours]
     assert ends == sorted(ends)
     with AnyReader([out / "residuals"], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
@@ -195,7 +195,7 @@ def test_the_recording_of_residuals_is_read_by_our_reader_and_by_rosbags(watched
     assert [m.predicted.tolist() for m in theirs] == [list(m.predicted) for m in ours]
 
 
-def test_the_schema_in_the_recording_is_the_installed_message():
+def test_the_schema_in_the_bag_is_the_installed_message():
     own = RESIDUAL_DEFINITION.split("=" * 80)[0].split("\n")
     written = {name: kind for kind, name in map(str.split, filter(None, own))}
     installed = {
@@ -204,8 +204,8 @@ def test_the_schema_in_the_recording_is_the_installed_message():
     assert list(written.items()) == list(installed.items())
 
 
-def test_a_stream_that_is_late_by_a_minute_of_the_recording_is_waited_for(models: dict[str, Path]):
-    """At rate 100 a minute passes in 0.6 s, which the middleware may take on a busy machine."""
+def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[str, Path]):
+    """At rate 100 a minute passes in 0.6 s, a delay that the middleware may have on a busy machine."""
     recording = read_recording(REPOSITORY / "bags" / "square_abs_test")
     assert recording.rig is not None and recording.wrench is not None
     asked: list[PredictPush.Request] = []
@@ -236,7 +236,7 @@ def test_a_stream_that_is_late_by_a_minute_of_the_recording_is_waited_for(models
 
 
 @pytest.mark.parametrize("given", ["gp", ""])
-def test_a_model_may_be_named_as_the_server_names_it_or_not_at_all(given: str, domain, server, models, tmp_path: Path):
+def test_a_model_is_given_by_the_servers_name_or_not_at_all(given: str, domain, server, models, tmp_path: Path):
     """The first model is the server's default."""
     with validator(domain, model=given, output=tmp_path) as process, replaying(domain, rate=20.0):
         process.wait_for_text(WRITTEN, 60.0)
@@ -246,7 +246,7 @@ def test_a_model_may_be_named_as_the_server_names_it_or_not_at_all(given: str, d
 # --- a server that is not there, or will not answer ------------------------------------------------------------------
 
 
-def test_a_server_that_starts_after_the_replay_has_ended_costs_no_window(domain: int, models, tmp_path: Path):
+def test_a_server_started_after_the_replay_costs_no_window(domain: int, models, tmp_path: Path):
     params = {"model": models["gp"], "output": tmp_path, "last_answers": 120.0}
     with ros_context(domain) as node, validator(domain, **params) as process:
         status = Status(node)
@@ -259,7 +259,7 @@ def test_a_server_that_starts_after_the_replay_has_ended_costs_no_window(domain:
     assert_same_as_offline(tmp_path, models["gp"])
 
 
-def test_a_server_that_is_killed_and_started_again_costs_no_window(domain: int, models, tmp_path: Path, monkeypatch):
+def test_a_server_killed_and_started_again_costs_no_window(domain: int, models, tmp_path: Path, monkeypatch):
     monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
     served = {"models": [str(models["gp"])]}
     params = {"model": models["gp"], "output": tmp_path, "request_timeout": 0.5, "last_answers": 120.0}
@@ -268,20 +268,20 @@ def test_a_server_that_is_killed_and_started_again_costs_no_window(domain: int, 
         validator(domain, **params) as process,
         node_process("predict_server", domain=domain, params=served) as first,
     ):
-        heard = Listener(node)
-        heard.status.wait_for_server()
+        received = Listener(node)
+        received.status.wait_for_server()
         with replaying(domain, rate=2.0):
-            assert wait_until(lambda: len(heard.residuals) >= 10, 60.0)
+            assert wait_until(lambda: len(received.residuals) >= 10, 60.0)
             first.send_signal(signal.SIGKILL)
             first.wait()
-            answered = len(heard.residuals)
+            answered = len(received.residuals)
             with node_process("predict_server", domain=domain, params=served):
                 process.wait_for_text(WRITTEN, 120.0)
     assert_same_as_offline(tmp_path, models["gp"])
     assert answered < len(windows_of(tmp_path))
 
 
-def test_a_model_that_the_server_does_not_know_yet_is_waited_for(domain: int, models, tmp_path: Path):
+def test_waits_for_a_model_that_the_server_has_not_loaded(domain: int, models, tmp_path: Path):
     with (
         ros_context(domain) as node,
         node_process("predict_server", domain=domain, params={"models": [str(models["analytical"])]}),
@@ -290,8 +290,8 @@ def test_a_model_that_the_server_does_not_know_yet_is_waited_for(domain: int, mo
         status = Status(node)
         with replaying(domain) as replay:
             replay.wait_for_text("finished: published", 60.0)
-        said = status.wait_for_message("hexagon")
-        assert "predict_server has no model 'hexagon'. Its models: analytical." in said
+        message = status.wait_for_message("hexagon")
+        assert "predict_server has no model 'hexagon'. Its models: analytical." in message
         answer = finish(node)
         assert not answer.success and "hexagon" in answer.message
         assert not (tmp_path / "validation.json").exists()
@@ -302,7 +302,7 @@ def test_a_model_that_the_server_does_not_know_yet_is_waited_for(domain: int, mo
 
 
 class StubServer:
-    """predict_push with answers of the test's making, by the number of the request."""
+    """A predict_push whose answer depends on the number of the request."""
 
     def __init__(self, node: Any) -> None:
         self.asked = 0
@@ -311,7 +311,7 @@ class StubServer:
     def _answer(self, request: PredictPush.Request, response: PredictPush.Response) -> PredictPush.Response:
         self.asked += 1
         if self.asked <= 3:
-            response.message = "the node is inactive: activate it"  # about the server: to be asked again
+            response.message = "the node is inactive: activate it"  # about the server's state: the validator asks again
             return response
         response.success, response.mean = True, [0.004, 0.0, 0.0]
         response.covariance = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-3]
@@ -325,7 +325,7 @@ class StubServer:
         return response
 
 
-def test_refused_windows_and_answers_that_are_no_gaussian_are_left_out_and_listed(domain: int, models, tmp_path: Path):
+def test_refused_windows_and_invalid_gaussians_are_listed_and_not_scored(domain: int, models, tmp_path: Path):
     """The stub offers no list_models: a validator with a model file does not depend on that."""
     with ros_context(domain) as node:
         status, _ = Status(node), StubServer(node)
@@ -343,7 +343,7 @@ def test_refused_windows_and_answers_that_are_no_gaussian_are_left_out_and_liste
     assert not known & {(entry["push_id"], entry["window"]) for entry in log["refused"]}
 
 
-def test_windows_that_nobody_answers_are_missed_not_guessed(domain: int, models, tmp_path: Path):
+def test_unanswered_windows_are_counted_and_not_scored(domain: int, models, tmp_path: Path):
     params = {"model": models["gp"], "output": tmp_path, "last_answers": 0.2}
     with ros_context(domain) as node, validator(domain, **params) as process, replaying(domain):
         status = Status(node)
@@ -356,15 +356,15 @@ def test_windows_that_nobody_answers_are_missed_not_guessed(domain: int, models,
     assert json.loads((tmp_path / "validation.json").read_text())["n_test"] == 0
 
 
-# --- the end of a score ----------------------------------------------------------------------------------------------
+# --- the end of a run ------------------------------------------------------------------------------------------------
 
 
-def test_finish_writes_everything_and_what_comes_then_is_a_new_score(domain: int, server, models, tmp_path: Path):
-    """The replay's status is not heard, as if another program played."""
-    deaf = ("-r", "replay_status:=nowhere")
+def test_finish_writes_everything_and_later_samples_begin_a_new_run(domain: int, server, models, tmp_path: Path):
+    """replay_status is remapped away, as if another program played."""
+    unheard = ("-r", "replay_status:=nowhere")
     with (
         ros_context(domain) as node,
-        validator(domain, *deaf, model=models["gp"], output=tmp_path, report=True) as process,
+        validator(domain, *unheard, model=models["gp"], output=tmp_path, report=True) as process,
     ):
         status, stray = Status(node), node.create_publisher(PoseStamped, "slider/pose", 100)
         answer = finish(node)
@@ -377,12 +377,12 @@ def test_finish_writes_everything_and_what_comes_then_is_a_new_score(domain: int
         assert_same_as_offline(tmp_path, models["gp"])
         assert (tmp_path / "report.html").stat().st_size > 10_000
         first = (tmp_path / "validation.json").read_text()
-        assert finish(node).success, "once more does no harm"
+        assert finish(node).success, "a second call changes nothing"
 
         stray.publish(pose())
         status.wait_for("state", "validating")
         assert finish(node).success
-        assert (tmp_path / "validation.json").read_text() == first, "no push was found, so there is nothing to tell"
+        assert (tmp_path / "validation.json").read_text() == first, "a run without a push replaces no result"
 
         with replaying(domain, rate=10.0) as replay:
             replay.wait_for_text("finished: published", 60.0)
@@ -393,13 +393,15 @@ def test_finish_writes_everything_and_what_comes_then_is_a_new_score(domain: int
         assert_same_as_offline(tmp_path, models["gp"])
 
 
-def test_an_interrupt_in_the_middle_has_what_was_measured_written(domain: int, server, models, tmp_path: Path):
+def test_an_interrupted_validator_writes_its_measurements(domain: int, server, models, tmp_path: Path):
     with ros_context(domain) as node, validator(domain, model=models["gp"], output=tmp_path, report=True) as process:
-        heard = Listener(node)
-        heard.status.wait_for_server()
+        received = Listener(node)
+        received.status.wait_for_server()
         with replaying(domain, rate=2.0):
-            assert wait_until(lambda: len(heard.residuals) >= 8, 60.0)
-            assert wait_until(lambda: int(heard.status.values.get("gp windows", "0")) >= 8), "the figures run along"
+            assert wait_until(lambda: len(received.residuals) >= 8, 60.0)
+            assert wait_until(lambda: int(received.status.values.get("gp windows", "0")) >= 8), (
+                "scores are published during the run"
+            )
             assert process.stop(signal.SIGINT, timeout=20.0) == 0  # not the 30 s of last_answers
     windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
     found = [(w["push_id"], w["window"]) for w in windows_of(tmp_path)]
@@ -409,7 +411,7 @@ def test_an_interrupt_in_the_middle_has_what_was_measured_written(domain: int, s
     assert not (tmp_path / "report.html").exists()
 
 
-def test_paused_sought_and_looped_replays_are_one_score_that_counts_the_jumps(
+def test_paused_sought_and_looped_replays_are_one_run_that_counts_time_jumps(
     domain: int, server, models, tmp_path: Path
 ):
     windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
@@ -430,7 +432,7 @@ def test_paused_sought_and_looped_replays_are_one_score_that_counts_the_jumps(
             call(pause, Pause.Request())
             status.wait_for_news()
             samples = figure("slider samples")
-            # From the middle at this rate the replay loops in 20 s only: what jumps before that is the seek.
+            # From the middle, at this rate, the replay loops only after 20 s: an earlier jump is the seek.
             assert call(set_rate, SetRate.Request(rate=0.5)).success and call(seek, middle).success
             call(resume, Resume.Request())
             assert wait_until(lambda: figure("slider samples") >= samples + 100)
@@ -445,7 +447,7 @@ def test_paused_sought_and_looped_replays_are_one_score_that_counts_the_jumps(
 # --- rigs ------------------------------------------------------------------------------------------------------------
 
 
-def test_in_a_namespace_with_other_topics_and_the_rig_from_a_file(domain: int, models, tmp_path: Path):
+def test_works_in_a_namespace_with_remapped_topics_and_a_rig_file(domain: int, models, tmp_path: Path):
     rig = tmp_path / "hexagon.rig.yaml"
     save_rig(load_rig_for([HEXAGON]), rig)
     remaps = ("-r", "slider/pose:=/vicon/butter/butter", "-r", "pusher/wrench:=ft/wrench")
@@ -461,13 +463,13 @@ def test_in_a_namespace_with_other_topics_and_the_rig_from_a_file(domain: int, m
     assert_same_as_offline(tmp_path, models["gp"])
 
 
-def test_another_rig_ends_the_score_and_a_model_of_another_slider_is_warned_about(
+def test_another_rig_ends_the_run_and_a_model_of_another_slider_gives_a_warning(
     domain: int, server, models, tmp_path: Path
 ):
-    deaf = ("-r", "replay_status:=nowhere")
+    unheard = ("-r", "replay_status:=nowhere")
     with (
         ros_context(domain) as node,
-        validator(domain, *deaf, model=models["analytical"], output=tmp_path) as process,
+        validator(domain, *unheard, model=models["analytical"], output=tmp_path) as process,
     ):
         status = Status(node)
         status.wait_for_server()  # a change of the rig waits 5 s for answers
@@ -477,8 +479,8 @@ def test_another_rig_ends_the_score_and_a_model_of_another_slider_is_warned_abou
             process.wait_for_text(WRITTEN, 60.0)
             assert_same_as_offline(tmp_path, models["analytical"])
             replay.wait_for_text("finished: published", 60.0)
-        said = status.wait_for_message("was trained with the outline")
-        assert "'hex'" in said and "'ellip1'" in said and status.all[-1][0] == DiagnosticStatus.WARN
+        message = status.wait_for_message("was trained with the outline")
+        assert "'hex'" in message and "'ellip1'" in message and status.all[-1][0] == DiagnosticStatus.WARN
         assert finish(node).success
     assert_same_as_offline(tmp_path, models["analytical"], CIRCLE)
 
@@ -493,13 +495,13 @@ def pose(frame: str = "world", x: float = 0.0, w: float = 1.0) -> PoseStamped:
     return message
 
 
-def test_useless_messages_are_counted_by_kind_and_do_no_harm(domain: int, models):
+def test_unusable_messages_are_counted_by_kind(domain: int, models):
     overrides = ("-p", "qos_overrides./slider/pose.subscription.reliability:=best_effort")
     with ros_context(domain) as node, validator(domain, *overrides, model=models["gp"]) as process:
         status = Status(node)
         slider, pusher = (node.create_publisher(PoseStamped, f"{name}/pose", 100) for name in ("slider", "pusher"))
         wrench = node.create_publisher(WrenchStamped, "pusher/wrench", 100)
-        rig = node.create_publisher(String, "rig", LATCHED)  # the last: who has heard it knows the others too
+        rig = node.create_publisher(String, "rig", LATCHED)  # created last: who has received it knows the others too
         for publisher in (slider, pusher, wrench):
             assert wait_until(lambda publisher=publisher: publisher.get_subscription_count() > 0)
         (info,) = node.get_subscriptions_info_by_topic("/slider/pose")
@@ -528,7 +530,7 @@ def test_useless_messages_are_counted_by_kind_and_do_no_harm(domain: int, models
 
 
 def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyPatch):
-    """Seen from inside: what is published to nobody cannot be heard."""
+    """Calls the class itself: without a subscriber nothing can be received."""
     made: list[Any] = []
     monkeypatch.setattr(publishers, "window_markers", lambda *of_what: made.append(of_what))
     for subscribers in (0, 1):
@@ -541,7 +543,7 @@ def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyP
 # --- starting --------------------------------------------------------------------------------------------------------
 
 
-def test_what_cannot_work_is_said_in_one_line_at_the_start(domain: int, models, tmp_path: Path):
+def test_a_bad_parameter_ends_the_start_with_one_line(domain: int, models, tmp_path: Path):
     blocked, twin = tmp_path / "file", tmp_path / "twin.pushmodel"
     blocked.write_text("no folder")
     twin.write_bytes(models["gp"].read_bytes())

@@ -1,4 +1,4 @@
-"""Scalar topics through real nodes: what a replay brings beside the sensors counts online as it does offline."""
+"""Scalar topics through real nodes: a replay gives the same values online as reading the recording."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def float64(value: float) -> bytes:
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Pushes with a scalar that jumps ten times a second, one that comes late and bears its time, and a rare one."""
+    """Pushes with a scalar that jumps ten times a second, one that starts late and has a stamp, and a rare one."""
     folder, rng = tmp_path_factory.mktemp("scalars"), np.random.default_rng(0)
     plan = random_pushes(10, [0.03], 0.02, rng)
     write_recording(folder / "pushes", simulate(SimulationSpec("rect1", "abs", plan, name="pushes")))
@@ -81,7 +81,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def model(recording: Path) -> Path:
-    """A model that lacks nothing but the warmth, which changes the contact friction."""
+    """A model that needs the warmth, which changes the contact friction."""
     rig = load_rig_for([recording])
     base = train_model(load_data([recording]), rig, "analytical", name="warm")
     basis = DriverBasis("linear", (f"topic:{WARMTH}",), (0.0,), (1.0,))
@@ -96,7 +96,7 @@ def model(recording: Path) -> Path:
 
 
 class Watched:
-    """A replay at rate 8 through a validator that was told of scalar topics."""
+    """A replay at rate 8 through a validator with the parameter scalar_topics."""
 
     def __init__(self, recording: Path, model: Path, output: Path) -> None:
         domain = free_domain()
@@ -114,7 +114,7 @@ class Watched:
             status.wait_for("state", "waiting for samples")
             assert process.stop() == 0, process.text()
         self.output, self.message, self.values = output, status.message, status.values
-        self.said = [message for _, message, _ in status.all]
+        self.messages = [message for _, message, _ in status.all]
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def watched(recording: Path, model: Path, tmp_path_factory: pytest.TempPathFacto
     return Watched(recording, model, tmp_path_factory.mktemp("watched"))
 
 
-def test_the_windows_have_the_values_that_reading_the_recording_gives(watched: Watched, recording: Path) -> None:
+def test_windows_have_the_scalar_values_of_reading_the_recording(watched: Watched, recording: Path) -> None:
     online, offline = load_data([watched.output / "pushes.csv"]), load_data([recording])
     assert online.push_id.tolist() == offline.push_id.tolist()
     for topic in OURS:
@@ -131,20 +131,20 @@ def test_the_windows_have_the_values_that_reading_the_recording_gives(watched: W
         assert np.max(np.abs(found - expected)) < 1e-9, topic
 
 
-def test_what_a_trace_is_given_has_them_too(watched: Watched, recording: Path) -> None:
+def test_a_trace_gets_the_scalar_values(watched: Watched, recording: Path) -> None:
     online, offline = load_evidence([watched.output / "pushes.csv"]), load_evidence([recording])
     assert not online.dropped and set(offline.table.covariates) <= {*online.table.covariates}
     for name, column in offline.table.covariates.items():
         assert np.allclose(online.table.covariates[name], column, rtol=0.0, atol=1e-9), name
 
 
-def test_a_model_that_needs_a_topic_is_judged_as_offline(watched: Watched, model: Path, recording: Path) -> None:
+def test_a_model_that_needs_a_topic_scores_as_offline(watched: Watched, model: Path, recording: Path) -> None:
     assert_same_as_offline(watched.output, model, recording)
     log = json.loads((watched.output / "windows.json").read_text())
     assert log["refused"] == [] and log["unanswered"] == 0
 
 
-def test_the_bag_of_residuals_has_them_at_the_windows_starts(watched: Watched, recording: Path) -> None:
+def test_the_bag_of_residuals_has_the_scalar_values_at_the_windows_starts(watched: Watched, recording: Path) -> None:
     windows = find_windows(read_recording(recording), load_rig_for([recording]))
     topics = open_bag(watched.output / "residuals").topics
     assert topics == {"/push_residual": RESIDUAL_TYPE, **dict.fromkeys(OURS, "std_msgs/msg/Float64")}
@@ -155,12 +155,12 @@ def test_the_bag_of_residuals_has_them_at_the_windows_starts(watched: Watched, r
         assert values == pytest.approx([window.covariates[f"topic:{topic}"] for window in windows], abs=1e-9)
 
 
-def test_topics_that_bring_nothing_are_named(watched: Watched) -> None:
+def test_topics_without_samples_are_named(watched: Watched) -> None:
     for topic in (*OURS, "/nowhere"):
         assert f"Scalar topic {topic} has no publisher." in watched.before
     assert "Scalar topic /nowhere has no publisher." in watched.message
     wrong = f"Scalar topic {NAME} has type std_msgs/msg/String. Accepted: std_msgs/msg/Float64"
-    assert any(wrong in message for message in watched.said), "while it was published"
+    assert any(wrong in message for message in watched.messages), "while it was published"
     assert not any(f"Scalar topic {topic}" in watched.message for topic in OURS)
     counts = [int(watched.values[f"topic:{topic} samples"]) for topic in OURS]
     assert counts[0] > 100 > counts[1] > counts[2] > 1
@@ -168,7 +168,7 @@ def test_topics_that_bring_nothing_are_named(watched: Watched) -> None:
 
 
 @pytest.mark.parametrize("names", [["warmth", "/warmth"], ["~/warmth"], ["1 warmth"]])
-def test_names_that_are_none_are_refused(names: list[str]) -> None:
+def test_rejects_invalid_topic_names(names: list[str]) -> None:
     with node_process("push_validator", domain=free_domain(), params={"scalar_topics": names}) as process:
         assert process.wait(30.0) == 1
         assert f"scalar_topics: {names[0]!r} is not accepted" in process.text()
@@ -183,19 +183,19 @@ def domain() -> int:
 
 
 @pytest.fixture
-def hearing(domain: int) -> Iterator[Node]:
+def listener(domain: int) -> Iterator[Node]:
     with ros_context(domain, namespace="cell") as node:
         yield node
 
 
 @pytest.fixture
-def speaking(domain: int) -> Iterator[Node]:
+def talker(domain: int) -> Iterator[Node]:
     with ros_context(domain, namespace="cell") as node:
         yield node
 
 
 class Gathered:
-    """What an subscriber has taken of one topic."""
+    """The samples that a subscriber has taken of one topic."""
 
     def __init__(self, subscriber: ScalarSubscriber, name: str, near: int | None = None) -> None:
         self._subscriber, self._name, self._near = subscriber, name, near
@@ -226,62 +226,62 @@ def kept() -> QoSProfile:
 
 
 @pytest.mark.parametrize("profile", [best_effort(), kept(), QoSProfile(depth=10)], ids=["lossy", "kept", "reliable"])
-def test_a_topic_that_appears_later_is_heard_as_its_publisher_offers_it(
-    hearing: Node, speaking: Node, profile: QoSProfile
+def test_subscribes_to_a_later_topic_with_the_qos_of_its_publisher(
+    listener: Node, talker: Node, profile: QoSProfile
 ) -> None:
-    subscriber = ScalarSubscriber(hearing, ["warmth"])
+    subscriber = ScalarSubscriber(listener, ["warmth"])
     assert subscriber.names == ["/warmth"] and "no publisher" in subscriber.problems()[0]
     gathered = Gathered(subscriber, "/warmth")
-    with offered(speaking, String, QoSProfile(depth=10)):
+    with offered(talker, String, QoSProfile(depth=10)):
         assert gathered.has(lambda _: "std_msgs/msg/String" in subscriber.problems()[0])
     message = Temperature(temperature=21.5)
     message.header.stamp.sec = 7
-    with offered(speaking, Temperature, profile) as publisher:
-        assert gathered.has(speaks(publisher, message, 21.5))
+    with offered(talker, Temperature, profile) as publisher:
+        assert gathered.has(publishing(publisher, message, 21.5))
         assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problems()
-    with offered(speaking, Float32, profile) as publisher:
-        assert gathered.has(speaks(publisher, Float32(data=0.5), 0.5)), "another type from now on"
+    with offered(talker, Float32, profile) as publisher:
+        assert gathered.has(publishing(publisher, Float32(data=0.5), 0.5)), "another type from now on"
 
 
 @contextmanager
 def offered(node: Node, kind: type, profile: QoSProfile) -> Iterator[Publisher]:
-    """A publisher of the topic that is gone at once when left, which one whose events an executor awaits is not."""
+    """A publisher that is destroyed at once on leaving; an executor waiting for its events would delay that."""
     silent = PublisherEventCallbacks(use_default_callbacks=False)
     publisher = node.create_publisher(kind, "warmth", profile, event_callbacks=silent)
     yield publisher
     node.destroy_publisher(publisher)
 
 
-def speaks(publisher: Any, message: Any, value: float) -> Callable[[Gathered], bool]:
-    """Publishes until it is heard; where messages are kept, only once, before anybody has subscribed."""
+def publishing(publisher: Any, message: Any, value: float) -> Callable[[Gathered], bool]:
+    """Publish until the value is received; where messages are kept, only once, before anybody has subscribed."""
     once = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     publisher.publish(message)
 
-    def heard(so_far: Gathered) -> bool:
+    def received(so_far: Gathered) -> bool:
         if not once:
             publisher.publish(message)
         return value in so_far.value
 
-    return heard
+    return received
 
 
-def test_without_a_clock_the_time_is_when_it_was_sent(hearing: Node, speaking: Node) -> None:
+def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
     subscriber, publisher = (
-        ScalarSubscriber(hearing, ["/cell/warmth"]),
-        speaking.create_publisher(Float64, "warmth", kept()),
+        ScalarSubscriber(listener, ["/cell/warmth"]),
+        talker.create_publisher(Float64, "warmth", kept()),
     )
-    begin = speaking.get_clock().now().nanoseconds
+    begin = talker.get_clock().now().nanoseconds
     publisher.publish(Float64(data=1.0))
-    end = speaking.get_clock().now().nanoseconds
+    end = talker.get_clock().now().nanoseconds
     gathered = Gathered(subscriber, "/cell/warmth")
     assert gathered.has(lambda so_far: bool(so_far.value))
     assert gathered.value == [1.0] and begin <= gathered.stamp[0] <= end
 
 
-def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Node) -> None:
-    subscriber = ScalarSubscriber(hearing, ["warmth"])
-    clock = speaking.create_publisher(Clock, "/clock", kept())
-    publisher = speaking.create_publisher(Float32, "warmth", kept())
+def test_with_a_clock_a_sample_is_dated_by_the_last_tick(listener: Node, talker: Node) -> None:
+    subscriber = ScalarSubscriber(listener, ["warmth"])
+    clock = talker.create_publisher(Clock, "/clock", kept())
+    publisher = talker.create_publisher(Float32, "warmth", kept())
     for second in range(5):
         message = Clock()
         message.clock.sec, message.clock.nanosec = second, 5
@@ -293,9 +293,9 @@ def test_with_a_clock_the_time_is_what_it_told_last(hearing: Node, speaking: Nod
     assert subscriber.take(None, last=True)["/warmth"].value.tolist() == [4.5], "no later tick came"
 
 
-def test_what_another_clock_has_stamped_or_is_no_number_is_counted_not_used(hearing: Node, speaking: Node) -> None:
-    subscriber = ScalarSubscriber(hearing, ["warmth"])
-    publisher = speaking.create_publisher(Temperature, "warmth", kept())
+def test_stamps_of_another_clock_and_nan_are_rejected_and_counted(listener: Node, talker: Node) -> None:
+    subscriber = ScalarSubscriber(listener, ["warmth"])
+    publisher = talker.create_publisher(Temperature, "warmth", kept())
     for sec, value in ((100, 1.0), (100_000, 2.0), (101, float("nan"))):
         message: Any = Temperature(temperature=value)
         message.header.stamp.sec = sec

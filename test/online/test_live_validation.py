@@ -1,4 +1,4 @@
-"""Keeping the score while windows and answers arrive: the same figures as reading all at once, in little memory."""
+"""Scores while windows and predictions arrive: the same as for a whole table, in little memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def models() -> dict[str, PushModel]:
 
 
 def answered(models: dict[str, PushModel], windows: list[PushWindow], shuffle: int = 0) -> LiveValidation:
-    """All windows, and every model's prediction of each in an order of its own."""
+    """All windows, and every model's prediction of each in a random order."""
     live = LiveValidation(models)
     numbers = [live.add(window) for window in windows]
     jobs = [(k, number) for number in numbers for k in range(len(models))]
@@ -54,10 +54,10 @@ def same_window(a: PushWindow, b: PushWindow) -> bool:
     )
 
 
-# --- windows in little memory ----------------------------------------------------------------------------------------
+# --- memory --------------------------------------------------------------------------------------------------------
 
 
-def test_windows_come_back_from_the_rows_as_they_went_in():
+def test_rows_return_the_windows_that_were_appended():
     windows, rows = made_up_windows(20), WindowRows()
     for window in windows:
         rows.append(window)
@@ -70,7 +70,7 @@ def test_windows_come_back_from_the_rows_as_they_went_in():
 
 
 def test_a_predicted_window_takes_less_than_700_bytes(models: dict[str, PushModel]):
-    """So a day of pushing without a break, 432 000 windows, takes less than 300 MB."""
+    """A day of pushing without a break, 432 000 windows, then takes less than 300 MB."""
     windows = made_up_windows(2000)
     prediction = predict(models["gp"], windows[0])
     live = LiveValidation({"gp": models["gp"]})
@@ -106,13 +106,13 @@ def test_running_sums_give_the_totals_of_the_final_metrics(seed: int, count: int
             assert running[f"coverage {level} {output}"] == pytest.approx(share, abs=1e-12)
 
 
-def test_before_the_first_window_nothing_is_claimed():
+def test_scores_are_none_before_the_first_window():
     values = RunningScore(np.zeros(3)).values()
     assert values.pop("windows") == values.pop("pushes") == 0
     assert set(values.values()) == {None}
 
 
-def test_intervals_from_sums_by_push_are_those_of_resampled_rows(models: dict[str, PushModel]):
+def test_intervals_from_push_sums_equal_those_of_resampled_rows(models: dict[str, PushModel]):
     comparison = compare(models["gp"], windows_to_table(made_up_windows(37)))
     weights = push_bootstrap(comparison.push_id)
     error, spread = ((comparison.observed - other) ** 2 for other in (comparison.mean, comparison.training_mean))
@@ -128,7 +128,7 @@ def test_intervals_from_sums_by_push_are_those_of_resampled_rows(models: dict[st
 
 
 @pytest.mark.parametrize("shuffle", [0, 1])
-def test_answers_in_any_order_give_the_comparison_of_the_whole_table(models: dict[str, PushModel], shuffle: int):
+def test_predictions_in_any_order_give_the_comparison_of_the_table(models: dict[str, PushModel], shuffle: int):
     windows = made_up_windows(12)
     live = answered(models, windows, shuffle)
     for k, model in enumerate(models.values()):
@@ -139,13 +139,13 @@ def test_answers_in_any_order_give_the_comparison_of_the_whole_table(models: dic
         assert np.allclose(online.covariance, offline.covariance, rtol=1e-9, atol=0.0)
 
 
-def test_residuals_come_in_the_order_of_windows_and_models(models: dict[str, PushModel]):
+def test_residuals_are_ordered_by_window_and_model(models: dict[str, PushModel]):
     windows = made_up_windows(5)
     found = [(name, window.start) for name, window, _, _ in answered(models, windows, shuffle=3).residuals()]
     assert found == [(name, window.start) for window in windows for name in models]
 
 
-def test_windows_without_a_prediction_are_in_no_figure_but_are_counted(models: dict[str, PushModel]):
+def test_windows_without_a_prediction_are_counted_and_not_scored(models: dict[str, PushModel]):
     windows = made_up_windows(9)
     live = LiveValidation(models)
     for window in windows:
@@ -163,7 +163,7 @@ def test_windows_without_a_prediction_are_in_no_figure_but_are_counted(models: d
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
-def test_the_main_model_and_the_others_get_their_files(models: dict[str, PushModel], tmp_path: Path):
+def test_writes_files_for_the_main_model_and_the_others(models: dict[str, PushModel], tmp_path: Path):
     windows = made_up_windows(8)
     live = answered(models, windows)
     written = live.write(tmp_path / "new" / "folder")
@@ -183,14 +183,14 @@ def test_the_main_model_and_the_others_get_their_files(models: dict[str, PushMod
     assert not [path for path in (tmp_path / "new" / "folder").iterdir() if path.name.startswith(".")]
 
 
-def test_a_score_without_windows_is_written_as_that(models: dict[str, PushModel], tmp_path: Path):
+def test_a_run_without_windows_is_written_with_empty_scores(models: dict[str, PushModel], tmp_path: Path):
     (path, _) = LiveValidation(models).write(tmp_path)
     result = json.loads(path.read_text())
     assert (result["n_test"], result["n_pushes"], result["nmse"]["total"], result["nlpd"]["dx"]) == (0, 0, None, None)
     assert json.loads((tmp_path / "windows.json").read_text())["windows"] == []
 
 
-def test_refusals_are_in_the_log_with_their_reason(models: dict[str, PushModel], tmp_path: Path):
+def test_the_log_contains_refusals_with_their_reason(models: dict[str, PushModel], tmp_path: Path):
     live = LiveValidation({"gp": models["gp"]})
     for window in made_up_windows(2):
         live.add(window)
@@ -201,14 +201,14 @@ def test_refusals_are_in_the_log_with_their_reason(models: dict[str, PushModel],
     assert log["unanswered"] == 1 and log["windows"] == []
 
 
-def test_a_server_cannot_choose_where_files_go(models: dict[str, PushModel], tmp_path: Path):
+def test_model_names_cannot_leave_the_output_folder(models: dict[str, PushModel], tmp_path: Path):
     named = {"main": models["gp"], "../../etc/x y": models["analytical"]}
     written = LiveValidation(named).write(tmp_path / "out")
     assert written[1].parent == tmp_path / "out" and written[1].name == "validation_.._.._etc_x_y.json"
     assert {path.parent for path in tmp_path.rglob("*.json")} == {tmp_path / "out"}
 
 
-def test_a_log_that_fails_leaves_the_older_one(models: dict[str, PushModel], tmp_path: Path):
+def test_a_failed_log_keeps_the_older_one(models: dict[str, PushModel], tmp_path: Path):
     windows = made_up_windows(3)
     comparison = compare(models["gp"], windows_to_table(windows))
     write_window_log(tmp_path / "log.json", windows, comparison)
@@ -220,10 +220,10 @@ def test_a_log_that_fails_leaves_the_older_one(models: dict[str, PushModel], tmp
     assert [path.name for path in tmp_path.iterdir()] == ["log.json"]
 
 
-# --- whose model is it? ----------------------------------------------------------------------------------------------
+# --- model and rig ---------------------------------------------------------------------------------------------------
 
 
-def test_a_model_of_another_slider_or_pusher_is_told_from_the_rig(models: dict[str, PushModel]):
+def test_detects_a_model_of_another_slider_or_pusher(models: dict[str, PushModel]):
     own = square_rig()
     assert rig_difference(models["gp"], own) == ""
     assert rig_difference(models["gp"], Rig("rect1", own.outline, own.pusher_radius, "abs", 2.0)) == ""

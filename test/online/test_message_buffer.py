@@ -1,4 +1,4 @@
-"""Sensor messages on their way into the streams: taken and refused by the rules of reading a recording."""
+"""Sensor messages become streams, or are rejected, by the rules of reading a recording."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def filled(buffer: MessageBuffer, *messages: bytes) -> MessageBuffer:
     return buffer
 
 
-def test_good_messages_become_a_stream_in_order():
+def test_usable_messages_become_a_stream_in_order():
     buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), pose(*GOOD, nanosec=9))
     stream = slider_stream(*buffer.take())
     assert stream.stamp.tolist() == [7_000_000_005, 7_000_000_009]
@@ -92,7 +92,7 @@ def test_a_wrench_survives_its_message(fx: float, fy: float, torque: float):
     ],
     ids=["nan", "infinity", "zero quaternion", "other frame", "no frame", "bad stamp", "cut"],
 )
-def test_a_useless_slider_pose_is_counted_by_kind_and_the_others_are_taken(message: bytes, kind: str):
+def test_an_unusable_slider_pose_is_counted_by_kind_and_the_others_are_used(message: bytes, kind: str):
     buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), message, pose(*GOOD))
     assert len(buffer.take()[0]) == 2
     assert dict(buffer.rejected) == {kind: 1}
@@ -108,13 +108,13 @@ def test_an_empty_frame_id_accepts_any_frame():
     assert len(filled(MessageBuffer(SLIDER, ""), pose(*GOOD, frame="map"), pose(*GOOD)).take()[0]) == 2
 
 
-def test_the_tip_is_a_point_its_orientation_does_not_matter():
+def test_the_orientation_of_the_tip_is_ignored():
     stream = pusher_stream(*filled(MessageBuffer(PUSHER, "world"), pose(*GOOD[:3], 0.0, 0.0, 0.0, 0.0)).take())
     assert stream.x.tolist() == [0.1]
     assert len(filled(MessageBuffer(PUSHER, "world"), pose(math.nan, *GOOD[1:])).take()[0]) == 0
 
 
-def test_of_a_wrench_the_planar_part_must_be_finite():
+def test_only_the_planar_part_of_a_wrench_must_be_finite():
     buffer = filled(
         MessageBuffer(samples.WRENCH, "world"),
         wrench(1.0, 2.0, math.nan, math.nan, math.nan, 3.0),
@@ -135,7 +135,7 @@ def test_a_full_buffer_drops_the_oldest_and_counts_them(monkeypatch: pytest.Monk
     assert stamp[-1] == 7_000_000_304 and np.all(np.diff(stamp) == 1)
 
 
-def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Path):
+def test_messages_and_a_bag_of_them_give_the_same_streams(tmp_path: Path):
     rng = np.random.default_rng(0)
     rows = rng.normal(size=(40, 7))
     rows[3, 0], rows[7, 3:], rows[11, 5] = np.nan, 0.0, np.inf
@@ -157,7 +157,7 @@ def test_messages_and_the_bag_that_holds_them_give_the_same_streams(tmp_path: Pa
         assert np.array_equal(getattr(force, name), getattr(read.wrench, name)), name
 
 
-def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_second(monkeypatch: pytest.MonkeyPatch):
+def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
     monkeypatch.setattr(sensor_subscriber, "monotonic", lambda: now[0])
     slider: list[bytes] = []
@@ -165,12 +165,12 @@ def test_a_score_begins_when_every_topic_speaks_or_one_has_been_silent_for_a_sec
     subscriber: Any = SimpleNamespace(_buffers={"slider": slider, "wrench": wrench}, _empty=0.0)
     subscriber._scalars = SimpleNamespace(waiting=lambda: True)
     complete = sensor_subscriber.SensorSubscriber.complete
-    assert not complete(subscriber), "nothing has come"
+    assert not complete(subscriber), "no message yet"
     slider.append(b"pose")
     now[0] += 0.9
     assert not complete(subscriber)
     now[0] += 0.2
-    assert complete(subscriber), "there is no wrench"
+    assert complete(subscriber), "no wrench for a second"
     wrench.append(b"force")
     subscriber._empty = now[0]
-    assert complete(subscriber), "all are there"
+    assert complete(subscriber), "messages of every topic"

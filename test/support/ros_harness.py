@@ -1,4 +1,4 @@
-"""Start nodes as processes and talk to them over DDS: what the tests of the nodes share."""
+"""Start nodes as processes and communicate with them over DDS."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from rclpy.task import Future
 from repository import REPOSITORY
 
 START_TIMEOUT = 60.0
-PATIENCE = 10.0  # s until a call is made again; ~/finish answers within 5 s
+PATIENCE = 10.0  # s after which a call is repeated; ~/finish answers within 5 s
 _HELD: deque[tuple[int, IO[str]]] = deque()
 _NAMES = itertools.count()
 
 
 def free_domain() -> int:
-    """A ROS domain (1..101) that no other test, worker or test run of this machine holds.
+    """A ROS domain (1..101) that no other test, worker or test run of this machine uses.
 
     A lock file is held for each of the last 12 domains of this process. The environment variable
     PUSH_PREDICTOR_TEST_DOMAINS, such as "41-45", narrows the range.
@@ -56,7 +56,7 @@ class NodeProcess(subprocess.Popen[bytes]):
     log: Path
 
     def text(self) -> str:
-        """What it has printed so far."""
+        """Everything it has printed so far."""
         return self.log.read_text(errors="replace")
 
     def wait_for_text(self, text: str, timeout: float = START_TIMEOUT) -> str:
@@ -110,7 +110,7 @@ def node_process(
 def node_environment(domain: int) -> dict[str, str]:
     """The environment of a node under test: its domain, this machine only, this repository's packages."""
     environment = dict(os.environ)
-    # Inherited, it would keep a Python of another environment from setting its library path.
+    # If inherited, it would keep the Python of another environment from setting its library path.
     environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
     environment.update(
         ROS_DOMAIN_ID=str(domain),
@@ -155,7 +155,7 @@ def wait_until(condition: Callable[[], bool], timeout: float = START_TIMEOUT) ->
 def acquaint(node: Node, server: str, timeout: float = START_TIMEOUT) -> None:
     """Wait until the node named `server` knows every subscription and client that `node` has made so far.
 
-    It learns of them in the order in which they were made, and answers the last one; asking that twice does no harm.
+    It discovers them in the order of their creation and answers the last one, which may safely be called twice.
     """
     client = node.create_client(GetParameters, f"{server}/get_parameters")
     try:
@@ -167,9 +167,9 @@ def acquaint(node: Node, server: str, timeout: float = START_TIMEOUT) -> None:
 def call(client: Client, request: Any, timeout: float = START_TIMEOUT, patience: float = PATIENCE) -> Any:
     """Wait for the service, call it and return the response.
 
-    Asks again now and then: the middleware drops the answer to a client that it has not yet matched after 0.1 s, which
-    happens on a busy machine to a client that has just been made. So the service must bear being asked twice; else
-    `acquaint` first.
+    Repeats the request every `patience` seconds: the middleware drops the answer to a client that it has not matched
+    within 0.1 s, as happens to a new client on a busy machine. For a service that must not be called twice, `acquaint`
+    first.
     Raises AssertionError if either takes longer than `timeout` (s). Another thread must spin the node.
     """
     assert client.wait_for_service(timeout), f"no service {client.srv_name} after {timeout} s"

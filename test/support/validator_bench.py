@@ -1,4 +1,4 @@
-"""A validator, a server and a replay as processes, and what the tests ask of their result."""
+"""Validator and replay as processes, their diagnostics, and checks of their results."""
 
 from __future__ import annotations
 
@@ -28,35 +28,35 @@ NO_SERVER = "No node offers predict_push"
 def replaying(
     domain: int, *ros_args: str, recording: Path = HEXAGON, rate: float = 10.0, **more: Any
 ) -> Iterator[NodeProcess]:
-    """push_replay, once somebody listens."""
+    """Run push_replay, which waits for subscribers."""
     params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
     with node_process("push_replay", *ros_args, domain=domain, params=params) as process:
         yield process
 
 
 class Status:
-    """The last status of a node on /diagnostics, and every one before."""
+    """All statuses of a node on /diagnostics, in order."""
 
     def __init__(self, node: Node, name: str = "push_validator") -> None:
         self._name = name
         self.all: list[tuple[bytes, str, dict[str, str]]] = []
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 100)
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, 100)
 
     def wait_for_first(self) -> None:
-        """A node that was heard here has, by then, discovered this listener too, which takes DDS up to 3 s."""
+        """Wait for the first status; by then the node has discovered this listener, which takes DDS up to 3 s."""
         assert wait_until(lambda: bool(self.all)), f"nothing on /diagnostics of {self._name}"
 
     def wait_for_server(self) -> None:
-        """Until the node knows a server: one found late in a replay would answer about all of it in one burst."""
+        """Wait until the node has discovered a server: a late one would answer all requests in one burst."""
         found = wait_until(lambda: bool(self.all) and NO_SERVER not in self.message)
         assert found, f"no server found: {self.all[-1:]}"
 
     def wait_for_news(self) -> None:
-        """Until the values are of after this call: the first that comes may have been on its way before."""
+        """Wait for values from after this call; the first status may have been sent before it."""
         known = len(self.all)
         assert wait_until(lambda: len(self.all) > known + 1), f"no more on /diagnostics of {self._name}"
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if self._name in status.name:
                 self.all.append((status.level, status.message, {v.key: v.value for v in status.values}))
@@ -82,7 +82,7 @@ def windows_of(folder: Path, suffix: str = "") -> list[dict[str, Any]]:
 
 
 def assert_same_as_offline(folder: Path, model: Path, recording: Path = HEXAGON, suffix: str = "") -> None:
-    """The same windows, their predictions equal to 1e-9, the metrics equal to rounding."""
+    """Assert the windows of an offline validation, its predictions to 1e-9 and its metrics to rounding."""
     windows, comparison = validate_recording(load_model(model), recording)
     online = windows_of(folder, suffix)
     found, expected = [(w["push_id"], w["window"]) for w in online], [(w.push_id, w.index) for w in windows]
@@ -99,7 +99,7 @@ def assert_same_as_offline(folder: Path, model: Path, recording: Path = HEXAGON,
 
 
 def assert_same_figures(found: Any, expected: Any) -> None:
-    """The same keys and texts, numbers equal to a relative 1e-6."""
+    """Assert equal keys and texts, and numbers equal to a relative 1e-6."""
     if isinstance(expected, dict):
         assert found.keys() == expected.keys()
         for key in expected:
