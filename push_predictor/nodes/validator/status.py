@@ -9,8 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.evaluation.alarm.evidence import AlarmState
-from push_predictor.evaluation.alarm.scores import SIZE
+from push_predictor.evaluation.alarm.evidence import SIZE, AlarmState
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.prediction_client import PredictionClient
