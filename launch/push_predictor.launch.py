@@ -1,7 +1,8 @@
-"""predict_server, push_replay and push_validator together, and RViz2 if wanted.
+"""Start predict_server, push_validator and, for a recording, push_replay; with rviz:=true also RViz2.
 
 ros2 launch push_predictor push_predictor.launch.py recording:=bags/square_abs_test model:=square_abs.pushmodel
-rviz:=true opens RViz2 beside them (docs/how_to/visualisation.md).
+
+docs/how_to/visualisation.md describes what RViz2 displays.
 """
 
 from __future__ import annotations
@@ -17,19 +18,19 @@ from launch import LaunchContext, LaunchDescription
 
 ARGUMENTS = (
     ("namespace", "", "Namespace of all nodes."),
-    ("params_file", "", "YAML file with parameters, such as those in config/; other arguments that are given win."),
-    ("use_sim_time", "false", "Nodes take /clock, which the replay publishes, for their time."),
+    ("params_file", "", "YAML file with parameters, such as those in config/. Other arguments override it."),
+    ("use_sim_time", "false", "Use the time on /clock, which the replay publishes."),
     ("log_level", "info", "debug, info, warn, error or fatal."),
     ("enclaves", "", "SROS 2: run each node in its enclave below this path (docs/how_to/security.md)."),
-    ("autostart", "true", "Configure and activate predict_server; false leaves that to a lifecycle manager."),
-    ("recording", "", "Recording to replay: rosbag2 folder or .mcap file; empty: none, sensors are live."),
-    ("bag", "", "The same as recording."),
-    ("model", "", "Model file to serve and to judge."),
-    ("rate", "", "Recorded seconds per second; empty: 1, or what params_file says."),
-    ("output", "", "Folder for the validator's results; empty: nothing is written."),
-    ("rig", "", "push_rig YAML file, where the recording holds none."),
-    ("rviz", "false", "Open RViz2 with the configuration of this package: slider, pusher, windows from above."),
-    ("rviz_config", "", "RViz configuration file; empty: config/push_predictor.rviz as installed."),
+    ("autostart", "true", "Configure and activate predict_server; false: a lifecycle manager does that."),
+    ("recording", "", "Recording to replay: rosbag2 folder or .mcap file. Empty: none, the sensors are live."),
+    ("bag", "", "Another name of the argument recording."),
+    ("model", "", "Model file to load and to validate."),
+    ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
+    ("output", "", "Folder for the validator's results. Empty: nothing is written."),
+    ("rig", "", "push_rig YAML file, for a recording without a push_rig record."),
+    ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
+    ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
 )
 
 
@@ -71,7 +72,7 @@ def _validator(given: dict[str, str]) -> dict[str, Any]:
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     rig = {"rig": _path(given["rig"])} if given["rig"] else {}
     rate = {"play.rate": float(given["rate"])} if given["rate"] else {}
-    # A replay that began before the validator listens would lose its first pushes.
+    # Without this wait the validator would miss the first pushes.
     return {**rig, **rate, "recording": _path(recording), "wait_for_subscribers": 30.0}
 
 
@@ -90,7 +91,7 @@ def _node(executable: str, name: str, given: dict[str, str], parameters: dict[st
 
 
 def _rviz(given: dict[str, str]) -> Node:
-    share = Path(__file__).resolve().parents[1]  # this file is installed beside config/
+    share = Path(__file__).resolve().parents[1]  # config/ is installed next to launch/
     config = _path(given["rviz_config"]) if given["rviz_config"] else str(share / "config" / "push_predictor.rviz")
     return Node(
         package="rviz2",
@@ -104,7 +105,7 @@ def _rviz(given: dict[str, str]) -> Node:
 
 
 def _switch(given: dict[str, str], name: str, default: bool) -> dict[str, bool]:
-    """The parameter if it is not at its default, so that params_file may say otherwise."""
+    """The parameter if it differs from its default, so that params_file can set it otherwise."""
     value = _true(given[name])
     return {} if value == default else {name: value}
 

@@ -1,4 +1,4 @@
-"""Node parameters as one table of rows: declared, described, bounded and checked alike in every node."""
+"""Node parameters as a table of rows, which are declared, described and checked in the same way in every node."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Value: TypeAlias = "bool | int | float | str | list[str]"
 
 @dataclass(frozen=True)
 class Param:
-    """One parameter. low and high bound a number (inclusive); choices bound a text. An empty list is [""]."""
+    """One parameter. low and high limit a number (inclusive); choices limit a text. An empty list is [""]."""
 
     name: str
     default: Value
@@ -30,7 +30,7 @@ class Param:
 
     @property
     def accepted(self) -> str:
-        """In words, what may be given."""
+        """In words, which values are accepted."""
         if self.choices:
             return " or ".join(repr(choice) for choice in self.choices)
         kind = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}.get(
@@ -41,7 +41,7 @@ class Param:
         return " ".join([kind, *bounds])
 
     def allows(self, value: Any) -> bool:
-        """Has it the type of the default (an integer will do for a number) and is it within bounds?"""
+        """Whether a value has the default's type (or is an integer for a float) and is within the limits."""
         if isinstance(self.default, list):
             return _is_texts(value)
         if isinstance(self.default, float):
@@ -57,7 +57,7 @@ class Param:
 
 
 def declare(node: Node, params: Sequence[Param]) -> None:
-    """Declare every row; a value given from outside is checked now, later changes when they come.
+    """Declare all rows. Check values given at start now, and later changes when they are made.
 
     Raises RequestError that names the parameter, its value and what is accepted.
     """
@@ -68,24 +68,24 @@ def declare(node: Node, params: Sequence[Param]) -> None:
             raise RequestError(param.name, given, param.accepted)
         value = param.default if given is None else _native(param, given)
         node.declare_parameter(param.name, value, _descriptor(param), ignore_override=True)
-    node.add_on_set_parameters_callback(lambda changed: _verdict(table, changed))
+    node.add_on_set_parameters_callback(lambda changed: _checked(table, changed))
 
 
 def given_value(node: Node, name: str) -> Any:
-    """What the command line or a file gives for a parameter that is not declared yet; None for nothing."""
+    """The value from the command line or a file for a parameter not declared yet; None if there is none."""
     value = node.declare_parameter(name, None, ParameterDescriptor(dynamic_typing=True)).value
     node.undeclare_parameter(name)
     return value
 
 
 def values_of(node: Node, params: Iterable[Param]) -> dict[str, Any]:
-    """A snapshot {name: value}; lists come without empty texts."""
+    """The present values {name: value}; lists without empty texts."""
     values = {param.name: node.get_parameter(param.name).value for param in params}
     return {name: [text for text in v if text] if isinstance(v, list) else v for name, v in values.items()}
 
 
 def _native(param: Param, value: Any) -> Any:
-    """`rate:=10` is as good as `rate:=10.0`."""
+    """The value in the type of the default: `rate:=10` means `rate:=10.0`."""
     if isinstance(param.default, list):
         return list(value)
     return float(value) if isinstance(param.default, float) else value
@@ -109,7 +109,7 @@ def _bounds(param: Param, kind: Any, limit: Any) -> Mapping[str, Any]:
     return {"from_value": low, "to_value": limit if param.high is None else kind(param.high)}
 
 
-def _verdict(table: Mapping[str, Param], changed: Sequence[Parameter]) -> SetParametersResult:
+def _checked(table: Mapping[str, Param], changed: Sequence[Parameter]) -> SetParametersResult:
     for parameter in changed:
         row = table.get(parameter.name)
         if row is not None and not row.allows(parameter.value):

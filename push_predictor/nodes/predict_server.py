@@ -85,8 +85,7 @@ class PredictServer(LifecycleNode):
         if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             self.trigger_activate()
         self._starting = False
-        if self._predict_push is not None:
-            self._predict_push.start()
+        self._start_predict_push()
 
     def close(self) -> None:
         """End a trace and long requests, publish the last diagnostics."""
@@ -120,8 +119,11 @@ class PredictServer(LifecycleNode):
         if SHIPPED in self.value("models"):
             self.get_logger().warning(SIMULATED)
         self._registry.choose_default(self.value("default_model"))
-        self._state = "inactive"
         self._create_services()
+        self._introspect(self.value("introspection"))
+        self._state = "inactive"
+        if not self._starting:
+            self._start_predict_push()
 
     def _create_services(self) -> None:
         self._predict_push = ThreadedService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
@@ -135,8 +137,9 @@ class PredictServer(LifecycleNode):
                 (LoadModel, "load_model", self._on_load),
             )
         ]
-        self._introspect(self.value("introspection"))
-        if not self._starting:
+
+    def _start_predict_push(self) -> None:
+        if self._predict_push is not None:
             self._predict_push.start()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -1,4 +1,4 @@
-"""QoS of replayed topics: reliable, bounded history, and the overrides of a file in rosbag2's form."""
+"""QoS of replayed topics: reliable with bounded history, plus overrides from a file in rosbag2's format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from push_predictor.errors import RequestError
 
 DEPTH = 1000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for subscribers that come late
+KEPT = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # for late subscribers
 _POLICIES: Mapping[str, Any] = {
     "history": HistoryPolicy,
     "reliability": ReliabilityPolicy,
@@ -35,15 +35,17 @@ _PARAMETER = "play.qos_profile_overrides_path"
 
 
 def replay_profile(recorded: str, kept: bool = False) -> QoSProfile:
-    """Reliable, KEEP_LAST; transient local where all recorded publishers were (`recorded`: rosbag2's YAML text), or
-    where messages are to be kept for subscribers that come late.
+    """The QoS of a replayed topic: reliable, KEEP_LAST.
+
+    Durability is transient local if all recorded publishers had it (`recorded`: rosbag2's YAML text), or if messages
+    are kept for late subscribers.
     """
     durability = DurabilityPolicy.TRANSIENT_LOCAL if kept or _was_latched(recorded) else DurabilityPolicy.VOLATILE
     return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
 
 
 def read_overrides(path: Path | None) -> dict[str, dict[str, Any]]:
-    """{topic without slashes at its ends: {policy: value}} of a file. Raises RequestError that names file and key."""
+    """{topic without leading slash: {policy: value}} from a file. Raises RequestError that names file and key."""
     if path is None:
         return {}
     try:
@@ -59,7 +61,7 @@ def read_overrides(path: Path | None) -> dict[str, dict[str, Any]]:
 
 
 def overridden(profile: QoSProfile, overrides: Mapping[str, Any], topic: str) -> QoSProfile:
-    """The profile with a topic's overrides. Raises RequestError if they make none."""
+    """The profile with a topic's overrides. Raises RequestError if they are not valid."""
     try:
         for name, value in overrides.items():
             setattr(profile, name, value)
@@ -94,7 +96,7 @@ def _was_latched(recorded: str) -> bool:
     try:
         profiles = yaml.safe_load(recorded)
     except yaml.YAMLError:
-        return False  # written by a foreign tool: the default serves every subscriber but late ones
+        return False  # written by another tool; the default suits every subscriber except late ones
     if not isinstance(profiles, list) or not profiles:
         return False
     return all(isinstance(p, dict) and p.get("durability") in (1, "transient_local") for p in profiles)

@@ -1,4 +1,4 @@
-"""What surrounds every node: start, spin, signals, end. SIGINT and SIGTERM both end a node with status 0."""
+"""The life of a node process: start, spin, signals, end. SIGINT and SIGTERM end it with status 0."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Protocol
 
 import rclpy
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
-from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -29,14 +29,14 @@ _GRAPH_ERRORS = (
 
 
 class Closable(Protocol):
-    """A node: close() writes and publishes what is left, while the graph is still there."""
+    """A node with a method close() that runs while the graph is still available."""
 
     def close(self) -> None:
-        """End its threads, publish its last words."""
+        """End its threads, write and publish its last results."""
 
 
 class Stop:
-    """Asks the process to end; set by a signal, by the node itself, or by a thread of it that failed."""
+    """A request to end the process, made by a signal, the node itself or one of its threads."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
@@ -52,18 +52,18 @@ class Stop:
         self._event.set()
 
     def wait(self) -> None:
-        """Block until somebody asks."""
-        # In turns: Python's main thread sleeps through a signal that the kernel hands to another thread.
+        """Block until the end is requested."""
+        # With a timeout: Python's main thread misses a signal that the kernel delivers to another thread.
         while not self._event.wait(0.2):
             pass
 
 
-def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | None = None, threads: int = 1) -> int:
-    """Make a node, spin it until a signal or Stop, close it; answers the exit status.
+def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | None = None) -> int:
+    """Create a node, spin it until a signal or Stop, close it; returns the exit status.
 
-    A PushPredictorError while the node is made becomes one line on stderr and status 1. threads above 1 takes a
-    MultiThreadedExecutor. make_node must answer a rclpy Node that is Closable. Other machines do not find the node
-    unless the environment asks for that; it is not made without the security that the environment asks for.
+    make_node: returns a rclpy Node that is Closable; its PushPredictorError becomes one line on stderr and status 1.
+    Discovery is limited to this machine unless the environment states otherwise. The node is not created without the
+    security that the environment requires.
     """
     stop = Stop()
     _handle_signals(stop)
@@ -75,7 +75,7 @@ def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | 
         rclpy.try_shutdown()
         return 1
     try:
-        return _spin(name, node, stop, threads)
+        return _spin(name, node, stop)
     finally:
         rclpy.try_shutdown()
 
@@ -88,7 +88,7 @@ def one_line(error: BaseException) -> str:
 def _made(name: str, make_node: Callable[[Stop], Closable], stop: Stop, args: Sequence[str] | None) -> Closable:
     limited = limit_discovery()
     require_security()
-    # rclpy's own handlers end the context at once: the last diagnostics could not be published any more.
+    # rclpy's own handlers shut the context down at once, before the last diagnostics are published.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     if limited:
         get_logger(name).info(LIMITED)
@@ -98,15 +98,15 @@ def _made(name: str, make_node: Callable[[Stop], Closable], stop: Stop, args: Se
 def _handle_signals(stop: Stop) -> None:
     def end(number: int, frame: object) -> None:
         stop.request()
-        signal.signal(number, signal.SIG_DFL)  # a second one ends the process at once
+        signal.signal(number, signal.SIG_DFL)  # a second signal ends the process at once
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
 
 
-def _spin(name: str, node: Closable, stop: Stop, threads: int) -> int:
-    # The main thread only waits: Python runs signal handlers there, and a wait in rcl would keep it from doing so.
-    executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
+def _spin(name: str, node: Closable, stop: Stop) -> int:
+    # The main thread only waits: Python runs signal handlers there, and a wait in rcl would block them.
+    executor = SingleThreadedExecutor()
     assert isinstance(node, Node)
     executor.add_node(node)
     spinner = threading.Thread(target=_spin_executor, args=(executor, stop), name="executor")
@@ -137,5 +137,5 @@ def _spin_executor(executor: Executor, stop: Stop) -> None:
         executor.spin()
     except ExternalShutdownException:
         stop.request()
-    except BaseException as error:  # reported by the main thread, which waits for it
+    except BaseException as error:  # the main thread waits for it and reports it
         stop.fail(error)

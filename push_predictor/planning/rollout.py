@@ -124,9 +124,10 @@ def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array
 
 
 def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
+    velocity, contact, angle, duration = step
     try:
-        windows = windows_of(model, step[3])
-        push = PushRequest(*step[:3], windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
+        windows = windows_of(model, duration)
+        push = PushRequest(velocity, contact, angle, windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
         check_request(model, push)
     except RequestError as error:
         raise error.within(f"steps[{index}]") from None

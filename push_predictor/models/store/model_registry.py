@@ -1,4 +1,4 @@
-"""The models a server holds: by name, one of them the default. No ROS here."""
+"""The model registry of a server: loaded models by name, one of them the default."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from push_predictor.models.store.model_file import is_model_file, load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
-SHIPPED = "default"  # stands for the model that ships with the package
+SHIPPED = "default"  # in place of a path: the model that ships with the package
 
 
 class ModelRegistry:
-    """Loaded models in the order of their arrival. A model is taken up only when its file has been read whole and its
-    table is made, so that it never answers in two ways.
+    """Loaded models in the order of loading.
+
+    A model is registered only after its file has been read completely and its table is built, so its predictions never
+    change while it is in use.
     """
 
     def __init__(self) -> None:
@@ -35,16 +37,16 @@ class ModelRegistry:
 
     @property
     def default(self) -> str:
-        """What an empty name stands for: the model chosen, else the first; empty where there is none."""
+        """The name that an empty name stands for: the chosen one, else the first; empty if there is none."""
         return self._chosen or next(iter(self._models), "")
 
     @property
     def accepted(self) -> str:
-        """In words, which names a request may give."""
+        """In words, the names that a request may give."""
         return f"one of {', '.join(self._models)}" if self._models else "a model; none is loaded"
 
     def choose_default(self, name: str) -> None:
-        """Let an empty name stand for this model, loaded by now or not; empty goes back to the first."""
+        """Make this name the default, loaded yet or not; empty: the first model again."""
         self._chosen = name
 
     def get(self, name: str) -> TabulatedModel:
@@ -56,30 +58,30 @@ class ModelRegistry:
         return model
 
     def load(self, path: Path, name: str = "", *, replace: bool = True) -> str:
-        """Load a model file under a name (empty: the one in the file); a model of that name gives way to it.
+        """Load a model file under a name (empty: the name in the file) and return the name.
 
-        Answers the name. Raises ModelFileError, after which the registry is as it was; also for a name that is taken
-        if `replace` is false.
+        It replaces a model of that name, unless `replace` is false. Raises ModelFileError for a bad file and for a name
+        in use with `replace` false; the registry is then unchanged.
         """
         path = _located(path)
         tabulated = _tabulated(path)
         name = name or tabulated.model.name
         if not replace and name in self._models:
-            raise ModelFileError(f"{path}: name {name!r} is taken by {self._files[name]}, give it another name")
-        # A new dictionary: requests are answered by other threads, which may be going through the old one.
+            raise ModelFileError(f"{path}: name {name!r} is already used by {self._files[name]}, give another name")
+        # A new dictionary: other threads may be iterating over the old one.
         self._files[name] = path
         self._models = {**self._models, name: tabulated}
         return name
 
     @property
     def answering(self) -> list[str]:
-        """For each model how it answers, a line each."""
+        """One line per model: from a table or exactly."""
         return [f"{name}: {tabulated.how}" for name, tabulated in self._models.items()]
 
     def load_all(self, places: Iterable[str]) -> list[str]:
-        """Load files, folders of files, and for SHIPPED the shipped model.
+        """Load files, folders of files and, for SHIPPED, the shipped model.
 
-        Answers what went wrong, a line each; the other models are loaded.
+        Returns one line for each model that could not be loaded; the others are loaded.
         """
         problems = []
         for index, place in enumerate(places):
@@ -102,7 +104,7 @@ class ModelRegistry:
             "surface": model.rig.surface,
             "pushes": len(model.training.pushes),
             "windows": len(model.training),
-            "covariates": ",".join(model.needs) or "-",  # what a request must bring besides
+            "covariates": ",".join(model.needs) or "-",  # that a request must contain
             "duration": f"{low:g}" if high - low < 1e-6 else f"{low:g}..{high:g}",
             "file": self._files[name],
         }
@@ -117,7 +119,7 @@ class ModelRegistry:
 
 
 def _located(path: Path) -> Path:
-    """The absolute path. Raises ModelFileError for one that can lead nowhere."""
+    """The absolute path. Raises ModelFileError if it cannot be resolved."""
     try:
         return path.expanduser().resolve()
     except (OSError, RuntimeError, ValueError) as error:  # no such user, a loop of links, a null character
@@ -125,15 +127,15 @@ def _located(path: Path) -> Path:
 
 
 def _tabulated(path: Path) -> TabulatedModel:
-    """The model of a file, ready to answer. Raises ModelFileError, whatever the file makes the mathematics do."""
+    """The model of a file, ready to predict. Raises ModelFileError, even if the numbers in the file make it fail."""
     model = load_model(path)
     try:
         tabulated = tabulate(model)
-        # The first prediction fills what is left of caches; no request should wait for that.
+        # The first prediction fills caches; no request should wait for that.
         first = model.training.take(np.arange(1))
         tabulated.predict_rows(first.inputs, first.duration, first.covariates)
     except Exception as error:
-        raise ModelFileError(f"{path}: the model cannot be served ({type(error).__name__}: {error})") from None
+        raise ModelFileError(f"{path}: the model cannot predict ({type(error).__name__}: {error})") from None
     return tabulated
 
 
@@ -146,5 +148,5 @@ def model_files(place: Path) -> list[Path]:
     except OSError as error:
         raise ModelFileError(f"{place}: cannot be read ({error.strerror})") from None
     if not files:
-        raise ModelFileError(f"{place}: the folder holds no model file, give one that train wrote")
+        raise ModelFileError(f"{place}: the folder contains no model file, give one written by `push_predictor train`")
     return files

@@ -1,4 +1,4 @@
-"""The parameters of predict_server, and the values of one of them."""
+"""The parameters of predict_server."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ PARAMETERS = (
     Param(
         "models",
         [SHIPPED],
-        "Model files, and folders of them, loaded when the node is configured; 'default': the shipped one.",
+        "Model files, and folders of them, to load on configuration. 'default' is the shipped model.",
     ),
     Param(
         "default_model",
         "",
-        "Name of the model that a request without a name gets; empty: the first loaded.",
+        "Name of the model for requests that name none. Empty: the first one loaded.",
         read_only=False,
     ),
-    Param("world_frame", "world", "Frame in which sliders lie flat: z points up, poses are read in it."),
-    Param("autostart", True, "Configure and activate without a lifecycle manager."),
+    Param("world_frame", "world", "Frame in which sliders lie flat, with z up."),
+    Param("autostart", True, "Configure and activate at start, without a lifecycle manager."),
     Param(
         "introspection",
         "disabled",
-        "Service events on NAME/_service_event: none, metadata, or requests and responses too.",
+        "Service events on NAME/_service_event: none, metadata only, or metadata and contents.",
         choices=tuple(INTROSPECTION),
         read_only=False,
     ),
@@ -37,7 +37,7 @@ PARAMETERS = (
     Param(
         "trace_alpha",
         0.01,
-        "Probability, at most, that trace_residual finds an effect where there is none.",
+        "Largest probability that trace_residual reports an effect where there is none.",
         low=1e-6,
         high=0.5,
         read_only=False,
