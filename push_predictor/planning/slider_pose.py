@@ -61,7 +61,8 @@ def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> Slid
     model = predictor.model if isinstance(predictor, TabulatedModel) else predictor
     touch = touch_of(model.rig, push)
     covariates = completed_covariates(push, touch, model.rig)
-    request = PushRequest(*touch.inputs[0].tolist(), push.duration, covariates)
+    velocity, contact, angle = touch.inputs[0].tolist()
+    request = PushRequest(velocity, contact, angle, push.duration, covariates)
     check_request(model, request)
     prediction = predictor.predict_rows(*request.arrays)
     return SliderAfter(
