@@ -1,4 +1,4 @@
-"""push_predictor trace: what it writes, prints and refuses."""
+"""push_predictor trace: its output, its options and its errors."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def found(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Makes the command find this trace; what it was asked is kept."""
+    """Replaces the trace of the command by a given one and records its arguments."""
     asked: dict[str, Any] = {}
 
     def find(trace: Trace) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def run(place: Path, *options: str) -> int:
     return main(["trace", str(place / "new.csv"), "--model", str(place / "deployed.pushmodel"), *options])
 
 
-def test_a_real_trace_from_a_table_to_an_extended_model(
+def test_trace_of_a_table_writes_json_and_extended_model(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, model = tmp_path / "sub" / "out.json", tmp_path / "sub" / "extended.pushmodel"
@@ -83,7 +83,7 @@ def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsy
     assert asked["covariates"] is None and asked["alpha"] == 0.01 and asked["rig"].shape == "rect1"
 
 
-def test_json_on_stdout_is_all_there_is_on_stdout(
+def test_json_on_stdout_is_the_only_output(
     place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found(replace(extended, extended=None))
@@ -94,19 +94,19 @@ def test_json_on_stdout_is_all_there_is_on_stdout(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_json_a_person_reads_what_was_found(
+def test_prints_verdict_worth_and_held_out_figures_without_json(
     place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found(extended)
     assert run(place) == 0
     text = capsys.readouterr().out
-    assert text.startswith("effect: The model lacks 1 effect: contact friction, driven by elapsed_time")
-    assert "so the motion model is extended" in text and extended.held_out.digest in text
+    assert text.startswith("Contact friction changes with elapsed time: 0.0")
+    assert "The motion model is extended." in text and extended.held_out.digest in text
     for name in ("before", "refit", "after"):
         assert f"\n{name} " in text
 
 
-def test_the_extended_model_is_saved_as_it_is(place: Path, tmp_path: Path, found: Any, extended: Trace) -> None:
+def test_saved_extended_model_predicts_the_same(place: Path, tmp_path: Path, found: Any, extended: Trace) -> None:
     found(extended)
     path = tmp_path / "extended.pushmodel"
     assert run(place, "--save-model", str(path)) == 0
@@ -131,7 +131,7 @@ def test_the_extended_model_is_saved_as_it_is(place: Path, tmp_path: Path, found
         (["--rig", "absent.yaml"], ["absent.yaml"]),
     ],
 )
-def test_errors_are_one_line_that_names_what_is_wrong(
+def test_errors_are_one_line_that_names_the_field(
     place: Path, options: list[str], words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(place, *options) == 1
@@ -144,9 +144,9 @@ def test_errors_are_one_line_that_names_what_is_wrong(
 @pytest.mark.parametrize("option", ["--report", "--json", "--save-model"])
 @pytest.mark.parametrize(
     ("where", "accepted"),
-    [("folder", "the path of a file, this is a folder"), ("file/below", "a path in a folder, ")],
+    [("folder", "the path of a file: this is a folder"), ("file/below", "a path inside a folder: ")],
 )
-def test_where_nothing_can_be_written_is_told_before_the_work(
+def test_unwritable_output_is_rejected_before_the_work(
     place: Path, tmp_path: Path, found: Any, extended: Trace, option: str, where: str, accepted: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -159,18 +159,18 @@ def test_where_nothing_can_be_written_is_told_before_the_work(
     assert asked == {} and (tmp_path / "file").read_text() == "kept"
 
 
-def test_a_folder_that_may_not_be_written_to_is_named(
+def test_rejects_output_folder_without_write_permission_by_name(
     place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     asked = found(extended)
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere
     assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
-    assert f"a path in a folder that may be written to, {tmp_path} may not" in capsys.readouterr().err
+    assert f"a path in a folder with write permission: {tmp_path} has none" in capsys.readouterr().err
     assert asked == {}
 
 
-def test_data_that_are_not_there_are_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rejects_missing_data_by_name(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trace", "absent.csv", "--model", str(place / "deployed.pushmodel")]) == 1
     assert "absent.csv: no such file or folder" in capsys.readouterr().err
 

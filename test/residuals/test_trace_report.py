@@ -1,4 +1,4 @@
-"""The report of a trace: what it says for every verdict, that it stands alone, and the numbers behind its pictures."""
+"""The report of a trace: its text for every verdict, that it is self-contained, and the numbers in its pictures."""
 
 from __future__ import annotations
 
@@ -35,8 +35,9 @@ from push_predictor.residuals.reporting.figures.partial import (
 from push_predictor.residuals.reporting.figures.shifts import binned_means, course_of
 from push_predictor.residuals.reporting.figures.tested import best_of, role_of
 from push_predictor.residuals.reporting.page import write_trace_report
+from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
-from push_predictor.residuals.reporting.wording import shift_sizes, verdict_sentence, worth_sentence
+from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
 
 LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
 PIXEL = bytes.fromhex("89504e470d0a1a0a")
@@ -45,7 +46,7 @@ UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta o
 
 @pytest.fixture(scope="module")
 def drift() -> Trace:
-    """Contact friction that drifts; the push's number goes with the time."""
+    """Contact friction that drifts; the push count correlates with the time."""
     rivals: dict[str, Any] = {"equivalent": ("push_index",), "undecided": True, "experiment": EXPERIMENT}
     return made_up_trace(slippery(0.06), verdict="mechanism_only", **rivals)
 
@@ -68,39 +69,41 @@ def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def written(path: Path, trace: Trace) -> str:
-    """The page's text."""
+    """The text of the page."""
     page = write_trace_report(path / "new" / "trace.html", trace).read_text()
-    assert not re.search(r'(?:src|href)="(?!data:|#)', page), "the page does not stand alone"
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page), "the page is not self-contained"
     return unescape(re.sub(r"<[^>]+>", " ", page))
 
 
 # --- the page --------------------------------------------------------------------------------------------------------
 
 
-def test_a_whole_page_is_written_with_its_pictures_in_it(tmp_path: Path, drift: Trace) -> None:
+def test_page_embeds_six_pictures(tmp_path: Path, drift: Trace) -> None:
     page = write_trace_report(tmp_path / "trace.html", drift)
     assert [path.name for path in tmp_path.iterdir()] == ["trace.html"]
     pictures = re.findall(r'<img alt="([^"]+)" src="data:image/png;base64,([^"]+)"', page.read_text())
     assert len(pictures) == 6 and all(len(data) > 10_000 for _, data in pictures)
 
 
-def test_the_page_tells_what_an_argument_needs(tmp_path: Path, unpainted: None, drift: Trace) -> None:
+def test_page_contains_hash_split_rivals_and_gain(tmp_path: Path, unpainted: None, drift: Trace) -> None:
     text = written(tmp_path, drift)
     assert drift.held_out.digest in text and "every third block of up to 10" in text
     assert "100 pushes, 300 windows" in text and "50 pushes, 150 windows" in text
-    assert "these data cannot tell whether elapsed_time drives it or push_index" in text
-    assert "Pushes that would separate the rivals" in text and "Rest the rig" in text
-    assert re.search(r"contact friction\s+push_index\s+[\d.]+\s+rival", text)
-    assert re.search(r"contact friction\s+elapsed_time\s+[\d.]+\s+found", text)
+    assert "Elapsed time and push count fit equally well; 1 push that would decide is listed below." in text
+    assert "Pushes that would separate the rivals" in text and "Pause for about half a session" in text
+    assert re.search(r"contact friction\s+push count\s+[\d.]+\s+rival", text)
+    assert re.search(r"contact friction\s+elapsed time\s+[\d.]+\s+found", text)
     assert "clock offset" in text and "after minus refit" in text and "a note for the reader" in text
     assert re.search(r"The other \d+ candidates", text)
 
 
-def test_nothing_found_is_a_page_of_equal_care(tmp_path: Path, unpainted: None, nothing: Trace) -> None:
+def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effects(
+    tmp_path: Path, unpainted: None, nothing: Trace
+) -> None:
     text = written(tmp_path, nothing)
-    assert "Nothing found: of 24 candidates none explains the residual of 60 pushes" in text
-    assert "the nearest was contact friction, driven by elapsed_time, with p = 0.3" in text
-    assert "smallest effect of each mechanism that would have been found" in text and "0.021" in text
+    assert "No change found." in text and "None of 24 candidates explains the residual of 60 pushes" in text
+    assert "The closest is contact friction depending on elapsed time, with p = 0.3." in text
+    assert "The smallest detectable effect of each mechanism" in text and "0.021" in text
     for heading in ("Residuals before and after", "What else was tested", "Before, refit, after", "Calibration"):
         assert heading in text
     assert "The effect" not in text and "after minus refit" not in text
@@ -110,20 +113,26 @@ def test_nothing_found_is_a_page_of_equal_care(tmp_path: Path, unpainted: None, 
 @pytest.mark.parametrize(
     ("trace", "words"),
     [
-        (lambda: told("measurement", "clock_offset", "model_inputs", LATE), "stamps 12 (95 %: 10.5 to 13.5) ms"),
+        (
+            lambda: told("measurement", "clock_offset", "model_inputs", LATE),
+            "The lateness of the slider's stamps is 12.0 ms (95 % CI 10.5 to 13.5, p = 0.002).",
+        ),
         (
             lambda: told("wrench_only", "surface_friction", "elapsed_time", Sized("change", 0.2, 0.1, 0.3, "1")),
-            "The force changed and the motion did not; the motion model is left alone: surface friction, driven by",
+            "The force needed to push the slider changes with elapsed time; the motion does not",
         ),
-        (lambda: told("variance", "", "elapsed_time", None), "scatter of dy "),
+        (lambda: told("variance", "", "elapsed_time", None), "The noise of dy is "),
         (
             lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
-            "The motion changes with elapsed_time, by a mechanism that the library does not hold",
+            "The slider moves differently than predicted, depending on elapsed time; no known mechanism fits",
         ),
-        (lambda: made_up_trace(planted(*GRAIN, 0.06, 0.03)), "anisotropic friction, driven by push_heading"),
+        (
+            lambda: made_up_trace(planted(*GRAIN, 0.06, 0.03)),
+            "Direction-dependent friction of the table differs from the model",
+        ),
         (
             lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
-            "driven by slider_x (map)",
+            "Contact friction changes with the position on the table",
         ),
     ],
 )
@@ -133,7 +142,7 @@ def test_every_verdict_has_its_page(tmp_path: Path, unpainted: None, trace: Call
     assert words in " ".join(summary_lines(found)) and " ".join(summary_lines(found)).isascii()
 
 
-def test_windows_cut_again_may_be_others(tmp_path: Path, unpainted: None) -> None:
+def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path, unpainted: None) -> None:
     trace = told("measurement", "clock_offset", "model_inputs", LATE)
     held, fewer = trace.held_out, slice(0, 30)
     after = held.after
@@ -148,7 +157,7 @@ def test_windows_cut_again_may_be_others(tmp_path: Path, unpainted: None) -> Non
     assert "on windows cut again" in text and "The motion was not searched" in text
 
 
-def test_what_is_in_the_data_is_shown_not_run(tmp_path: Path, unpainted: None, nothing: Trace) -> None:
+def test_page_escapes_names_from_the_data(tmp_path: Path, unpainted: None, nothing: Trace) -> None:
     tested = (outcome.Tested("<script>", "topic:/<b>", 0.5),)
     page = write_trace_report(tmp_path / "trace.html", replace(nothing, tested=tested, notes=("<i>",))).read_text()
     assert not re.search("<script>|<b>|<i>", page)
@@ -157,42 +166,43 @@ def test_what_is_in_the_data_is_shown_not_run(tmp_path: Path, unpainted: None, n
 # --- sentences -------------------------------------------------------------------------------------------------------
 
 
-def test_the_verdict_is_one_sentence_with_size_unit_and_interval(drift: Trace) -> None:
-    sentence = verdict_sentence(drift)
-    assert sentence[0].isupper() and sentence.count(". ") == 0 and sentence.endswith(".")
-    assert re.search(r"change per 300 s 0\.0\d+ \(95 %: 0\.0\d+ to 0\.0\d+\)", sentence)
+def test_verdict_starts_with_the_answer_then_size_and_interval(drift: Trace) -> None:
+    verdict = verdict_sentence(drift)
+    assert verdict.startswith("Contact friction changes with elapsed time: ") and verdict.endswith(".")
+    assert re.search(r": 0\.0\d+ \(95 % CI 0\.0\d+ to 0\.0\d+, p = 0\.001\)\. It explains 23 % of", verdict)
+    assert max(len(sentence.split()) for sentence in re.split(r"[.;:] ", verdict)) <= 25
 
 
 @pytest.mark.parametrize(
     ("gain", "kept", "words"),
     [
-        (Gain(-0.5, -0.6, -0.4), True, "so the motion model is extended"),
+        (Gain(-0.5, -0.6, -0.4), True, "The motion model is extended."),
         (Gain(-0.1, -0.3, 0.1), False, "found, but not worth modelling"),
         (Gain(-0.1, float("nan"), float("nan")), False, "too few pushes for an interval"),
     ],
 )
-def test_found_and_worth_modelling_are_two_verdicts(drift: Trace, gain: Gain, kept: bool, words: str) -> None:
+def test_worth_sentence_separates_found_from_worth_modelling(drift: Trace, gain: Gain, kept: bool, words: str) -> None:
     trace = replace(drift, gain_nlpd=gain, extended=drift.extended if kept else None)
     assert words in worth_sentence(trace)
 
 
-def test_a_candidate_below_alpha_that_was_not_found_is_explained(nothing: Trace) -> None:
+def test_verdict_explains_a_candidate_below_alpha_that_is_not_significant(nothing: Trace) -> None:
     near = replace(nothing, tested=(outcome.Tested("inertia", "velocity", 0.008),))
-    assert "the level is shared" in verdict_sentence(near)
+    assert "share the level" in verdict_sentence(near)
 
 
-def test_advice_fits_the_rivals() -> None:
+def test_advice_matches_the_rivals() -> None:
     assert len(separating_words(["elapsed_time", "push_index"])) == 1
     assert "Return to places" in " ".join(separating_words(["slider_x", "slid_distance"]))
     assert separating_words(["topic:/a", "topic:/b"]) == [
-        "Change one of topic:/a, topic:/b while the others stay, and then the next."
+        "Vary topic /a and topic /b independently: change one while the others stay constant."
     ]
 
 
 # --- what the pictures show ------------------------------------------------------------------------------------------
 
 
-def test_bins_show_the_planted_drift_and_held_out_pushes_agree(drift: Trace) -> None:
+def test_bins_recover_the_planted_drift_on_analysis_and_held_out_pushes(drift: Trace) -> None:
     strength = strength_of(drift.terms[0], drift.analysis)
     for rows in (analysis_rows(drift), held_out_rows(drift), analysis_rows(replace(drift, extended=None))):
         time = rows.table.covariates["elapsed_time"]
@@ -203,7 +213,7 @@ def test_bins_show_the_planted_drift_and_held_out_pushes_agree(drift: Trace) -> 
         np.testing.assert_allclose(found.value[:, 0], truth, atol=0.04)
 
 
-def test_bins_do_not_repeat_the_fit_where_the_data_say_otherwise() -> None:
+def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
     """A step, fitted by a line: the bins stay on the step."""
     trace = made_up_trace(planted("contact_friction", "elapsed_time", made_up.JUMP, 0.15), count=200)
     line = made_up.traced(trace.model, trace.analysis, trace.held_out.table, (slippery(0.1),))
@@ -222,13 +232,13 @@ def test_bins_do_not_repeat_the_fit_where_the_data_say_otherwise() -> None:
     assert abs(early[-1] - early[0]) < 0.5 * (fitted[1] - fitted[0])
 
 
-def test_the_band_is_that_of_the_coefficients(drift: Trace) -> None:
+def test_band_follows_the_covariance_of_the_coefficients(drift: Trace) -> None:
     strength = strength_of(drift.terms[0], drift.analysis)
     _, half = strength.curve({"elapsed_time": np.array([500.0, 800.0])}, 2)
     np.testing.assert_allclose(half[:, 0], [0.0, 1.96 * np.sqrt(drift.terms[0].covariance[0, 0])], rtol=1e-12)
 
 
-def test_single_pushes_scatter_about_the_curve(drift: Trace) -> None:
+def test_single_pushes_have_the_curve_as_median(drift: Trace) -> None:
     strength, rows = strength_of(drift.terms[0], drift.analysis), analysis_rows(drift)
     place, value = per_push(strength, rows, responses(drift, strength, rows), rows.table.covariates["elapsed_time"])
     assert len(place) == len(drift.analysis.pushes)
@@ -236,7 +246,7 @@ def test_single_pushes_scatter_about_the_curve(drift: Trace) -> None:
     assert abs(np.nanmedian(off)) < 0.02
 
 
-def test_an_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
+def test_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     trace = made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN))
     strength = strength_of(trace.terms[0], trace.analysis)
     rows = analysis_rows(trace)
@@ -248,7 +258,7 @@ def test_an_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     assert strength.share == pytest.approx(1.0)
 
 
-def test_a_constant_effect_is_shown_over_the_angle_by_contact() -> None:
+def test_constant_effect_is_shown_against_push_angle_by_thirds_of_the_edge() -> None:
     trace = made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08), count=200)
     rows, effect = analysis_rows(trace), trace.terms[0]
     course = course_of(effect, trace.model.rig.outline, rows)
@@ -257,18 +267,18 @@ def test_a_constant_effect_is_shown_over_the_angle_by_contact() -> None:
         means = binned_means(trace, effect, rows, course.x, group, 1)
         assert np.mean((means.low <= means.fitted) & (means.fitted <= means.high)) >= 0.6
     headed = planted(*GRAIN, 0.06, 0.03)
-    assert "push_heading" in course_of(headed, trace.model.rig.outline, rows).label
+    assert "Push direction" in course_of(headed, trace.model.rig.outline, rows).label
 
 
-def test_maps_are_split_where_the_effect_turns_its_sign(drift: Trace, nothing: Trace) -> None:
+def test_maps_are_split_at_the_median_strength_of_the_effect(drift: Trace, nothing: Trace) -> None:
     halves = halves_of(strength_of(drift.terms[0], drift.analysis), drift.analysis)
-    assert halves.names == ("elapsed_time: lower", "elapsed_time: higher")
+    assert halves.names == ("elapsed time: low", "elapsed time: high")
     time = drift.analysis.covariates["elapsed_time"]
     assert time[halves.masks[0]].max() <= time[halves.masks[1]].min()
     assert len(halves_of(None, nothing.analysis).masks) == 1
 
 
-def test_maps_share_one_scale_about_zero_that_noise_does_not_fill() -> None:
+def test_maps_share_one_symmetric_scale_of_at_least_one_deviation() -> None:
     scale = scale_of_noise(0.3)
     assert (scale.low, scale.high) == (-1.0, 1.0)
     wide = scale_of_noise(4.0)
@@ -281,14 +291,14 @@ def scale_of_noise(size: float) -> Any:
     return scale_of([PushMap(cells, mean, np.abs(mean))])
 
 
-def test_shifts_have_the_planted_size(drift: Trace) -> None:
+def test_shift_intervals_contain_the_planted_size(drift: Trace) -> None:
     sizes = shift_sizes(drift, drift.terms[0], drift.analysis)
     exact = replace(drift.terms[0], coefficients=np.array([0.06]), covariance=np.zeros((1, 1)))
     for size, truth in zip(sizes, shift_sizes(drift, exact, drift.analysis), strict=True):
         assert size.low <= truth.value <= size.high and truth.low == pytest.approx(truth.value)
 
 
-def test_one_line_a_pair_with_its_smallest_p_and_its_role(drift: Trace) -> None:
+def test_tested_candidates_are_unique_pairs_with_smallest_p_and_role(drift: Trace) -> None:
     tested = (outcome.Tested("a", "x", 0.5), outcome.Tested("a", "x", 0.02), outcome.Tested(None, "x", 0.1))
     assert [(t.mechanism, t.p_value) for t in best_of(tested)] == [("a", 0.02), (None, 0.1)]
     roles = {(t.mechanism, t.covariate): role_of(drift, t) for t in drift.tested}
@@ -296,7 +306,7 @@ def test_one_line_a_pair_with_its_smallest_p_and_its_role(drift: Trace) -> None:
     assert roles["pressure_spread", "push_index"] == ""
 
 
-def test_every_verdict_of_the_contract_has_a_name() -> None:
+def test_every_verdict_has_a_name() -> None:
     assert set(report.VERDICTS) == {
         "none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance",
     }  # fmt: skip

@@ -87,4 +87,4 @@ def test_what_lies_in_the_models_own_inputs_is_told_and_left_to_a_refit() -> Non
     assert told["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
     refit, before = (sum(told[model]["nlpd"].values()) for model in ("refit", "before"))
     assert refit < before
-    assert "training anew" in worth_sentence(found)
+    assert "Retraining on the new pushes fixes this." in worth_sentence(found)

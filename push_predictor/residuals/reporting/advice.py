@@ -1,44 +1,50 @@
-"""How to push so that drivers which these data cannot tell apart go separate ways."""
+"""How to push so that covariates which these data cannot distinguish become distinguishable."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from push_predictor.residuals.reporting.phrases import covariate_phrase, listed
+
 DRIFTING = ("elapsed_time", "push_index", "slid_distance")
 HEADED = ("slider_heading", "push_heading", "edge")
-ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two rivals, one of each kind
+ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two rivals, one of each group
     (
         DRIFTING,
         DRIFTING,
-        "Rest the rig for a good part of the session's length and push on: the time runs, count and way do not. Then "
-        "push short and long pushes in turn: the way grows faster than the count.",
+        "Pause for about half a session, then continue: time passes, push count and distance do not. Then alternate "
+        "short and long pushes: the distance grows faster than the count.",
     ),
     (
         DRIFTING,
         ("slider_x", "slider_y"),
-        "Return to places where the slider was early on: what goes with the place comes back, what drifts does not.",
+        "Return to places where the slider was early on: an effect of the place recurs, a drift does not.",
     ),
     (
         HEADED,
         HEADED,
-        "Set the slider at many headings and push from every side at each: side, slider's heading and push's heading "
-        "part.",
+        "Set the slider at many headings and push from every side at each. That separates the side, the slider's "
+        "heading and the push direction.",
     ),
-    (DRIFTING, ("velocity", "angle", "contact"), "Mix speeds, angles and contacts at random over the session."),
-    (DRIFTING, ("dwell_time",), "Vary the pause before a push at random over the session."),
+    (
+        DRIFTING,
+        ("velocity", "angle", "contact"),
+        "Randomise speed, push angle and contact point over the session.",
+    ),
+    (DRIFTING, ("dwell_time",), "Randomise the pause before each push over the session."),
     (
         DRIFTING,
         ("recording",),
-        "Repeat the setting of an early recording in a new one: what belongs to the setting comes back, a drift does "
-        "not.",
+        "Repeat the setting of an early recording in a new one: an effect of the setting recurs, a drift does not.",
     ),
 )
 
 
 def separating_words(rivals: Sequence[str]) -> list[str]:
-    """How pushes tell these drivers apart."""
+    """Advice on pushes that separate these covariates."""
     advice = [text for one, other, text in ADVICE if len({*one, *other} & {*rivals}) > 1 and _both(one, other, rivals)]
-    return advice or [f"Change one of {', '.join(rivals)} while the others stay, and then the next."]
+    names = listed([covariate_phrase(name) for name in rivals])
+    return advice or [f"Vary {names} independently: change one while the others stay constant."]
 
 
 def _both(one: Sequence[str], other: Sequence[str], rivals: Sequence[str]) -> bool:

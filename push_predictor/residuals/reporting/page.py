@@ -1,4 +1,4 @@
-"""A trace as one HTML page that stands alone: whoever reads only this can argue with it."""
+"""A trace as one self-contained HTML page: the answer first, then its evidence, then data and method."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from tempfile import TemporaryDirectory
 
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
-from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.advice import separating_words
@@ -18,6 +17,8 @@ from push_predictor.residuals.reporting.figures.gallery import (
     tested_picture,
 )
 from push_predictor.residuals.reporting.figures.map_pictures import map_pictures
+from push_predictor.residuals.reporting.phrases import effect_phrase
+from push_predictor.residuals.reporting.quantities import count
 from push_predictor.residuals.reporting.tables import (
     detectable_table,
     effects_table,
@@ -26,77 +27,66 @@ from push_predictor.residuals.reporting.tables import (
     shifts_table,
     tested_tables,
 )
-from push_predictor.residuals.reporting.wording import (
-    count,
-    driver_words,
-    mechanism_words,
-    verdict_sentence,
-    worth_sentence,
-)
+from push_predictor.residuals.reporting.wording import evidence_sentence, headline, worth_sentence
 
 VERDICTS = {
-    "none": "nothing found",
+    "none": "no change found",
     "effect": "effect named",
-    "driver_only": "driver known, mechanism unknown",
-    "mechanism_only": "mechanism known, driver undecided",
-    "wrench_only": "wrench only",
+    "driver_only": "mechanism unknown",
+    "mechanism_only": "cause undecided",
+    "wrench_only": "force only",
     "measurement": "measurement error",
-    "variance": "variance only",
+    "variance": "noise only",
 }
-
 UNNAMED = (
-    "A mechanism is named only if it leaves little along the driver that the general pattern over contact and angle "
-    "still takes. Some mechanisms above may be significant: they resemble the pattern, but none passed that test."
+    "A mechanism is named only if the general pattern over contact point and push angle explains little in addition to "
+    "it. Some mechanisms above may be significant because they resemble the pattern, but none passed that test."
+)
+EXPERIMENT = (
+    "Each push below was already made here, at other values of the covariates. Repeat it with the covariates set as "
+    "the table shows. There the rivals differ most, and one of them will be wrong."
 )
 
 
 def write_trace_report(path: Path, trace: Trace) -> Path:
-    """Write the page, pictures in it; returns its path. Raises OSError, or PushPredictorError without matplotlib."""
+    """Write the page with its pictures; return its path. Raises OSError, or PushPredictorError without matplotlib."""
     path = Path(path)
     with TemporaryDirectory() as folder:
         parts = _parts(Path(folder), trace)
-    write_whole(path, html.page(f"What {trace.model.name} leaves over", parts).encode())
+    write_whole(path, html.page(f"What the model `{trace.model.name}` fails to explain", parts).encode())
     return path
 
 
 def _parts(out: Path, trace: Trace) -> list[str]:
     return [
-        html.finding("Verdict", _verdict(trace), verdict_sentence(trace)),
+        html.finding(f"{headline(trace)}.", VERDICTS[trace.verdict], evidence_sentence(trace)),
         html.paragraph(worth_sentence(trace), "lead"),
-        html.definitions(_facts(trace)),
-        *_residuals(out, trace),
         *_effects(out, trace),
-        *_tested(out, trace),
         *_rivals(trace),
         *_held_out(out, trace),
-        *_left(trace),
+        *_residuals(out, trace),
+        *_tested(out, trace),
+        *_remaining(trace),
         *([html.heading("Notes"), html.bullets(trace.notes)] if trace.notes else []),
+        html.heading("Data and method"),
+        html.definitions(_facts(trace)),
     ]
-
-
-def _verdict(trace: Trace) -> str:
-    if trace.verdict == "driver_only" and trace.effects[0].covariate == CONSTANT:
-        return "no driver, mechanism unknown"
-    return VERDICTS[trace.verdict]
 
 
 def _facts(trace: Trace) -> dict[str, str]:
     model, held = trace.model, trace.held_out
+    trained = count(model.provenance.pushes, "training push", "training pushes")
+    analysis = count(len(trace.analysis.pushes), "push", "pushes")
+    held_out = count(len(held.table.pushes), "push", "pushes")
     return {
-        "model": f"{model.name} ({model.kind}; {model.rig.shape} on {model.rig.surface}), "
-        f"{count(model.provenance.pushes, 'training push', 'training pushes')}",
-        "analysis": f"{count(len(trace.analysis.pushes), 'push', 'pushes')}, {len(trace.analysis)} windows",
-        "held out": f"{count(len(held.table.pushes), 'push', 'pushes')}, {len(held.table)} windows, opened once, "
-        f"after everything was chosen",
+        "model": f"{model.name} ({model.kind}; {model.rig.shape} on {model.rig.surface}), {trained}",
+        "analysis": f"{analysis}, {len(trace.analysis)} windows",
+        "held out": f"{held_out}, {len(held.table)} windows, opened once, after every choice was made",
         "split": f"by push: {RULE}",
-        "held-out sha256": held.digest,
-        "family-wise level": f"{trace.alpha:g}: the probability of any false alarm where there is nothing",
-        "motion model": "extended" if trace.extended is not None else "left as it is",
+        "held-out SHA-256": held.digest,
+        "family-wise level": f"{trace.alpha:g}: the probability of any false alarm if nothing changed",
+        "motion model": "extended" if trace.extended is not None else "unchanged",
     }
-
-
-def _residuals(out: Path, trace: Trace) -> list[str]:
-    return [html.heading("Residuals before and after"), *map(html.figure, map_pictures(out, trace))]
 
 
 def _effects(out: Path, trace: Trace) -> list[str]:
@@ -110,49 +100,32 @@ def _effects(out: Path, trace: Trace) -> list[str]:
     return [*parts, *map(html.figure, channel_picture(out, trace))]
 
 
-def _tested(out: Path, trace: Trace) -> list[str]:
-    parts = [html.heading("What else was tested")]
-    if not trace.tested:
-        return [*parts, html.paragraph("Nothing could be tested: see the notes.", "warning")]
-    return [*parts, *map(html.figure, tested_picture(out, trace)), *tested_tables(trace)]
-
-
 def _rivals(trace: Trace) -> list[str]:
     if not trace.effects:
         return []
-    parts = [html.heading("Rivals, and what would separate them"), html.paragraph(_rivals_sentence(trace))]
+    parts = [html.heading("Rival explanations, and pushes that would decide"), html.paragraph(_rivals_sentence(trace))]
     if trace.verdict == "driver_only":
         parts.append(html.paragraph(UNNAMED))
     if trace.equivalent:
         parts.append(html.bullets(separating_words([trace.effects[0].covariate, *trace.equivalent])))
     if trace.experiment:
-        words = (
-            "Each push below has been made here already, at other values of the drivers. Make it again with the "
-            "drivers set as the table says, one rival's low while the other's is high: there the rivals predict most "
-            "differently, and one of them will be wrong."
-        )
-        parts += [html.paragraph(words), experiment_table(trace)]
+        parts += [html.paragraph(EXPERIMENT), experiment_table(trace)]
     return parts
 
 
 def _rivals_sentence(trace: Trace) -> str:
-    first = trace.effects[0]
-    named = f"{mechanism_words(first.mechanism)}, {driver_words(first.covariate)}"
     if not trace.equivalent and not trace.mechanisms:
-        return f"No other candidate explains these pushes as well as {named}."
-    others = []
-    if trace.equivalent:
-        others.append(f"other drivers: {', '.join(trace.equivalent)}")
-    if trace.mechanisms:
-        others.append(f"other mechanisms: {', '.join(map(mechanism_words, trace.mechanisms))}")
-    sure = "which it is stays undecided" if trace.undecided else "the first is the best, but not surely so"
-    return f"These data cannot tell {named} from its rivals ({'; '.join(others)}): {sure}."
+        return "No other candidate explains these pushes as well."
+    if trace.undecided:
+        return "These data do not decide between the explanations above."
+    return "The explanation above fits best, but these data do not exclude the others."
 
 
 def _held_out(out: Path, trace: Trace) -> list[str]:
     intro = (
-        "On pushes that took no part in the search. Before: the deployed model; refit: the same model made anew from "
-        f"the analysis pushes in its own inputs (of an analytical model, its covariance alone). {_after(trace)}"
+        f"{_after(trace)} All figures are of pushes that took no part in the search. Before: the deployed model. "
+        "Refit: the same model retrained on the analysis pushes, without the effect (of an analytical model, only its "
+        "covariance)."
     )
     parts = [html.heading("Before, refit, after"), html.paragraph(intro), *held_out_tables(trace)]
     return [*parts, html.heading("Calibration"), *map(html.figure, calibration_picture(out, trace))]
@@ -160,18 +133,37 @@ def _held_out(out: Path, trace: Trace) -> list[str]:
 
 def _after(trace: Trace) -> str:
     if trace.terms:
-        return "After: the refit with what was found."
+        return "After: the refit with the effects found."
     if trace.verdict == "measurement":
-        return "After: the deployed model, unchanged, on windows cut again from recordings put right, if there are any."
-    return "Nothing was added, so after is the refit."
+        return "After: the deployed model, unchanged, on windows cut again from corrected recordings, if there are any."
+    return "Nothing was added, so there is no model after the refit."
 
 
-def _left(trace: Trace) -> list[str]:
-    left = "nothing that it could see" if trace.remaining is None else f"something, strongest {trace.remaining}"
-    remaining = f"The search was run again with what was found taken out. It left {left}."
-    if trace.verdict == "measurement":
-        remaining = "The motion was not searched: put the measurement right first, record or cut again, and trace anew."
-    parts = [html.heading("What is left, and what could have been missed"), html.paragraph(remaining)]
+def _residuals(out: Path, trace: Trace) -> list[str]:
+    return [html.heading("Residuals before and after"), *map(html.figure, map_pictures(out, trace))]
+
+
+def _tested(out: Path, trace: Trace) -> list[str]:
+    parts = [html.heading("What else was tested")]
+    if not trace.tested:
+        return [*parts, html.paragraph("Nothing could be tested: see the notes.", "warning")]
+    return [*parts, *map(html.figure, tested_picture(out, trace)), *tested_tables(trace)]
+
+
+def _remaining(trace: Trace) -> list[str]:
+    parts = [
+        html.heading("What remains, and what could have been missed"),
+        html.paragraph(_remaining_sentence(trace)),
+    ]
     if not trace.minimum_detectable:
-        return [*parts, html.paragraph("The smallest effect that would have been found was not determined.")]
+        return [*parts, html.paragraph("The smallest detectable effect was not determined.")]
     return [*parts, detectable_table(trace)]
+
+
+def _remaining_sentence(trace: Trace) -> str:
+    if trace.verdict == "measurement":
+        return "The motion was not searched. Correct the measurement first, record or cut again, then trace again."
+    if trace.remaining is None:
+        return "A second search, with the effects found subtracted, found nothing more."
+    strongest = effect_phrase(*trace.remaining)
+    return f"Something remains after the effects found are subtracted. The strongest candidate is {strongest}."

@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from push_predictor.models.request import UNITS
 from push_predictor.residuals.evidence.drivers import CONSTANT
-
-SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "°"), "s": (1e3, "ms"), "1": (1.0, "")}
 
 
 @dataclass(frozen=True)
@@ -105,6 +101,11 @@ def listed(phrases: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def label(phrase: str) -> str:
+    """A phrase as a label of an axis or a column: without its article, capitalised."""
+    return capitalised(phrase.removeprefix("the ").removeprefix("an ").removeprefix("a "))
+
+
 def capitalised(text: str) -> str:
     """A text with its first letter in upper case."""
     return text[:1].upper() + text[1:]
@@ -117,5 +118,5 @@ def unit_of(covariate: str) -> str:
 
 def with_unit(covariate: str) -> str:
     """A covariate with its unit, for the axis of a picture or the head of a table."""
-    unit, phrase = unit_of(covariate), capitalised(covariate_phrase(covariate))
+    unit, phrase = unit_of(covariate), label(covariate_phrase(covariate))
     return f"{phrase} ({unit})" if unit else phrase

@@ -11,55 +11,53 @@ from push_predictor.evaluation.report.tables import metrics_tables
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
-from push_predictor.residuals.outcome import FoundEffect, Gain, Sized, Tested, Trace
+from push_predictor.residuals.outcome import FoundEffect, Tested, Trace
 from push_predictor.residuals.reporting.figures.tested import best_of, role_of
+from push_predictor.residuals.reporting.phrases import covariate_phrase, effect_phrase, label, mechanism_phrase, unit_of
+from push_predictor.residuals.reporting.quantities import in_shown_unit, interval_cell, p_text, shown_unit
+from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of
-from push_predictor.residuals.reporting.wording import (
-    SHOWN,
-    driver_words,
-    mechanism_words,
-    p_words,
-    shift_sizes,
-    unit_of,
-)
 
-AT_ONCE = 15  # candidates shown without unfolding
+AT_ONCE = 15  # candidates shown before the reader opens the rest
+COUNTS = ("push_index", "edge", "recording")
 ANGLES = ("angle", "slider_heading", "push_heading")
 
 
 def effects_table(trace: Trace) -> str:
-    """What was found, strongest first."""
+    """The effects found, strongest first."""
     rows = [_effect_row(effect, trace.verdict == "variance") for effect in trace.effects]
-    head = ("mechanism", "driver", "form", "parameter", "value", "unit", "outputs", "share of residual", "p")
+    head = ("mechanism", "depends on", "parameter", "value", "outputs", "share", "p")
     caption = (
-        "What was found, strongest first. In brackets: 95 % intervals. Share: of the residual's sum of squares on the "
-        "analysis pushes, in units of the prediction. p: family-wise over all that was tried."
+        "Effects found, strongest first. In brackets: 95 % intervals. Share: of the squared standardised residual of "
+        "the analysis pushes. p: family-wise, over all candidates."
     )
     return html.table(caption, head, rows)
 
 
 def shifts_table(trace: Trace) -> str:
-    """By how much each effect moves the outcome."""
+    """How far each effect shifts the outcome."""
     rows = []
     for effect, term in zip(trace.effects, trace.terms, strict=False):
         sizes = shift_sizes(trace, term, trace.analysis)
-        name = f"{mechanism_words(effect.mechanism)}, {driver_words(effect.covariate)}"
-        rows.append([name, *(_sized_cell(size) for size in sizes)])
+        cells = (interval_cell(in_shown_unit(size)[0]) for size in sizes)
+        rows.append([effect_phrase(effect.mechanism, effect.covariate), *cells])
     head = ("effect", "dx (mm)", "dy (mm)", "dtheta (deg)")
     caption = (
-        "Root mean square shift of a window's outcome by each effect over the analysis pushes; 95 % intervals from the "
-        "coefficients' covariance, which allows for what neighbouring pushes share."
+        "Shift of a window's outcome by each effect: root mean square over the analysis pushes. The 95 % intervals "
+        "allow for dependence between neighbouring pushes."
     )
     return html.table(caption, head, rows)
 
 
 def tested_tables(trace: Trace) -> list[str]:
-    """All that was tried, smallest p first; what is beyond the first lines unfolds."""
+    """All candidates, smallest p first; the later ones are hidden until the reader opens them."""
     best = best_of(trace.tested)
-    rows = [[mechanism_words(t.mechanism), t.covariate, p_words(t.p_value), _mark(trace, t)] for t in best]
-    head = ("mechanism", "driver", "family-wise p", "")
+    rows = [
+        [mechanism_phrase(t.mechanism), covariate_phrase(t.covariate), p_text(t.p_value), _mark(trace, t)] for t in best
+    ]
+    head = ("mechanism", "depends on", "family-wise p", "")
     open_rows = max(AT_ONCE, 1 + max((k for k, row in enumerate(rows) if row[3]), default=0))
-    caption = f"The {min(open_rows, len(rows))} candidates with the smallest p of {len(rows)}."
+    caption = f"The {min(open_rows, len(rows))} candidates with the smallest p, of {len(rows)}."
     parts = [html.table(caption, head, rows[:open_rows])]
     if rest := rows[open_rows:]:
         table = html.table(f"The other {len(rest)}.", head, rest)
@@ -68,7 +66,7 @@ def tested_tables(trace: Trace) -> list[str]:
 
 
 def held_out_tables(trace: Trace) -> list[str]:
-    """NMSE, NLPD, exact density and coverage before, after the refit and with the effects, and the gain."""
+    """NMSE, NLPD, exact density and coverage before, after the refit and with the effects; and the gain."""
     shown = comparisons_of(trace)
     metrics = [metrics_json(comparison) for comparison in shown]
     alike = len({comparison.push_id.tobytes() for comparison in shown}) == 1
@@ -77,78 +75,64 @@ def held_out_tables(trace: Trace) -> list[str]:
         if alike
         else [table for c, m in zip(shown, metrics, strict=True) for table in metrics_tables([c], [m])]
     )
-    return [*tables, gain_table(trace)] if trace.terms else tables
+    return [gain_table(trace), *tables] if trace.terms else tables
 
 
 def gain_table(trace: Trace) -> str:
-    """After minus refit."""
+    """The gain of the extended model over the refit."""
     rows = [
-        ["total NMSE", _interval_cell(trace.gain_nmse)],
-        ["total NLPD (nats per window)", _interval_cell(trace.gain_nlpd)],
+        ["total NMSE", interval_cell(trace.gain_nmse)],
+        ["total NLPD (nats per window)", interval_cell(trace.gain_nlpd)],
     ]
     caption = (
-        "The gain: after minus refit on the same held-out pushes, below zero is better. 95 % intervals by drawing "
-        "whole pushes in pairs. The refit, not the deployed model, is the fair reference: it saw the new pushes too."
+        "The gain: after minus refit on the same held-out pushes; below zero is better. 95 % intervals are from a "
+        "paired bootstrap of pushes. The refit is the fair reference, because it saw the new pushes too."
     )
     return html.table(caption, ("", "after minus refit"), rows)
 
 
 def detectable_table(trace: Trace) -> str:
-    """The smallest effects that would have been found."""
-    keys = list(dict.fromkeys(key for size in trace.minimum_detectable.values() for key in size))
-    named = [key for key in keys if key not in ("value", "unit")]
-    rows = [
-        [mechanism_words(name), *_size_cells(size), *(_told(size.get(key)) for key in named)]
-        for name, size in trace.minimum_detectable.items()
-    ]
-    caption = "The smallest effect of each mechanism that would have been found on these pushes at this level."
-    return html.table(caption, ("mechanism", "size", "unit", *(key.replace("_", " ") for key in named)), rows)
+    """The smallest detectable effects."""
+    rows = []
+    for name, size in trace.minimum_detectable.items():
+        driven = size.get("driven")
+        along = covariate_phrase(str(driven["covariate"])) if isinstance(driven, Mapping) else html.NOTHING
+        cells = [_size_cell(size), _size_cell(driven) if isinstance(driven, Mapping) else html.NOTHING, along]
+        rows.append([mechanism_phrase(name), *cells])
+    caption = (
+        "The smallest detectable effect of each mechanism: what the search finds with 80 % probability on these pushes "
+        "at this level. Along a covariate the size is per standard deviation of the covariate."
+    )
+    return html.table(caption, ("mechanism", "constant", "along a covariate", "covariate"), rows)
 
 
 def experiment_table(trace: Trace) -> str:
     """Pushes that would separate the rivals."""
     keys = list(dict.fromkeys(key for push in trace.experiment for key in push))
     rows = [
-        [str(k + 1), *(_told(_shown(key, push.get(key))) for key in keys)] for k, push in enumerate(trace.experiment)
+        [str(k + 1), *(_cell(_shown(key, push.get(key))) for key in keys)] for k, push in enumerate(trace.experiment)
     ]
-    head = ("push", *(f"{key} ({unit})" if (unit := _unit(key)) else key for key in keys))
-    return html.table("Pushes that would separate the rivals.", head, rows)
+    return html.table("Pushes that would separate the rivals.", ("push", *map(_column, keys)), rows)
 
 
-def _effect_row(effect: FoundEffect, scatter: bool) -> list[str]:
-    size = effect.parameter
-    share = effect.share_of_residual
+def _effect_row(effect: FoundEffect, noise: bool) -> list[str]:
+    size, share = effect.parameter, effect.share_of_residual
+    basis = "" if effect.basis == "constant" else f" ({effect.basis})"
     return [
-        "scatter" if scatter else mechanism_words(effect.mechanism),
-        effect.covariate,
-        effect.basis,
-        html.NOTHING if size is None else size.name,
-        html.NOTHING if size is None else _interval_cell(Gain(*_scaled(size))),
-        html.NOTHING if size is None else SHOWN.get(size.unit, (1.0, size.unit))[1],
+        "noise" if noise else mechanism_phrase(effect.mechanism),
+        f"{covariate_phrase(effect.covariate)}{basis}",
+        html.NOTHING if size is None else size.name.partition(", ")[0],
+        html.NOTHING if size is None else interval_cell(*in_shown_unit(size)),
         ", ".join(name for name in OUTPUTS if name in effect.outputs) or html.NOTHING,
         f"{100.0 * share:.1f} %" if np.isfinite(share) and share > 0.0 else html.NOTHING,
-        p_words(effect.p_value),
+        p_text(effect.p_value),
     ]
 
 
-def _scaled(size: Sized) -> tuple[float, float, float]:
-    factor = SHOWN.get(size.unit, (1.0, size.unit))[0]
-    return factor * size.value, factor * size.low, factor * size.high
-
-
-def _sized_cell(size: Sized) -> str:
-    return _interval_cell(Gain(*_scaled(size)))
-
-
-def _interval_cell(gain: Gain) -> str:
-    value, low, high = (html.number(v if np.isfinite(v) else None, 3) for v in (gain.value, gain.low, gain.high))
-    return value if html.NOTHING in (low, high) else f"{value}\n[{low}, {high}]"
-
-
-def _size_cells(size: Mapping[str, Any]) -> list[str]:
-    value, unit = size.get("value"), str(size.get("unit", ""))
-    factor, shown = SHOWN.get(unit, (1.0, unit))
-    return [_told(value if value is None else factor * float(value)), shown]
+def _size_cell(size: Mapping[str, Any]) -> str:
+    value = size.get("value")
+    factor, unit = shown_unit(str(size.get("unit", "")))
+    return html.NOTHING if value is None else f"{_cell(factor * float(value))} {unit}".strip()
 
 
 def _mark(trace: Trace, tested: Tested) -> str:
@@ -158,17 +142,16 @@ def _mark(trace: Trace, tested: Tested) -> str:
     return "p below alpha" if tested.p_value <= trace.alpha else ""
 
 
-def _told(value: object) -> str:
-    if value is None:
-        return html.NOTHING
-    if isinstance(value, int | float | np.floating):
-        return html.number(float(value), 3) if np.isfinite(value) else html.NOTHING
-    return str(value)
+def _cell(value: float | None) -> str:
+    return html.number(value, 3) if value is not None and np.isfinite(value) else html.NOTHING
+
+
+def _column(key: str) -> str:
+    unit, name = "deg" if key in ANGLES else unit_of(key), label(covariate_phrase(key)).lower()
+    return f"{name} ({unit})" if unit else name
 
 
 def _shown(key: str, value: float | None) -> float | None:
+    if value is not None and key in COUNTS:
+        return float(np.round(value))
     return float(np.degrees(value)) if value is not None and key in ANGLES else value
-
-
-def _unit(key: str) -> str:
-    return "deg" if key in ANGLES else unit_of(key)

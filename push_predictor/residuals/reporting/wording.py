@@ -1,4 +1,4 @@
-"""What a trace found, in sentences: size, unit and interval, for the page and for the terminal."""
+"""The verdict of a trace in sentences: the answer, its size with interval, and what it means for the model."""
 
 from __future__ import annotations
 
@@ -7,56 +7,92 @@ from collections.abc import Callable
 import numpy as np
 
 from push_predictor.evaluation.metrics import gaussian_nlpd
-from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
-from push_predictor.models.effects.effect import Effect, design_of
-from push_predictor.models.mechanisms import Push
-from push_predictor.models.request import UNITS
-from push_predictor.recordings.table import OUTPUTS, PushTable
-from push_predictor.reporting.html import NOTHING, number
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.evidence.standardised import physics_of
-from push_predictor.residuals.outcome import FoundEffect, Gain, Sized, Trace, Verdict
-from push_predictor.types import Array
+from push_predictor.residuals.outcome import FoundEffect, Gain, Trace, Verdict
+from push_predictor.residuals.reporting.noise_ratio import noise_ratios
+from push_predictor.residuals.reporting.phrases import (
+    MECHANISMS,
+    capitalised,
+    covariate_phrase,
+    listed,
+    mechanism_phrase,
+    moved_noun,
+    unit_of,
+)
+from push_predictor.residuals.reporting.quantities import count, estimate, in_shown_unit, p_text
+from push_predictor.residuals.reporting.shift_size import shift_sizes
 
-DRAWS = 500
-FIFTH = 0.2  # of the windows at either end of a driver, between which scatters are compared
-SHOWN = {"m": (1e3, "mm"), "rad": (np.degrees(1.0), "deg"), "s": (1e3, "ms")}  # of sizes told in SI
-OUTPUT_UNITS = dict(zip(OUTPUTS, ("m", "m", "rad"), strict=True))
-UNKNOWN = "mechanism unknown"
+FORCE = "surface_friction"  # its size is a share of the force
+UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
 
 
-def verdict_sentence(trace: Trace) -> str:
-    """The verdict in one sentence."""
-    sentence = SENTENCES[trace.verdict](trace)
-    return sentence[0].upper() + sentence[1:]
+def verdict_sentence(trace: Trace, where: str = "below") -> str:
+    """The verdict in a few sentences: answer, size, rivals; where: the place that lists pushes that would decide."""
+    first, _, rest = EVIDENCE[trace.verdict](trace).partition(". ")
+    joined = f" ({first.removesuffix('.')})." if first.startswith("p = ") else f": {first.removesuffix('.')}."
+    return f"{headline(trace)}{joined}{f' {rest}' if rest else ''}{_rivals(trace, where)}"
+
+
+def headline(trace: Trace) -> str:
+    """The answer in one clause, without a full stop."""
+    if trace.verdict == "none":
+        return "No change found"
+    if trace.verdict == "measurement":
+        return "The measurement is wrong, not the motion model"
+    return capitalised(_claim(trace, 0))
+
+
+def evidence_sentence(trace: Trace, where: str = "below") -> str:
+    """The sentences of the verdict after the headline."""
+    evidence = EVIDENCE[trace.verdict](trace)
+    sized = trace.verdict not in ("none", "measurement") and not evidence.startswith("p = ")
+    first = f"Size: {evidence}" if sized else evidence if evidence.startswith("p = ") else capitalised(evidence)
+    return f"{first}{_rivals(trace, where)}"
 
 
 def worth_sentence(trace: Trace) -> str:
-    """What the effect is worth on held-out pushes, and whether the motion model was changed."""
+    """What the finding means for the motion model, and the gain on held-out pushes."""
     pushes = count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
     if trace.verdict == "measurement":
-        before, after = (_nlpd(comparison) for comparison in (trace.held_out.before, trace.held_out.after))
-        change = f"the deployed model's negative log density goes from {before} to {after} nats per window"
-        return f"The motion model stays as it is. With the measurement put right where recordings allow it, {change}."
+        return (
+            "The motion model stays unchanged. Correct the measurement, then trace again. "
+            f"With corrected streams the model's negative log density {_change(trace.held_out.before, trace, 'after')}."
+        )
     if not trace.terms:
-        return f"The motion model stays as it is; on {pushes} nothing was added to the refit."
+        retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
+        return f"The motion model stays unchanged: no effect on the mean motion was found.{retrain}"
+    if trace.gain_nlpd.low == trace.gain_nlpd.high == 0.0:  # a refit learns all effects that were found
+        return (
+            "Retraining on the new pushes fixes this. No extension is needed. "
+            f"On {pushes} retraining changes the negative log density: it {_change(trace.held_out.before, trace)}."
+        )
+    return f"{_decision(trace)} {_gain(trace, pushes)}"
+
+
+def _decision(trace: Trace) -> str:
     gain = trace.gain_nlpd
-    if gain.low == gain.high == 0.0:  # nothing was added to the refit
-        before, refit = (_nlpd(comparison) for comparison in (trace.held_out.before, trace.held_out.refit))
-        change = f"On {pushes} training anew takes the negative log density from {before} to {refit} nats per window"
-        return f"{change}. What was found lies in the model's own inputs: that is enough, and the model stays as it is."
-    change = (
-        f"On {pushes} the negative log density changes by {interval(gain)} nats per window against the same model "
-        f"refitted without the effect (below zero: better)"
-    )
     if trace.extended is not None:
-        return f"{change}. The interval lies wholly below zero, so the motion model is extended."
+        return "The motion model is extended."
     if not np.isfinite([gain.low, gain.high]).all():
-        return f"{change}. There are too few pushes for an interval, so the motion model stays as it is."
-    if gain.high < 0.0:  # another rule than the gain's stands against it
-        return f"{change}. The motion model stays as it is all the same: see the notes."
-    return f"{change}. The interval does not lie wholly below zero: found, but not worth modelling; the model stays."
+        return "The motion model stays unchanged: there are too few pushes for an interval."
+    if gain.high < 0.0:
+        return "The motion model stays unchanged although the gain is certain: see the notes."
+    return "The motion model stays unchanged: found, but not worth modelling."
+
+
+def _gain(trace: Trace, pushes: str) -> str:
+    return (
+        f"On {pushes} the effect changes the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "
+        "The reference is the same model retrained without the effect; below zero is better."
+    )
+
+
+def _change(first: Comparison, trace: Trace, second: str = "refit") -> str:
+    last: Comparison = getattr(trace.held_out, second)
+    return f"goes from {_nlpd(first)} to {_nlpd(last)} nats per window"
 
 
 def _nlpd(comparison: Comparison) -> str:
@@ -64,164 +100,138 @@ def _nlpd(comparison: Comparison) -> str:
     return number(float(np.mean(every)) if len(every) else None)
 
 
-def mechanism_words(mechanism: str | None) -> str:
-    """A mechanism's name in words."""
-    return UNKNOWN if mechanism is None else mechanism.replace("_", " ")
+# --- the claim: what changed, and with what ------------------------------------------------------------------------
 
 
-def driver_words(covariate: str, basis: str | None = None) -> str:
-    """What drives an effect."""
-    if covariate == CONSTANT:
-        return "constant, driven by nothing recorded"
-    return f"driven by {covariate}" if basis is None else f"driven by {covariate} ({basis})"
+def _claim(trace: Trace, index: int) -> str:
+    """What an effect is, in one clause: its mechanism and what it depends on."""
+    effect = trace.effects[index]
+    if trace.verdict == "variance":
+        if effect.covariate == CONSTANT:
+            return "the noise of the outcomes differs from training; the mean does not"
+        return f"the noise of the outcomes changes with {covariate_phrase(effect.covariate)}; the mean does not"
+    if effect.mechanism is None:
+        how = "" if effect.covariate == CONSTANT else f", depending on {covariate_phrase(effect.covariate)}"
+        return f"the slider moves differently than predicted{how}; no known mechanism fits"
+    return f"{_moves(trace, index)}{'; the motion does not' if trace.verdict == 'wrench_only' else ''}"
 
 
-def size_words(size: Sized) -> str:
-    """A parameter with unit and interval, in the units that people use."""
-    factor, unit = SHOWN.get(size.unit, (1.0, size.unit))
-    told = interval(Gain(*(factor * value for value in (size.value, size.low, size.high))))
-    return f"{size.name} {told}" if unit in ("", "1") else f"{size.name} {told} {unit}"
+def _moves(trace: Trace, index: int) -> str:
+    """Subject and verb for a known mechanism, by the basis of its dependence."""
+    effect = trace.effects[index]
+    noun = moved_noun(effect.mechanism)
+    if effect.covariate == CONSTANT or (effect.basis == "constant" and effect.covariate in UNVARIED):
+        return f"{noun} differs from {'the model' if trace.model.kind == 'analytical' else 'training'}"
+    if effect.basis == "step" and index < len(trace.terms):
+        known = MECHANISMS.get(effect.mechanism)
+        onset = known.onset if known and known.onset else f"{noun} changed"
+        return f"{onset} {_place(effect.covariate, trace.terms[index].basis.place)}"
+    if effect.basis == "category":
+        return f"{noun} differs by {covariate_phrase(effect.covariate)}"
+    along = "the position on the table" if effect.basis == "map" else covariate_phrase(effect.covariate)
+    return f"{noun} changes with {along}"
 
 
-def interval(gain: Gain, digits: int = 3) -> str:
-    """A number with its 95 % interval; dashes for what is not determined."""
-    value, low, high = (number(v if np.isfinite(v) else None, digits) for v in (gain.value, gain.low, gain.high))
-    return value if NOTHING in (low, high) else f"{value} (95 %: {low} to {high})"
+def _place(covariate: str, place: float) -> str:
+    """Where a step lies, in words."""
+    if covariate == "elapsed_time":
+        return f"{place:.0f} s into the session"
+    if covariate == "push_index":
+        return f"after push {np.floor(place):.0f}"
+    if covariate == "slid_distance":
+        return f"after {number(place, 3)} m of sliding"
+    unit = unit_of(covariate)
+    return f"where {covariate_phrase(covariate)} exceeds {number(place, 3)}{f' {unit}' if unit else ''}"
 
 
-def count(n: int, one: str, many: str) -> str:
-    """A number of things."""
-    return f"{n} {one if n == 1 else many}"
-
-
-def p_words(p: float) -> str:
-    """A family-wise p value."""
-    return number(p, 2)
-
-
-def shift_sizes(trace: Trace, effect: Effect, table: PushTable) -> tuple[Sized, ...]:
-    """Root mean square, over the windows of a table, by which the effect shifts each output (m, m, rad).
-
-    The interval holds the central 95 % of draws of its coefficients.
-    """
-    push = Push(table.inputs, table.duration, table.covariates)
-    square = _mean_square(trace, effect, push)
-    rng = np.random.default_rng(0)
-    draws = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="svd")
-    spread = np.sqrt(np.maximum(np.einsum("da,kab,db->dk", draws, square, draws), 0.0))
-    value = np.sqrt(np.maximum(np.einsum("a,kab,b->k", effect.coefficients, square, effect.coefficients), 0.0))
-    low, high = np.quantile(spread, [0.025, 0.975], axis=0)
-    ends = zip(OUTPUTS, value.tolist(), low.tolist(), high.tolist(), strict=True)
-    return tuple(Sized(f"root mean square shift of {o}", v, a, b, OUTPUT_UNITS[o]) for o, v, a, b in ends)
-
-
-def _mean_square(trace: Trace, effect: Effect, push: Push) -> Array:
-    """Of each output, mean over the windows of the square of the design: (3, q, q)."""
-    physics = physics_of(trace.model)
-    design = design_of(effect.mechanism, effect.basis, physics, push, effect.outcome_scale)
-    return np.asarray(np.einsum("nka,nkb->kab", design, design) / max(len(design), 1))
+# --- the evidence for each verdict ---------------------------------------------------------------------------------
 
 
 def _none(trace: Trace) -> str:
-    strongest = min(trace.tested, key=lambda tested: tested.p_value, default=None)
-    nearest = ""
-    if strongest is not None:
-        what = f"{mechanism_words(strongest.mechanism)}, {driver_words(strongest.covariate)}"
-        shared = (
-            " (the level is shared among motion, force and measurement)" if strongest.p_value <= trace.alpha else ""
-        )
-        nearest = f"; the nearest was {what}, with p = {p_words(strongest.p_value)}{shared}"
-    return (
-        f"Nothing found: of {count(len(trace.tested), 'candidate', 'candidates')} none explains the residual of "
-        f"{count(len(trace.analysis.pushes), 'push', 'pushes')} at the family-wise level of {number(trace.alpha)}"
-        f"{nearest}."
-    )
+    pushes = count(len(trace.analysis.pushes), "push", "pushes")
+    tried = count(len(trace.tested), "candidate", "candidates")
+    text = f"none of {tried} explains the residual of {pushes} (family-wise level {number(trace.alpha)})."
+    closest = min(trace.tested, key=lambda tested: tested.p_value, default=None)
+    if closest is None:
+        return text
+    name = mechanism_phrase(closest.mechanism)
+    depends = "" if closest.covariate == CONSTANT else f" depending on {covariate_phrase(closest.covariate)}"
+    text = f"{text} The closest is {name}{depends}, with p = {p_text(closest.p_value)}."
+    if closest.p_value <= trace.alpha:
+        text = f"{text} It is not significant: motion, force and measurement share the level."
+    return text
 
 
-def _found(trace: Trace) -> str:
-    told = "; and ".join(_effect(trace, k) for k in range(len(trace.effects)))
-    return f"The model lacks {count(len(trace.effects), 'effect', 'effects')}: {told}."
+def _effects(trace: Trace) -> str:
+    first, *others = (f"{_size(trace, k)}{_share(trace.effects[k])}" for k in range(len(trace.effects)))
+    return "".join([first, *(f" {capitalised(_claim(trace, k + 1))}: {text}" for k, text in enumerate(others))])
 
 
-def _driver_only(trace: Trace) -> str:
-    first = trace.effects[0]
-    how = "is another than the model says" if first.covariate == CONSTANT else f"changes with {first.covariate}"
-    return f"The motion {how}, by a mechanism that the library does not hold: {_effect(trace, 0)}."
+def _size(trace: Trace, index: int) -> str:
+    effect = trace.effects[index]
+    if effect.parameter is None:
+        return f"p = {p_text(effect.p_value)}.{_shift(trace, index)}"
+    value, unit = in_shown_unit(effect.parameter)
+    if effect.mechanism == FORCE:
+        value, unit = Gain(100.0 * value.value, 100.0 * value.low, 100.0 * value.high), "%"
+    return f"{estimate(value, unit, effect.p_value)}."
 
 
-def _mechanism_only(trace: Trace) -> str:
-    first, rivals = trace.effects[0], ", ".join(trace.equivalent)
-    return (
-        f"{mechanism_words(first.mechanism)} is not as the model has it, but these data cannot tell whether "
-        f"{first.covariate} drives it or {rivals}: {_effect(trace, 0)}."
-    )
+def _shift(trace: Trace, index: int) -> str:
+    """By how much an unknown mechanism shifts the outcome."""
+    if index >= len(trace.terms):
+        return ""
+    every = zip(shift_sizes(trace, trace.terms[index], trace.analysis), OUTPUTS, strict=True)
+    outputs = trace.effects[index].outputs
+    shifts = [f"{name} by {estimate(*in_shown_unit(size))}" for size, name in every if name in outputs]
+    return f" It shifts {listed(shifts)}, root mean square." if shifts else ""
 
 
-def _wrench(trace: Trace) -> str:
-    return f"The force changed and the motion did not; the motion model is left alone: {_all(trace)}."
+def _share(effect: FoundEffect) -> str:
+    share = effect.share_of_residual
+    return f" It explains {100.0 * share:.0f} % of the squared residual." if np.isfinite(share) and share > 0.0 else ""
 
 
 def _measurement(trace: Trace) -> str:
-    return f"The measurement is off, not the motion: {_all(trace)}."
+    sizes = []
+    for effect in trace.effects:
+        if effect.parameter is not None:
+            value, unit = in_shown_unit(effect.parameter)
+            sizes.append(f"The {effect.parameter.name} is {estimate(value, unit, effect.p_value)}.")
+    errors = listed([mechanism_phrase(name) for name in dict.fromkeys(e.mechanism for e in trace.effects)])
+    return f"{errors}. {' '.join(sizes)}"
 
 
 def _variance(trace: Trace) -> str:
-    return f"The scatter changes and the mean does not: {_all(trace)}."
+    sentences = []
+    for effect in trace.effects:
+        sentences += [
+            f"The noise of {name} is {estimate(ratio)} times as large in the highest fifth of "
+            f"{covariate_phrase(effect.covariate)} as in the lowest."
+            for name, ratio in noise_ratios(trace, effect).items()
+        ]
+    return " ".join([f"p = {p_text(trace.effects[0].p_value)}.", *sentences])
 
 
-def _all(trace: Trace) -> str:
-    return "; and ".join(_effect(trace, k) for k in range(len(trace.effects)))
-
-
-def _effect(trace: Trace, index: int) -> str:
-    effect = trace.effects[index]
-    sizes = [] if effect.parameter is None else [size_words(effect.parameter)]
-    if trace.verdict == "variance":
-        sizes = _scatter(trace, effect)
-    elif not sizes and index < len(trace.terms):
-        every = shift_sizes(trace, trace.terms[index], trace.analysis)
-        sizes = [size_words(size) for size, name in zip(every, OUTPUTS, strict=True) if name in effect.outputs]
-    driver = [] if trace.verdict == "measurement" else [driver_words(effect.covariate, effect.basis)]
-    named = [] if trace.verdict == "variance" else [mechanism_words(effect.mechanism)]
-    told = [*named, *driver, *sizes, *_share(effect), f"p = {p_words(effect.p_value)}"]
-    return ", ".join(told)
-
-
-def _scatter(trace: Trace, effect: FoundEffect) -> list[str]:
-    """Root mean square of the residual in the highest fifth of the driver over that in the lowest."""
-    values = trace.analysis.covariates.get(effect.covariate)
-    if values is None or len(trace.unexplained) != len(values):
-        return []
-    low, high = (values <= np.quantile(values, FIFTH)), (values >= np.quantile(values, 1.0 - FIFTH))
-    weights = np.vstack([np.ones(len(values)), push_bootstrap(trace.analysis.push_id)])
-    told = []
-    for name in effect.outputs:
-        square = trace.unexplained[:, OUTPUTS.index(name)] ** 2
-        spread = [np.sqrt(weights @ (square * rows) / np.maximum(weights @ rows, 1.0)) for rows in (low, high)]
-        ratio = spread[1] / np.maximum(spread[0], np.finfo(float).tiny)
-        ends = np.quantile(ratio[1:], [0.025, 0.975])
-        told.append(
-            f"scatter of {name} {interval(Gain(float(ratio[0]), *map(float, ends)))} times as large high as low"
-        )
-    return told
-
-
-def _share(effect: FoundEffect) -> list[str]:
-    share = effect.share_of_residual
-    return [f"{100.0 * share:.0f} % of the residual's sum of squares"] if np.isfinite(share) and share > 0.0 else []
-
-
-SENTENCES: dict[Verdict, Callable[[Trace], str]] = {
+EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
     "none": _none,
-    "effect": _found,
-    "driver_only": _driver_only,
-    "mechanism_only": _mechanism_only,
-    "wrench_only": _wrench,
+    "effect": _effects,
+    "driver_only": _effects,
+    "mechanism_only": _effects,
+    "wrench_only": _effects,
     "measurement": _measurement,
     "variance": _variance,
 }
 
 
-def unit_of(covariate: str) -> str:
-    """The unit of a driver, empty where none is known."""
-    return UNITS.get(covariate, "")
+def _rivals(trace: Trace, where: str) -> str:
+    """The covariates and mechanisms that fit as well, and how many pushes would decide."""
+    text = ""
+    if trace.equivalent:
+        names = listed([covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)])
+        pushes = count(len(trace.experiment), "push that would decide is", "pushes that would decide are")
+        text = f" {capitalised(names)} fit equally well{f'; {pushes} listed {where}' if trace.experiment else ''}."
+    if trace.mechanisms:
+        names = listed([mechanism_phrase(name) for name in trace.mechanisms])
+        text += f" {capitalised(names)} would explain these pushes as well."
+    return text

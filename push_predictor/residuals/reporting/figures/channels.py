@@ -1,4 +1,4 @@
-"""The data behind a finding that moves no mean: the force, the gap at the contact, the scatter."""
+"""The data behind a finding that shifts no mean: the force, the gap at the contact, the noise."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import DRAWS, LEAST_PUSHES
-from push_predictor.residuals.reporting.wording import unit_of
+from push_predictor.residuals.reporting.phrases import with_unit
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 10
-NORMAL = "heading of the contact's inward normal in the world (deg)"
+NORMAL = "Direction of the contact normal in the world (deg)"
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Windows along x (n,): what is shown of them, y (n, k) by name; spread: its root mean square, else its mean."""
+    """Values y (n, k) of windows against x (n,), with their names; spread: show the root mean square, not the mean."""
 
     x: Array
     label: str
@@ -38,22 +38,28 @@ class Channel:
 
 
 def channel_of(trace: Trace) -> Channel | None:
-    """What the verdict rests on, None where these windows do not hold it."""
+    """The data behind the verdict; None if these windows do not contain them."""
     table, effect = trace.analysis, trace.effects[0]
     covariates = table.covariates
     if trace.verdict == "variance" and len(trace.residual) == len(table):
-        return Channel(*_driver(table, effect.covariate), trace.residual, "rms residual / predicted sd", SYMBOLS, True)
+        return Channel(
+            *_driver(table, effect.covariate),
+            trace.residual,
+            "RMS residual / predicted standard deviation",
+            SYMBOLS,
+            True,
+        )
     if trace.verdict == "wrench_only" and "normal_force" in covariates:
         place = _driver(table, effect.covariate)
-        return Channel(*place, covariates["normal_force"][:, None], "normal force (N)", ("normal force",))
+        return Channel(*place, covariates["normal_force"][:, None], "Normal force (N)", ("normal force",))
     if trace.verdict == "measurement" and {"contact_gap", "push_heading"} <= set(covariates):
         gap = 1e3 * covariates["contact_gap"][:, None]
-        return Channel(*_opening(table, effect.mechanism), gap, "gap of tip and outline (mm)", ("contact_gap",))
+        return Channel(*_opening(table, effect.mechanism), gap, "Gap between pusher and outline (mm)", ("gap",))
     return None
 
 
 def paint_channel(figure: Figure, table: PushTable, channel: Channel) -> None:
-    """Bins of the driver with 95 % intervals by drawing whole pushes; dots are windows, where means are shown."""
+    """Paint bins of x with 95 % intervals from a bootstrap of pushes, and single windows where means are shown."""
     ax = figure.subplots()
     grid(ax)
     for k, name in enumerate(channel.names):
@@ -96,16 +102,15 @@ def _room(y: Array) -> tuple[float, float]:
 
 
 def _driver(table: PushTable, covariate: str) -> tuple[Array, str]:
-    """The driver, or the order of the pushes where there is none."""
+    """The covariate, or the order of the pushes if it is not recorded."""
     if covariate not in table.covariates:
-        return push_order(table).astype(np.float64), "number of the push"
-    unit = unit_of(covariate)
-    return table.covariates[covariate], f"{covariate} ({unit})" if unit else covariate
+        return push_order(table).astype(np.float64), "Number of the push"
+    return table.covariates[covariate], with_unit(covariate)
 
 
 def _opening(table: PushTable, mechanism: str | None) -> tuple[Array, str]:
-    """What an error of measurement opens the gap with: a late clock by speed, a shift by the contact's direction."""
+    """What a measurement error opens the gap with: a clock offset with the speed, a shift with the direction."""
     velocity, _, angle = table.inputs.T
     if mechanism == "clock_offset":
-        return 1e3 * velocity * np.cos(angle), "speed into the contact (mm/s); a late clock makes a slope"
+        return 1e3 * velocity * np.cos(angle), "Speed into the contact (mm/s)"
     return np.degrees(wrap_angle(table.covariates["push_heading"] - angle)), NORMAL

@@ -1,4 +1,4 @@
-"""An effect's fitted basis with its band over what drives it, and the data it rests on."""
+"""An effect as fitted against its covariate, with its band, and the data that it rests on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, grid
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import Binned, Rows, Strength, binned, per_push, responses
-from push_predictor.residuals.reporting.wording import unit_of
+from push_predictor.residuals.reporting.phrases import covariate_phrase, label, with_unit
 from push_predictor.types import Array, IntArray
 
 if TYPE_CHECKING:
@@ -23,12 +23,12 @@ PUSHES_PER_BIN = 12
 FEWEST_BINS, MOST_BINS = 3, 12
 MAP_BINS = 5
 HELD_OUT = "#3b3b3b"
-BESIDE = 0.08  # of the levels of a category: so far to either side
+ASIDE = 0.08  # offset of the points of a category's levels, to either side
 PERIODIC = ("periodic", "periodic, twice around")
 
 
 def paint_basis(figure: Figure, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None) -> None:
-    """A panel for each parameter; of a map two: fitted, and estimated cell by cell."""
+    """Paint a panel for each parameter; for a map two: fitted, and estimated cell by cell."""
     if len(strength.effect.basis.drivers) > 1:
         _paint_maps(figure, trace, strength, analysis)
         return
@@ -39,7 +39,7 @@ def paint_basis(figure: Figure, trace: Trace, strength: Strength, analysis: Rows
 
 
 def bins_of(basis: DriverBasis, table: PushTable) -> IntArray:
-    """Bin (n,) of each window: of a category by level, of a heading by width, else as many windows in each."""
+    """Bin (n,) of each window: levels of a category, equal widths of a heading, else equal counts."""
     values = table.covariates[basis.drivers[0]]
     if basis.name == "category":
         return np.asarray(np.searchsorted(np.sort(basis.levels), values), dtype=np.int64)
@@ -50,8 +50,8 @@ def bins_of(basis: DriverBasis, table: PushTable) -> IntArray:
     return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.int64)
 
 
-def beyond(strength: Strength, trace: Trace, rows: Rows) -> str:
-    """How many pushes have no dot inside the picture."""
+def hidden_pushes(strength: Strength, trace: Trace, rows: Rows) -> str:
+    """How many pushes have no dot inside each panel, in words."""
     place, value = per_push(strength, rows, responses(trace, strength, rows), _axis(strength.effect.basis, rows.table))
     limits = [_limits(strength, trace, rows, q) for q in range(value.shape[1])]
     inside = [np.sum((value[:, q] >= low) & (value[:, q] <= high)) for q, (low, high) in enumerate(limits)]
@@ -59,10 +59,9 @@ def beyond(strength: Strength, trace: Trace, rows: Rows) -> str:
 
 
 def driver_label(basis: DriverBasis) -> str:
-    """The driver with its unit."""
+    """The covariate with its unit."""
     name = basis.drivers[0]
-    unit = "deg" if basis.name in PERIODIC else unit_of(name)
-    return f"{name} ({unit})" if unit else name
+    return f"{label(covariate_phrase(name))} (deg)" if basis.name in PERIODIC else with_unit(name)
 
 
 def _paint_panel(ax: Axes, trace: Trace, strength: Strength, analysis: Rows, held_out: Rows | None, q: int) -> None:
@@ -70,7 +69,7 @@ def _paint_panel(ax: Axes, trace: Trace, strength: Strength, analysis: Rows, hel
     grid(ax)
     ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     _paint_curve(ax, strength, analysis.table, q)
-    aside = BESIDE if basis.name == "category" else 0.0
+    aside = ASIDE if basis.name == "category" else 0.0
     response = responses(trace, strength, analysis)
     place, value = per_push(strength, analysis, response, _axis(basis, analysis.table))
     ax.plot(place, value[:, q], "o", color="0.55", markersize=2.4, mew=0.0, alpha=0.6, label="one push", zorder=1)
@@ -122,7 +121,7 @@ def _axis(basis: DriverBasis, table: PushTable) -> Array:
 
 
 def _limits(strength: Strength, trace: Trace, rows: Rows, q: int) -> tuple[float, float]:
-    """Room for the curve and the bins; single pushes scatter beyond it."""
+    """Limits that contain the curve and the bins; single pushes may lie outside."""
     mean, half = strength.curve(rows.table.covariates, len(rows.table))
     bins = _bins(trace, strength, rows)
     low = min((mean - half)[:, q].min(), bins.low[:, q].min(initial=0.0), 0.0)
@@ -132,7 +131,7 @@ def _limits(strength: Strength, trace: Trace, rows: Rows, q: int) -> tuple[float
 
 
 def _paint_maps(figure: Figure, trace: Trace, strength: Strength, rows: Rows) -> None:
-    """A row a parameter: the fitted map, what was estimated cell by cell, the dots are windows."""
+    """Paint a row for each parameter: the fitted map with the windows, and each cell estimated by itself."""
     first, second = strength.effect.basis.drivers
     x, y = rows.table.covariates[first], rows.table.covariates[second]
     edges = [np.linspace(v.min(), v.max(), MAP_BINS + 1) for v in (x, y)]
@@ -154,11 +153,11 @@ def _paint_maps(figure: Figure, trace: Trace, strength: Strength, rows: Rows) ->
         unit = strength.units[q]
         label = strength.names[q] if unit == "1" else f"{strength.names[q]} ({unit})"
         figure.colorbar(image, ax=[left, right], label=label, extend="both", pad=0.01, shrink=0.9)
-        left.set_ylabel(f"{second} ({unit_of(second)})")
-    axes[0, 0].set_title("fitted; dots: windows")
+        left.set_ylabel(with_unit(second))
+    axes[0, 0].set_title("fitted (dots: windows)")
     axes[0, 1].set_title("estimated cell by cell")
     for ax in axes[-1]:
-        ax.set_xlabel(f"{first} ({unit_of(first)})")
+        ax.set_xlabel(with_unit(first))
 
 
 def _in_bin(edges: Array, values: Array) -> IntArray:

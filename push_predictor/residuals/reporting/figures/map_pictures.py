@@ -1,4 +1,4 @@
-"""The maps of a trace's report, with their captions."""
+"""The maps of a trace's report: mean residual over contact point and push angle, with captions."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.maps import Column, Halves, columns_of, halves_of, paint_residual_maps
 from push_predictor.residuals.reporting.figures.partial import strength_of
+from push_predictor.residuals.reporting.phrases import covariate_phrase
 from push_predictor.residuals.reporting.summary import comparisons_of
 
 SIZE = (10.0, 6.6)  # inches
 
 
 def map_pictures(out: Path, trace: Trace) -> list[Picture]:
-    """Residuals over contact and angle: of the pushes that the search saw, and of those held out."""
+    """Maps of the analysis pushes and of the held-out pushes."""
     pictures = []
     for name, title, columns in (
         ("maps_analysis", "analysis pushes", _analysis_columns(trace)),
@@ -60,22 +61,29 @@ def _halves(trace: Trace, part: str) -> Halves:
 def _map_caption(trace: Trace, title: str, columns: list[Column]) -> str:
     seen = title == "analysis pushes"
     pushes = len((trace.analysis if seen else trace.held_out.table).pushes)
-    split = (
-        f" Each is split at the median of the first effect's fitted strength: an effect of {trace.terms[0].covariate} "
-        f"differs between the halves, and can cancel in one map of all."
-        if trace.terms and trace.terms[0].basis.drivers
-        else ""
-    )
     trust = (
-        "The search has seen these pushes: what is gone here need not be gone elsewhere."
+        "The search used these pushes, so a smaller residual here is no proof."
         if seen
         else "Nothing was fitted or chosen on these pushes."
     )
-    after = "on windows cut again" if trace.verdict == "measurement" else "with what was found"
+    after = "the deployed model on windows cut again" if trace.verdict == "measurement" else "with the effects found"
+    meaning = {"before": "the deployed model", "refit": "retrained on the analysis pushes", "after": after}
+    shown = dict.fromkeys(column.title.partition("\n")[0] for column in columns)
+    models = [f"{name.capitalize()}: {meaning[name]}." for name in shown]
     numbers = " Numbers: pushes." if len(columns) < 3 else ""
     return (
-        f"Mean residual of {pushes} {title} over contact and angle, in units of each model's own predicted deviation. "
-        f"Before: the deployed model; refit: made anew in its own inputs from the analysis pushes; after: {after}. "
-        f"One colour scale for all, orange above and purple below zero.{split} {trust}{numbers} Hatched: fewer than "
-        f"six windows."
+        f"Mean residual of {pushes} {title} over contact point and push angle, in units of the predicted standard "
+        f"deviation; orange is positive, purple negative. {' '.join(models)}{_split_words(trace)} {trust}{numbers} "
+        "Hatched: fewer than six windows."
+    )
+
+
+def _split_words(trace: Trace) -> str:
+    """How the maps are split, if the first effect depends on a covariate."""
+    if not trace.terms or not trace.terms[0].basis.drivers:
+        return ""
+    name = covariate_phrase(trace.terms[0].covariate)
+    return (
+        f" Maps are split at the median strength of the first effect, because an effect of {name} may cancel in one "
+        "map of all pushes."
     )

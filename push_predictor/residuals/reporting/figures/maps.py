@@ -1,4 +1,4 @@
-"""Mean standardised residual over contact and angle, before and after, all panels on one scale."""
+"""Mean standardised residual over contact point and push angle, before and after, on one colour scale."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import SYMBOLS
 from push_predictor.residuals.reporting.figures.partial import Strength
+from push_predictor.residuals.reporting.phrases import covariate_phrase
 from push_predictor.types import Array, BoolArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LEAST_REACH = 1.0  # predicted sd at either end of the colours: below it is what few windows scatter
-WIDEST = 97.0  # % of the cells that the colours tell apart
+LEAST_REACH = 1.0  # predicted standard deviations at either end of the colours; less is noise of few windows
+WIDEST = 97.0  # % of the cells whose values the colours resolve
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A column of the picture: residuals z (n, 3) of the windows of a table, in units of the prediction."""
+    """A column of the picture: standardised residuals z (n, 3) of the windows of a table."""
 
     title: str
     table: PushTable
@@ -35,14 +36,14 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Halves:
-    """Windows (n,) split by an effect's strength, with the names of the two parts; one part where nothing drives it."""
+    """Windows (n,) split by the strength of an effect, with the names of both parts; one part if it is constant."""
 
     masks: tuple[BoolArray, ...]
     names: tuple[str, ...]
 
 
 def halves_of(strength: Strength | None, table: PushTable) -> Halves:
-    """The windows where the fitted effect lies below its median, and the others: its sign differs between them."""
+    """Windows below and above the median of the fitted effect: its sign differs between them."""
     if strength is None or not strength.effect.basis.drivers:
         return Halves((np.ones(len(table), dtype=np.bool_),), ("",))
     values = strength.curve(table.covariates, len(table))[0]
@@ -61,17 +62,17 @@ def columns_of(title: str, table: PushTable, z: Array, halves: Halves) -> list[C
 
 
 def paint_residual_maps(figure: Figure, outline: Outline, columns: Sequence[Column]) -> None:
-    """Rows dx, dy, dtheta; a column each; numbers are pushes."""
+    """Paint rows dx, dy, dtheta, a column for each of `columns`; numbers are pushes."""
     maps = [residual_map(outline, column, _cells(outline, columns)) for column in columns]
     scale = scale_of(maps)
     axes = figure.subplots(len(SYMBOLS), len(columns), sharex=True, sharey=True, squeeze=False)
     for k, row in enumerate(axes):
         for ax, shown in zip(row, maps, strict=True):
             image = paint_panel(ax, outline, shown, shown.mean[..., k], scale, counted=len(columns) < 3)
-        row[0].set_ylabel(f"{SYMBOLS[k]}\npush angle (deg)")
+        row[0].set_ylabel(f"{SYMBOLS[k]}\nPush angle (deg)")
     for ax, column in zip(axes[0], columns, strict=True):
         ax.set_title(column.title)
-    label = "mean residual / predicted sd"
+    label = "Mean residual / predicted standard deviation"
     figure.colorbar(image, ax=axes.ravel().tolist(), label=label, extend=scale.extend, pad=0.01, aspect=36, shrink=0.8)
     figure.supxlabel(contact_label(outline), fontsize=9.0)
 
@@ -99,10 +100,9 @@ def _cells(outline: Outline, columns: Sequence[Column]) -> Cells:
 
 
 def _names(basis: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str, str]:
-    name = basis.drivers[0]
-    values = table.covariates[name]
+    phrase, values = covariate_phrase(basis.drivers[0]), table.covariates[basis.drivers[0]]
     low, high = values[~above], values[above]
     if len(basis.drivers) == 1 and high.size and low.size and (low.max() <= high.min() or high.max() <= low.min()):
-        lower, upper = f"{name}: lower", f"{name}: higher"
+        lower, upper = f"{phrase}: low", f"{phrase}: high"
         return (lower, upper) if low.max() <= high.min() else (upper, lower)
-    return f"effect of {name}: lower", f"effect of {name}: higher"
+    return f"effect of {phrase}: low", f"effect of {phrase}: high"

@@ -1,4 +1,4 @@
-"""The data that an effect rests on: what the other effects leave, told as the strength of this one."""
+"""The data that an effect rests on: partial residuals, expressed as the strength of the effect."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from push_predictor.residuals.outcome import Trace
 from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 400
-CENTRAL = 1.96  # sd that hold 95 % of a Gaussian
+CENTRAL = 1.96  # standard deviations that cover 95 % of a Gaussian
 LEAST_PUSHES = 3  # of a bin that is shown
 
 
@@ -32,10 +32,10 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """An effect as q parameters that its basis drives.
+    """An effect as q parameters that depend on its covariate.
 
-    pattern (p, q): of the mechanism's p responses. coefficients (q, m) and their covariance (q, m, m). share: part of
-    the fitted coefficients that the pattern holds, 1 unless the mechanism is unknown.
+    pattern (p, q): of the mechanism's p responses. coefficients (q, m) and their covariance (q, m, m). share: of the
+    fitted coefficients' sum of squares that the pattern covers, 1 unless the mechanism is unknown.
     """
 
     effect: Effect
@@ -55,7 +55,7 @@ class Strength:
 
 @dataclass(frozen=True, eq=False)
 class Binned:
-    """Of each bin (b,): where it lies, and the q parameters' estimates with their 95 % ends (b, q)."""
+    """Position of each bin (b,), and the q parameters' estimates with their 95 % ends (b, q)."""
 
     place: Array
     value: Array
@@ -64,30 +64,30 @@ class Binned:
 
 
 def analysis_rows(trace: Trace) -> Rows:
-    """The analysis pushes: by the extended model, or by the deployed one less the effects where none was kept."""
+    """Analysis pushes under the extended model, or under the deployed model minus the effects if there is none."""
     if trace.extended is not None:
         evidence = evidence_of(trace.extended, trace.analysis)
         return Rows(trace.analysis, evidence.z, evidence.whitener)
     evidence = evidence_of(trace.model, trace.analysis)
     shift = sum((shift_of(trace, term, trace.analysis) for term in trace.terms), np.zeros_like(evidence.residual))
-    left = replace(evidence, residual=evidence.residual - shift)
-    return Rows(trace.analysis, left.z, left.whitener)
+    unexplained = replace(evidence, residual=evidence.residual - shift)
+    return Rows(trace.analysis, unexplained.z, unexplained.whitener)
 
 
 def held_out_rows(trace: Trace) -> Rows:
-    """The held-out pushes, by the model with the effects."""
+    """Held-out pushes under the model with the effects."""
     after = trace.held_out.after
     whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(after.covariance)))
     return Rows(trace.held_out.table, np.einsum("nij,nj->ni", whitener, after.observed - after.mean), whitener)
 
 
 def shift_of(trace: Trace, effect: Effect, table: PushTable) -> Array:
-    """What an effect adds to the mean (n, 3)."""
+    """Shift of the mean (n, 3) by an effect."""
     return effect.shift(physics_of(trace.model), _push(table))[0]
 
 
 def strength_of(effect: Effect, table: PushTable) -> Strength:
-    """The effect's physical parameters; of an unknown mechanism its strongest pattern, 1 at its root mean square."""
+    """The effect's physical parameters; for an unknown mechanism its strongest pattern, scaled to RMS 1."""
     m = columns_of(effect.basis)
     coefficients = effect.coefficients.reshape(-1, m)
     p = len(coefficients)
@@ -104,12 +104,12 @@ def strength_of(effect: Effect, table: PushTable) -> Strength:
     rms = max(float(np.sqrt(np.mean(along_values**2))), np.finfo(float).tiny)
     own = np.einsum("p,pmqk,q->mk", u, blocks, u)[None] / rms**2
     share = float(size[0] ** 2 / max(float(np.sum(size**2)), np.finfo(float).tiny))
-    names = ("strength of the fitted pattern (1: root mean square)",)
+    names = ("Strength of the fitted pattern (RMS 1)",)
     return Strength(effect, names, ("1",), u[:, None] * rms, along[None] / rms, own, share)
 
 
 def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
-    """The outcome per unit of each of the q parameters, in units of the prediction, (n, 3, q)."""
+    """Standardised outcome (n, 3, q) per unit of each of the q parameters."""
     effect = strength.effect
     bare = design_of(
         effect.mechanism, DriverBasis("constant"), physics_of(trace.model), _push(rows.table), effect.outcome_scale
@@ -118,9 +118,9 @@ def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
 
 
 def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: IntArray) -> Binned:
-    """The parameters in each bin (n,) of windows by least squares alone, 95 % ends by drawing the bin's pushes anew.
+    """The parameters in each bin (n,) of windows by least squares, with 95 % ends from a bootstrap of its pushes.
 
-    place (n,): where on the axis a window lies. Windows of bin -1 and bins of fewer than three pushes are left out.
+    place (n,): position of a window on the axis. Windows of bin -1 and bins of fewer than three pushes are dropped.
     """
     fitted = strength.curve(rows.table.covariates, len(rows.table))[0]
     target = rows.unexplained + np.einsum("nkq,nq->nk", response, fitted)
@@ -132,14 +132,14 @@ def binned(strength: Strength, rows: Rows, response: Array, place: Array, bins: 
 
 
 def per_push(strength: Strength, rows: Rows, response: Array, place: Array) -> tuple[Array, Array]:
-    """Of each push that tells anything: its place (k,) and every parameter (k, q) with the others as fitted."""
+    """Position (k,) and parameters (k, q) of each push; NaN where the response is too small."""
     _, push = np.unique(rows.table.push_id, return_inverse=True)
     times = np.bincount(push)
     square, score = (_sums(push, values) for values in (_squares(response), _scores(response, rows.unexplained)))
     fitted = strength.curve(rows.table.covariates, len(rows.table))[0]
     mean = _sums(push, fitted) / times[:, None]
-    telling = square >= 0.1 * np.median(square, axis=0)
-    value = np.divide(score, square, out=np.full(score.shape, np.nan), where=telling & (square > 0.0)) + mean
+    informative = square >= 0.1 * np.median(square, axis=0)
+    value = np.divide(score, square, out=np.full(score.shape, np.nan), where=informative & (square > 0.0)) + mean
     return np.bincount(push, place) / times, value
 
 
@@ -173,8 +173,8 @@ def _squares(response: Array) -> Array:
     return np.asarray(np.sum(response**2, axis=1))
 
 
-def _scores(response: Array, left: Array) -> Array:
-    return np.asarray(np.einsum("nkq,nk->nq", response, left))
+def _scores(response: Array, residual: Array) -> Array:
+    return np.asarray(np.einsum("nkq,nk->nq", response, residual))
 
 
 def _push(table: PushTable) -> Push:

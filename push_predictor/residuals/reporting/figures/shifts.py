@@ -1,4 +1,4 @@
-"""What an effect does to dx, dy, dtheta: fitted against found, and over the angle or the heading of the push."""
+"""The shift of dx, dy, dtheta by an effect: found against fitted, and against push angle or push direction."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PLACES = ("first third", "middle third", "last third")
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Windows in groups along an axis: x (n,) in shown units, its name, groups by name as masks (n,)."""
+    """Position x (n,) of windows on an axis with its label, and named groups of windows as masks (n,)."""
 
     x: Array
     label: str
@@ -39,7 +39,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Means:
-    """Of each bin (b,): its place, the mean fitted shift and half its 95 % band, the mean found with its 95 % ends."""
+    """Bins (b,): position, mean fitted shift with half its 95 % band, mean shift found with its 95 % ends."""
 
     place: Array
     fitted: Array
@@ -50,44 +50,46 @@ class Means:
 
 
 def paint_shifts(figure: Figure, trace: Trace, effect: Effect, analysis: Rows, held_out: Rows | None) -> None:
-    """Mean found shift of windows with like fitted shift, per output; a right effect lies on the diagonal."""
+    """Paint the mean shift found against the fitted shift, per output; a correct effect lies on the diagonal."""
     axes = figure.subplots(1, 3)
     for k, ax in enumerate(axes):
         _paint_shift(ax, trace, effect, (analysis, held_out), k)
-    axes[0].set_ylabel("found: what the other terms leave")
+    axes[0].set_ylabel("Shift found")
     axes[0].legend(loc="upper left", handlelength=1.2)
 
 
 def paint_course(figure: Figure, trace: Trace, effect: Effect, rows: Rows, course: Course) -> None:
-    """The shift of each output along the course: lines fitted, points found."""
+    """Paint the shift of each output along an axis: lines fitted, points found."""
     axes = figure.subplots(1, 3)
     for k, ax in enumerate(axes):
         grid(ax)
         ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
         for (name, group), colour in zip(course.groups, COLOURS, strict=False):
             _paint_group(ax, binned_means(trace, effect, rows, course.x, group, k), colour, name)
-        ax.set_title(f"shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
+        ax.set_title(f"Shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
     axes[0].legend(loc="best", handlelength=1.2)
     axes[1].set_xlabel(course.label)
 
 
 def course_of(effect: Effect, outline: Outline, rows: Rows) -> Course:
-    """Over the heading of the push for what has a direction in the world, else over the angle, by thirds of the edge.
+    """The push direction for effects that are fixed to the world, else the push angle by thirds of the edge.
 
-    Only windows of the commonest speed and duration: a shift grows with the way.
+    Only windows of the commonest speed and duration: a shift grows with the distance travelled.
     """
     table, alike = rows.table, commonest_condition(rows.table).rows
     if "push_heading" in table.covariates and (effect.covariate == "push_heading" or "slider_heading" in effect.needs):
-        return Course(np.degrees(table.covariates["push_heading"]), "push_heading (deg)", (("all pushes", alike),))
+        return Course(
+            np.degrees(table.covariates["push_heading"]), "Push direction in the world (deg)", (("all pushes", alike),)
+        )
     third = np.minimum((arc_length(outline, table.inputs[:, 1]) / sector_length(outline) * 3.0).astype(int), 2)
     groups = tuple((name, alike & (third == k)) for k, name in enumerate(PLACES))
-    return Course(np.degrees(table.inputs[:, 2]), "push angle (deg)", groups)
+    return Course(np.degrees(table.inputs[:, 2]), "Push angle (deg)", groups)
 
 
 def binned_means(
     trace: Trace, effect: Effect, rows: Rows, x: Array, group: BoolArray, output: int, bins: int = COURSE_BINS
 ) -> Means:
-    """Means of an output's shift (shown units) in bins of x (n,) with as many windows of the group in each."""
+    """Means of an output's shift (shown units) in bins of x (n,) with equal counts of the group's windows."""
     design = _design(trace, effect, rows)[:, output] * UNITS[output]
     fitted = design @ effect.coefficients
     found = fitted + _residual(rows)[:, output] * UNITS[output]
@@ -126,8 +128,8 @@ def _paint_shift(ax: Axes, trace: Trace, effect: Effect, parts: Sequence[Rows | 
         ends += [*means.place.tolist()]
     if ends:
         ax.plot([min(ends), max(ends)], [min(ends), max(ends)], color=PREDICTED, linewidth=1.4)
-    ax.set_title(f"shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
-    ax.set_xlabel("fitted")
+    ax.set_title(f"Shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
+    ax.set_xlabel("Fitted shift")
 
 
 def _bars(ax: Axes, means: Means, colour: str, marker: str, name: str | None = None) -> None:
@@ -143,5 +145,5 @@ def _design(trace: Trace, effect: Effect, rows: Rows) -> Array:
 
 
 def _residual(rows: Rows) -> Array:
-    """What is left, in m, m, rad (n, 3)."""
+    """Residuals (n, 3) after all effects: m, m, rad."""
     return np.asarray(np.linalg.solve(rows.whitener, rows.unexplained[:, :, None])[:, :, 0])

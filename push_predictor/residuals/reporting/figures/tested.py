@@ -1,4 +1,4 @@
-"""All that was tried: a mechanism a row, a driver a column, coloured by how little chance makes such a trace."""
+"""All candidates: a row for each mechanism, a column for each covariate, coloured by the family-wise p."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from push_predictor.reporting.canvas import EMPTY
 from push_predictor.residuals.outcome import Tested, Trace
-from push_predictor.residuals.reporting.wording import mechanism_words
+from push_predictor.residuals.reporting.phrases import covariate_phrase, label, mechanism_phrase
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FLOOR = 1e-3  # p values below it are shown alike
+FLOOR = 1e-3  # p values below it share a colour
 
 
 def paint_tested(figure: Figure, trace: Trace) -> None:
-    """The smallest p of each pair; a ring is what was found, a dot a rival that these data cannot tell from it."""
+    """Paint the smallest p of each pair; a ring marks an effect found, a dot a rival of the first."""
     from matplotlib.colors import LogNorm
 
     rows, columns, p = grid_of(trace.tested)
@@ -28,7 +28,7 @@ def paint_tested(figure: Figure, trace: Trace) -> None:
     image = ax.pcolormesh(np.arange(len(columns) + 1), np.arange(len(rows) + 1), p, cmap="viridis",
                           norm=LogNorm(FLOOR, 1.0), edgecolors="white", linewidth=0.5)  # fmt: skip
     for tested in best_of(trace.tested):
-        place = columns.index(tested.covariate) + 0.5, rows.index(mechanism_words(tested.mechanism)) + 0.5
+        place = columns.index(_column(tested)) + 0.5, rows.index(_row(tested)) + 0.5
         if (mark := role_of(trace, tested)) == "found":
             ax.plot(*place, "o", mfc="none", mec="#D55E00", markersize=11.0, mew=2.2)
         elif mark == "rival":
@@ -37,12 +37,12 @@ def paint_tested(figure: Figure, trace: Trace) -> None:
     ax.set_yticks(np.arange(len(rows)) + 0.5, rows)
     ax.tick_params(length=0.0)
     ax.invert_yaxis()
-    bar = figure.colorbar(image, label="family-wise p", pad=0.01, aspect=22, extend="min")
+    bar = figure.colorbar(image, label="Family-wise p", pad=0.01, aspect=22, extend="min")
     bar.ax.axhline(max(trace.alpha, FLOOR), color="#D55E00", linewidth=1.6)
 
 
 def best_of(tested: Sequence[Tested]) -> list[Tested]:
-    """One for each mechanism and driver, of the basis with the smallest p; the smallest first."""
+    """One candidate for each mechanism and covariate, that with the smallest p; the smallest first."""
     best: dict[tuple[str | None, str], Tested] = {}
     for each in sorted(tested, key=lambda t: t.p_value):
         best.setdefault((each.mechanism, each.covariate), each)
@@ -50,7 +50,7 @@ def best_of(tested: Sequence[Tested]) -> list[Tested]:
 
 
 def role_of(trace: Trace, tested: Tested) -> str:
-    """found, rival (of the first effect), or nothing."""
+    """The role of a candidate: "found", "rival" (of the first effect) or ""."""
     if any((tested.mechanism, tested.covariate) == (e.mechanism, e.covariate) for e in trace.effects):
         return "found"
     if not trace.effects:
@@ -62,11 +62,19 @@ def role_of(trace: Trace, tested: Tested) -> str:
 
 
 def grid_of(tested: Sequence[Tested]) -> tuple[list[str], list[str], Array]:
-    """Names of mechanisms (r,) and drivers (c,), and the smallest p (r, c), NaN where a pair was not tried."""
+    """Phrases of mechanisms (r,) and covariates (c,), and the smallest p (r, c), NaN for a pair that was not tried."""
     best = best_of(tested)
-    rows = list(dict.fromkeys(mechanism_words(each.mechanism) for each in sorted(best, key=lambda t: t.p_value)))
-    columns = list(dict.fromkeys(each.covariate for each in best))
+    rows = list(dict.fromkeys(_row(each) for each in sorted(best, key=lambda t: t.p_value)))
+    columns = list(dict.fromkeys(_column(each) for each in best))
     p = np.full((len(rows), len(columns)), np.nan)
     for each in best:
-        p[rows.index(mechanism_words(each.mechanism)), columns.index(each.covariate)] = max(each.p_value, FLOOR)
+        p[rows.index(_row(each)), columns.index(_column(each))] = max(each.p_value, FLOOR)
     return rows, columns, p
+
+
+def _row(tested: Tested) -> str:
+    return label(mechanism_phrase(tested.mechanism))
+
+
+def _column(tested: Tested) -> str:
+    return label(covariate_phrase(tested.covariate))
