@@ -13,7 +13,6 @@ from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.evaluation.alarm.evidence import checked_rate
-from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import Stop, run
@@ -29,8 +28,6 @@ from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
-from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor_interfaces.msg import PushResidual
 
 PERIOD = 0.02  # s between two looks at what has arrived
 
@@ -59,10 +56,10 @@ class PushValidator(Node):
         )
         self._run: ValidationRun | None = None  # the present one, or the last
         self.create_subscription(String, "replay_status", self._on_replay_status, LATCHED)
-        self._finish = FinishService(self, self._session, self._writer, self._hindrance)
+        self._finish = FinishService(self, self._session, self._models, self._rigs, self._writer)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
         self.create_timer(PERIOD, self._work, clock=steady)
-        self.create_timer(values["diagnostics_period"], self._publish_status, clock=steady)
+        self.create_timer(values["diagnostics_period"], lambda: self._status.publish(self._run), clock=steady)
 
     def close(self) -> None:
         """Wait until the results are written. Raises PushPredictorError if they cannot be."""
@@ -94,7 +91,7 @@ class PushValidator(Node):
         self._advance()
         self._finish.answer()
         if self._session.over:
-            self._publish_status()
+            self._status.publish(self._run)
             self._closed.set()
 
     def _advance(self) -> None:
@@ -102,9 +99,11 @@ class PushValidator(Node):
         if not self._session.active:
             self._open()
         if self._session.state is State.OPEN and self._run is not None:
-            self._feed(self._run)
-            if self._session.drain_if_due(monotonic(), self._finish.requested(), self._rig_changed(self._run)):
-                self._run.finish({} if self._rig_changed(self._run) else self._sensors.last_scalars())
+            other_rig = self._rigs.differs_from(self._run.rig)
+            if not other_rig:
+                self._feed(self._run)
+            if self._session.drain_if_due(monotonic(), self._finish.requested(), other_rig):
+                self._run.finish({} if other_rig else self._sensors.last_scalars())
         self._client.work()
         if self._session.state is State.DRAINING and self._run is not None:
             self._drain(self._run)
@@ -117,21 +116,17 @@ class PushValidator(Node):
         # A recording gives the finder every stream from its beginning, so a run begins with all of them.
         if complete or self._closing.is_set() or self._finish.requested():
             output, scalars = self._writer.folder, self._sensors.scalar_names
-            self._run = ValidationRun(rig, models, self._client, self._publish, self._alarm, output, scalars)
+            self._run = ValidationRun(rig, models, self._client, self._results.publish, self._alarm, output, scalars)
             self._session.open(monotonic())
 
     def _feed(self, current: ValidationRun) -> None:
-        if not len(self._sensors) or self._rig_changed(current):
+        if not len(self._sensors):
             return
         samples = self._sensors.take()
         if len(samples):
             self._session.sample(monotonic())
         current.feed(samples)
         self._writer.warn_of_interrupted(current)
-
-    def _rig_changed(self, current: ValidationRun) -> bool:
-        rig = self._rigs.rig
-        return rig is not None and current.rig is not rig and current.rig.to_record() != rig.to_record()
 
     def _drain(self, ending: ValidationRun) -> None:
         """Write the run once every answer is there or the patience is over."""
@@ -145,18 +140,6 @@ class PushValidator(Node):
             self._session.failed(failure)
         else:
             self._session.written()
-
-    def _hindrance(self) -> str:
-        """In words, why no run can begin, empty if one can."""
-        return self._models.hindrance or (self._rigs.problem if self._rigs.rig is None else "")
-
-    def _publish(self, model: int, window: PushWindow, prediction: Prediction, residual: PushResidual) -> None:
-        self._results.residual(residual)
-        if model == 0 and self._rigs.rig is not None:
-            self._results.markers(self._rigs.rig, window, prediction)
-
-    def _publish_status(self) -> None:
-        self._status.publish(self._run, self._hindrance())
 
 
 def main(args: Sequence[str] | None = None) -> int:

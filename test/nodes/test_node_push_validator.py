@@ -536,7 +536,7 @@ def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyP
     for subscribers in (0, 1):
         topic = SimpleNamespace(get_subscription_count=lambda count=subscribers: count, publish=lambda message: None)
         node = SimpleNamespace(create_publisher=lambda *of_what, topic=topic: topic, get_logger=lambda: None)
-        publishers.ResultPublishers(node, "world").markers("rig", "window", "prediction")
+        publishers.ResultPublishers(node, "world").publish("rig", 0, "window", "prediction", "residual")
         assert len(made) == subscribers
 
 

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from push_predictor.nodes.polling import PolledGroup
+from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.result_writer import ResultWriter
+from push_predictor.nodes.validator.rig_source import RigSource
 from push_predictor.online.session import Session, State
 
 
 class FinishService:
-    """Offers ~/finish; callers wait while the executor does other work.
+    """Offers ~/finish; callers wait while the executor does other work."""
 
-    hindrance: returns in words why no run can begin, empty if one can.
-    """
-
-    def __init__(self, node: Node, session: Session, writer: ResultWriter, hindrance: Callable[[], str]) -> None:
+    def __init__(
+        self, node: Node, session: Session, models: ModelSource, rigs: RigSource, writer: ResultWriter
+    ) -> None:
         self._service = node.create_service(Trigger, "~/finish", _not_called, callback_group=PolledGroup())
         self._callers: list[Any] = []
-        self._session, self._writer, self._hindrance = session, writer, hindrance
+        self._session, self._models, self._rigs, self._writer = session, models, rigs, writer
 
     def requested(self) -> bool:
         """Whether a caller waits for the answer."""
@@ -41,7 +41,7 @@ class FinishService:
 
     def _response(self) -> Trigger.Response:
         output = self._writer.folder
-        if problem := self._session.failure or self._hindrance():
+        if problem := self._session.failure or self._models.missing or self._rigs.missing:
             return Trigger.Response(success=False, message=problem)
         if self._writer.report.failed:
             text = f"The result is in {output}. The report failed: see the log of the node."

@@ -46,8 +46,8 @@ class ModelSource:
         return dict(self._found[text] for text in self._wanted)
 
     @property
-    def hindrance(self) -> str:
-        """In words, why not all models are known, empty if they are."""
+    def missing(self) -> str:
+        """In words, which models are not known, empty if all are."""
         if self.models() is not None:
             return ""
         return "; ".join(self.problems) or "Waiting for list_models of predict_server."

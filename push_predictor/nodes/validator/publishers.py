@@ -6,10 +6,9 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.alarms import alarm_to_message
-from push_predictor.evaluation.alarm.evidence import AlarmState
+from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json, alarm_sentence
 from push_predictor.models.prediction import Prediction
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.validator.status import alarm_text
 from push_predictor.nodes.validator.window_markers import window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
@@ -27,16 +26,13 @@ class ResultPublishers:
         self._alarms = node.create_publisher(PushAlarm, "push_alarm", LATCHED)
         self._markers = node.create_publisher(MarkerArray, "push_markers", 100)  # for a burst after a stall
 
-    def residual(self, residual: PushResidual) -> None:
-        """Publish a window, predicted and observed."""
+    def publish(self, rig: Rig, model: int, window: PushWindow, prediction: Prediction, residual: PushResidual) -> None:
+        """Publish the residual of a window; markers only of the main model, 0, and while somebody subscribes."""
         self._residuals.publish(residual)
-
-    def markers(self, rig: Rig, window: PushWindow, prediction: Prediction) -> None:
-        """Publish a window's markers; none are made while nobody subscribes."""
-        if self._markers.get_subscription_count():
+        if model == 0 and self._markers.get_subscription_count():
             self._markers.publish(window_markers(rig, window, prediction, self._frame_id))
 
     def alarm(self, state: AlarmState, end: int) -> None:
         """Log and publish an alarm that has fired; end: of the push at which it fired, ns."""
-        self._log.warning(alarm_text(state))
+        self._log.warning(alarm_sentence(alarm_json(state)))
         self._alarms.publish(alarm_to_message(state, end, self._frame_id))

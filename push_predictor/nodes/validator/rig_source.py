@@ -24,6 +24,15 @@ class RigSource:
             String, "rig", self._take, LATCHED, callback_group=PolledGroup()
         )  # not called by the executor: work() takes the messages
 
+    @property
+    def missing(self) -> str:
+        """In words, why there is no rig, empty if there is one."""
+        return self.problem if self.rig is None else ""
+
+    def differs_from(self, earlier: Rig) -> bool:
+        """Whether the rig is known and differs from an earlier one."""
+        return self.rig is not None and self.rig is not earlier and self.rig.to_record() != earlier.to_record()
+
     def work(self) -> None:
         """Take what was published since the last call."""
         for message, *_ in take_all(self._subscription):

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.evaluation.alarm.evidence import SIZE, AlarmState
+from push_predictor.evaluation.alarm.evidence import alarm_json, alarm_sentence
 from push_predictor.evaluation.offline import rig_difference
 from push_predictor.nodes.validator.model_source import ModelSource
 from push_predictor.nodes.validator.prediction_client import PredictionClient
@@ -43,9 +43,9 @@ class StatusPublisher:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._logged: list[str] = []
 
-    def publish(self, run: ValidationRun | None, hindrance: str) -> None:
-        """Publish the status of this moment. run: the present one or the last. hindrance: why none can begin."""
-        problems = self._problems(run, hindrance)
+    def publish(self, run: ValidationRun | None) -> None:
+        """Publish the status of this moment. run: the present one or the last."""
+        problems = self._problems(run)
         if problems != self._logged:
             self._logged = problems
             for problem in problems:
@@ -54,10 +54,10 @@ class StatusPublisher:
         status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
-    def _problems(self, run: ValidationRun | None, hindrance: str) -> list[str]:
+    def _problems(self, run: ValidationRun | None) -> list[str]:
         unsaved = run.journal.failure if run and run.journal else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
-        found = [*self._models.problems, hindrance, self._rigs.problem, unsaved, silent]
+        found = [*self._models.problems, self._models.missing, self._rigs.problem, unsaved, silent]
         return [*filter(None, dict.fromkeys(found))]
 
     def _activity(self) -> str:
@@ -94,29 +94,6 @@ def validator_status(
     return diagnostic_status(name, level, _paragraph([failure, *warnings]) or state, values)
 
 
-def alarm_text(state: AlarmState) -> str:
-    """In words, why an alarm has fired, on what evidence and at which push."""
-    assert state.fired_evidence is not None
-    return (
-        f"The model no longer fits: {_cause(state.fired_by or '')} (evidence {_odds(state.fired_evidence)}; "
-        f"false-alarm rate at most {100.0 * state.false_alarm_rate:g} %). "
-        f"The alarm fired at push {state.fired_at}, number {state.fired_after} of this run."
-    )
-
-
-def _cause(score: str) -> str:
-    if score == SIZE:
-        return "errors are too large"
-    mechanism, _, parameter = score.partition(": ")
-    if parameter:
-        return f"errors look like a change of {mechanism.replace('_', ' ')} ({parameter.replace('_', ' ')})"
-    return f"errors have shifted in {score}"
-
-
-def _odds(log10_evidence: float) -> str:
-    return f"{10.0**log10_evidence:.0f} : 1" if log10_evidence < 6.0 else f"10^{log10_evidence:.1f} : 1"
-
-
 def _paragraph(texts: Sequence[str]) -> str:
     """The texts that are not empty as sentences, one after the other."""
     return " ".join(text if text.endswith((".", "?")) else f"{text}." for text in texts if text)
@@ -146,7 +123,7 @@ def _run_problems(run: ValidationRun) -> list[str]:
 def _alarm_problems(alarm: AlarmProcess) -> list[str]:
     found = []
     if alarm.state is not None and alarm.state.fired:
-        found.append(alarm_text(alarm.state))
+        found.append(alarm_sentence(alarm_json(alarm.state)))
     if alarm.skipped:
         found.append(f"The alarm skipped {len(alarm.skipped)} pushes, the last: {alarm.skipped[-1]}")
     return found

@@ -35,9 +35,9 @@ from push_predictor_interfaces.srv import PredictPush
 class ValidationRun:
     """Takes samples, requests a prediction for every window from the client, and scores the answers.
 
-    models: by the name to request, the main one first. publish: called for every prediction, with the number of the
-    model. alarm: of the main model. output: folder in which windows and residuals are saved as they arrive; None: not
-    at all. scalars: the topics that may be published in addition to the sensors.
+    models: by the name to request, the main one first. publish: called for every prediction, with rig and number of
+    the model. alarm: of the main model. output: folder in which windows and residuals are saved as they arrive; None:
+    they are not saved. scalars: the topics that may be published in addition to the sensors.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class ValidationRun:
         rig: Rig,
         models: Mapping[str, PushModel],
         client: PredictionClient,
-        publish: Callable[[int, PushWindow, Prediction, PushResidual], None],
+        publish: Callable[[Rig, int, PushWindow, Prediction, PushResidual], None],
         alarm: AlarmProcess | None = None,
         output: Path | None = None,
         scalars: Sequence[str] = (),
@@ -148,7 +148,7 @@ class ValidationRun:
         self._settle(model, number, window, prediction)
         if self.journal is not None:
             self.journal.add(name, window, prediction.mean[0], prediction.covariance[0])
-        self._publish(model, window, prediction, residual)
+        self._publish(self.rig, model, window, prediction, residual)
 
     def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
         if model == 0:
