@@ -20,7 +20,7 @@ FAR = 3_600_000_000_000  # ns; a stamp farther than this from the poses' stamps 
 NEVER = np.iinfo(np.int64).min
 
 
-class SentTimes:
+class ClockHistory:
     """The times published on /clock, by the time (ns) at which they were sent."""
 
     def __init__(self) -> None:

@@ -10,7 +10,7 @@ import pytest
 from synthetic import START, Push, rows, square_rig, stamps, translating_push, wrench_rows
 
 from push_predictor.online import scalar_buffer, stream_sync
-from push_predictor.online.scalar_buffer import ScalarBuffer, SentTimes
+from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.streams import Recording, ScalarStream
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
@@ -148,7 +148,7 @@ def tick(seconds: int, rest: int, order: str = "<") -> bytes:
 
 
 def test_a_message_is_dated_by_the_last_tick_before_it() -> None:
-    times = SentTimes()
+    times = ClockHistory()
     times.put(tick(7, 5), 100)
     times.put(tick(8, 6, ">"), 200)
     assert [times.at(sent) for sent in (99, 100, 199, 200, 300)] == [

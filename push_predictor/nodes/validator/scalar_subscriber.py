@@ -26,13 +26,13 @@ from push_predictor.errors import RequestError
 from push_predictor.nodes.polling import PolledGroup, take_all
 from push_predictor.nodes.qos import DEPTH
 from push_predictor.nodes.replay.topics import message_class
-from push_predictor.online.scalar_buffer import ScalarBuffer, SentTimes
+from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.streams import ScalarStream
 
-LOOK = 0.05  # s between two looks at who publishes what
-UNDATED = 1_000_000_000  # ns after its sending by which a message's /clock is known, if there is one
-STALE = 5_000_000_000  # ns after the last message of a /clock that has no publisher any more, when its time expires
+LOOK = 0.05  # s between two looks at the publishers
+CLOCK_DELAY = 1_000_000_000  # ns after sending a message within which its /clock arrives, if there is one
+STALE = 5_000_000_000  # ns after the last message of a /clock without publisher, when its time expires
 CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 
 
@@ -42,24 +42,24 @@ class _Reader:
     def __init__(self, node: Node, topic: str) -> None:
         self._node, self._topic, self._group = node, topic, PolledGroup()
         self._subscription: Subscription | None = None
-        self._suits: tuple[Any, ...] = ()
+        self._profile: tuple[Any, ...] = ()
 
     def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
         """Subscribe to this type, as these publishers offer it."""
-        profile = _suited([publisher.qos_profile for publisher in publishers])
-        suits = kind, profile.durability, profile.reliability
-        if suits == self._suits:
+        profile = _common_profile([publisher.qos_profile for publisher in publishers])
+        wanted = kind, profile.durability, profile.reliability
+        if wanted == self._profile:
             return
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
-            self._subscription, self._suits = None, ()
+            self._subscription, self._profile = None, ()
         try:
             self._subscription = self._node.create_subscription(
-                message_class(kind), self._topic, _nothing, profile, callback_group=self._group, raw=True
+                message_class(kind), self._topic, _not_called, profile, callback_group=self._group, raw=True
             )
         except rclpy_implementation.RCLError:
-            return  # the executor still holds the one of another type: at the next call
-        self._suits = suits
+            return  # the executor still has the one of another type: try again at the next call
+        self._profile = wanted
 
     def taken(self) -> Iterator[tuple[bytes, int]]:
         """The arrived messages, each with the time (ns) at which it was sent."""
@@ -71,7 +71,7 @@ class _Reader:
 class _Topic:
     """A requested topic. name: as in the covariate; problem: why there are no samples, empty if there are."""
 
-    asked: str
+    requested: str
     name: str
     reader: _Reader
     problem: str = ""
@@ -88,8 +88,8 @@ class ScalarSubscriber:
         _check(names)
         self._node = node
         self._topics = [_Topic(text, _name(text), _Reader(node, text)) for text in names]
-        self._ticks, self._clock = _Reader(node, CLOCK), SentTimes()
-        self._clock_is_there = False
+        self._ticks, self._clock = _Reader(node, CLOCK), ClockHistory()
+        self._clock_published = False
         self._looked = 0.0
         self._draining = threading.Lock()
         self.look()
@@ -108,7 +108,7 @@ class ScalarSubscriber:
             for topic in self._topics:
                 self._find(topic)
             publishers = self._node.get_publishers_info_by_topic(CLOCK)
-            self._clock_is_there = bool(publishers)
+            self._clock_published = bool(publishers)
             if publishers:
                 self._ticks.follow(CLOCK_TYPE, publishers)
 
@@ -135,8 +135,8 @@ class ScalarSubscriber:
         until, time_of = self._dating()
         until = sys.maxsize if last else until
         with self._draining:
-            there = [(topic.name, topic.buffer) for topic in self._topics if topic.buffer is not None]
-            return {name: buffer.take(until, time_of, near) for name, buffer in there}
+            published = [(topic.name, topic.buffer) for topic in self._topics if topic.buffer is not None]
+            return {name: buffer.take(until, time_of, near) for name, buffer in published}
 
     def figures(self) -> dict[str, int]:
         """Counts of messages by topic; rejected ones also by kind, for the kinds that occurred."""
@@ -158,7 +158,7 @@ class ScalarSubscriber:
 
     def _find(self, topic: _Topic) -> None:
         """Subscribe to a published topic, or note why not; one that has lost its publishers stays as it is."""
-        publishers = self._node.get_publishers_info_by_topic(topic.asked)
+        publishers = self._node.get_publishers_info_by_topic(topic.requested)
         kinds = sorted({publisher.topic_type for publisher in publishers})
         usable = [kind for kind in kinds if kind in SCALAR_LAYOUTS]
         if len(usable) == 1:
@@ -174,10 +174,10 @@ class ScalarSubscriber:
     def _dating(self) -> tuple[int, Callable[[int], int | None]]:
         """The sending time (ns) up to which messages can be dated now, and the function that dates them."""
         newest, at = self._clock.newest, self._clock.at
-        if self._clock_is_there:
+        if self._clock_published:
             return newest or 0, at
-        over = 0 if newest is None else newest + STALE
-        return time_ns() - UNDATED, lambda sent: sent if sent > over else at(sent)
+        expired = 0 if newest is None else newest + STALE
+        return time_ns() - CLOCK_DELAY, lambda sent: sent if sent > expired else at(sent)
 
 
 def _check(names: Sequence[str]) -> None:
@@ -190,12 +190,12 @@ def _check(names: Sequence[str]) -> None:
             raise RequestError("scalar_topics", text, "relative or absolute names, each topic once")
 
 
-def _name(asked: str) -> str:
+def _name(requested: str) -> str:
     """The name in a recording, whatever the node's namespace: with a slash before it."""
-    return f"/{asked.strip('/')}"
+    return f"/{requested.strip('/')}"
 
 
-def _suited(publishers: Sequence[QoSProfile]) -> QoSProfile:
+def _common_profile(publishers: Sequence[QoSProfile]) -> QoSProfile:
     """The QoS that all publishers offer: earlier messages are received if all publishers keep them."""
     kept = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
@@ -206,5 +206,5 @@ def _suited(publishers: Sequence[QoSProfile]) -> QoSProfile:
     )
 
 
-def _nothing(message: object) -> None:
-    """Never called: drain() takes the messages."""
+def _not_called(message: object) -> None:
+    """The callback that a subscription must have: drain() takes the messages instead."""

@@ -31,7 +31,7 @@ TOPICS = (
 
 
 class SensorSubscriber:
-    """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides say otherwise.
+    """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides change that.
 
     frame_id: frame that the headers must name, empty for any. scalars: the scalar topics to subscribe to as well. A
     thread empties the middleware's queues: a fast replay fills them while a portion of samples is processed.
@@ -41,7 +41,7 @@ class SensorSubscriber:
         self._node = node
         self._scalars = ScalarSubscriber(node, scalars)
         self._newest: int | None = None  # stamp (ns) of the poses
-        self._buffers = {name: MessageBuffer(kind, frame_id) for name, _, _, kind in TOPICS}
+        self._buffers = {name: MessageBuffer(rules, frame_id) for name, _, _, rules in TOPICS}
         self.lost: Counter[str] = Counter()
         self._last: dict[str, int] = {}
         self._empty = monotonic()  # when nothing waited last
@@ -59,7 +59,7 @@ class SensorSubscriber:
             for name, message, topic, _ in TOPICS
         }
         self._draining, self._ending = threading.Lock(), threading.Event()
-        self._thread = threading.Thread(target=self._keep_draining, name="sensor subscriber", daemon=True)
+        self._thread = threading.Thread(target=self._drain_repeatedly, name="sensor subscriber", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -71,9 +71,9 @@ class SensorSubscriber:
         return sum(map(len, self._buffers.values()))
 
     def complete(self) -> bool:
-        """Whether messages of every topic wait, or those of some have waited for PATIENCE.
+        """Whether messages of every topic wait, or messages of some topic have waited for PATIENCE.
 
-        Ask often, or take: the time since nothing waited counts.
+        Call it often: it measures the time since no message waited.
         """
         waiting = [len(buffer) > 0 for buffer in self._buffers.values()]
         if not any(waiting):
@@ -104,18 +104,18 @@ class SensorSubscriber:
         if sequence > last + 1 and self._node.count_publishers(topic) == 1:
             self.lost[name] += sequence - last - 1
 
-    def _keep_draining(self) -> None:
+    def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):
             self.drain()
 
     def take(self) -> Samples:
         """The usable samples since the last call."""
         self._empty = monotonic()
-        slider, tip, wrench = (self._buffers[name].take() for name, *_ in TOPICS)
-        for stamp, _ in (slider, tip):
+        slider, pusher, wrench = (self._buffers[name].take() for name, *_ in TOPICS)
+        for stamp, _ in (slider, pusher):
             self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # a single stamp may be wrong
         scalars = self._scalars.take(self._newest)
-        return Samples(slider_stream(*slider), pusher_stream(*tip), wrench_stream(*wrench), scalars)
+        return Samples(slider_stream(*slider), pusher_stream(*pusher), wrench_stream(*wrench), scalars)
 
     def last_scalars(self) -> dict[str, ScalarStream]:
         """The scalars since the last sample of a sensor."""
