@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the recordings in bags/ anew: scripts/make_bags.sh [NAME...]. Seeds are fixed, so are the recordings.
+# Writes the recordings in bags/ again: scripts/make_bags.sh [NAME...]. Seeds are fixed, so the files are identical.
 set -eu
 cd "$(dirname "$0")/.."
 python="${PYTHON:-.venv/bin/python}"

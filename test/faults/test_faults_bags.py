@@ -1,4 +1,4 @@
-"""Damaged bags: what stands before the damage is used, the damage is named, nothing hangs, dies or fills the memory."""
+"""Damaged bags: data before the damage are used, the damage is noted, and time and memory stay bounded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def bag(tmp_path: Path) -> Path:
 
 
 def chunks_of(data: bytes) -> list[int]:
-    """Where chunks start."""
+    """The offsets of the chunks."""
     found, at = [], 8
     while at + 9 < len(data) and data[at] != 15:
         found += [at] if data[at] == 6 else []
@@ -41,13 +41,13 @@ def chunks_of(data: bytes) -> list[int]:
     return found
 
 
-def told(bag: Path) -> tuple[list[bytes], list[str]]:
+def messages_and_notes(bag: Path) -> tuple[list[bytes], list[str]]:
     """The messages and the notes."""
     opened = open_bag(bag)
     return [m.data for m in opened.messages()], opened.notes
 
 
-def test_damaged_copies_of_every_kind_and_form_are_read_as_far_as_they_are_whole() -> None:
+def test_damaged_copies_are_read_as_far_as_they_are_intact() -> None:
     """The same by hand, of 2000: python -m benchmarks.fuzz_bags. It judges by bags that the mcap package wrote."""
     command = [sys.executable, "-m", "benchmarks.recordings.fuzz_bags", "--copies", str(COPIES), "--seed", "6"]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(REPOSITORY)}
@@ -58,10 +58,10 @@ def test_damaged_copies_of_every_kind_and_form_are_read_as_far_as_they_are_whole
 
 @pytest.mark.parametrize("length", [1 << 31, 1 << 40, (1 << 64) - 1, 300_000], ids=["2 GB", "1 TB", "2^64", "300 kB"])
 @pytest.mark.parametrize("summary", [True, False], ids=["summary", "no summary"])
-def test_a_chunk_that_claims_too_much_is_named_and_costs_no_memory(bag: Path, length: int, summary: bool) -> None:
-    """Were the length believed, the rest of the file would be one chunk; with a summary reading goes on at the next."""
+def test_chunk_with_an_excessive_length_is_noted_and_uses_no_memory(bag: Path, length: int, summary: bool) -> None:
+    """With this length the rest of the file would be one chunk; with a summary, reading continues at the next one."""
     data = bytearray(bag.read_bytes())
-    whole, _ = told(bag)
+    whole, _ = messages_and_notes(bag)
     chunks = chunks_of(data)
     struct.pack_into("<Q", data, chunks[2] + 1, length)
     bag.write_bytes(data if summary else data[:-200])
@@ -70,7 +70,7 @@ def test_a_chunk_that_claims_too_much_is_named_and_costs_no_memory(bag: Path, le
     count = sum(1 for _ in opened.messages())
     held = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    messages = told(bag)[0]
+    messages = messages_and_notes(bag)[0]
     assert messages[:900] == whole[:900]
     assert len(whole) * 0.75 < count < len(whole) if summary else 900 < count < len(whole) / 2
     assert any(f"bag.mcap at byte {chunks[2]}: " in note for note in opened.notes)
@@ -78,7 +78,7 @@ def test_a_chunk_that_claims_too_much_is_named_and_costs_no_memory(bag: Path, le
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused_before_it_does(bag: Path, compression: str) -> None:
+def test_chunk_larger_than_stated_is_rejected_before_decompression(bag: Path, compression: str) -> None:
     import lz4.frame
 
     data = bytearray(bag.read_bytes())
@@ -89,7 +89,7 @@ def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused_before_it_does(bag
     content = data[chunk + 9 : chunk + 37] + struct.pack("<I", len(name)) + name + struct.pack("<Q", len(bomb)) + bomb
     bag.write_bytes(data[:chunk] + struct.pack("<BQ", 6, len(content)) + content + data[end:])
     tracemalloc.start()
-    messages, notes = told(bag)
+    messages, notes = messages_and_notes(bag)
     held = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(messages) > 1000
@@ -112,7 +112,7 @@ print(most() - before)
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
 @pytest.mark.parametrize("noise", [4000, 500], ids=["that_do_not_compress", "that_do"])
-def test_reading_holds_no_more_than_two_chunks(
+def test_reading_uses_the_memory_of_at_most_two_chunks(
     bag: Path, tmp_path: Path, compression: CompressionType, noise: int
 ) -> None:
     path, chunk, rng = tmp_path / "noise.mcap", 1 << 24, Random(0)
@@ -123,13 +123,13 @@ def test_reading_holds_no_more_than_two_chunks(
         for step in range(10_000):
             writer.add_message(channel, START + step, rng.randbytes(noise) + bytes(4000 - noise), 0)
         writer.finish()
-    told = subprocess.run([sys.executable, "-c", HELD, bag, path], check=True, cwd=REPOSITORY, capture_output=True)
-    print(int(told.stdout) / chunk)
-    assert int(told.stdout) < 2.1 * chunk  # what the whole process grew by at most; noise of a megabyte
+    grown = subprocess.run([sys.executable, "-c", HELD, bag, path], check=True, cwd=REPOSITORY, capture_output=True)
+    print(int(grown.stdout) / chunk)
+    assert int(grown.stdout) < 2.1 * chunk  # what the whole process grew by at most; noise of a megabyte
 
 
-def test_the_messages_of_the_chunk_that_a_cut_goes_through_are_used(bag: Path) -> None:
-    """zstd unpacks in blocks of 128 kB: of a chunk that holds several, those before the cut are there."""
+def test_messages_of_a_truncated_chunk_are_used(bag: Path) -> None:
+    """zstd decompresses in blocks of 128 kB: of a chunk with several, those before the cut are used."""
     messages = [("/camera", "std_msgs/msg/String", START + i, os.urandom(500)) for i in range(2000)]
     with bag.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=2_000_000)
@@ -140,14 +140,14 @@ def test_the_messages_of_the_chunk_that_a_cut_goes_through_are_used(bag: Path) -
             writer.add_message(channel, time, content, time)
         writer.finish()
     bag.write_bytes(bag.read_bytes()[:700_000])
-    found, notes = told(bag)
+    found, notes = messages_and_notes(bag)
     assert 1000 < len(found) < 1400
     assert found == [m[3] for m in messages[: len(found)]]
     assert any("damaged or cut off" in note for note in notes)
 
 
-def test_a_chunk_that_lost_bytes_does_not_pass_for_one_that_is_cut_off(bag: Path) -> None:
-    """So many that it seems to reach beyond the file's end: what follows the gap is no message, whatever it says."""
+def test_chunk_with_missing_bytes_is_not_treated_as_truncated(bag: Path) -> None:
+    """So many that it extends beyond the end of the file: what follows the gap is not a message."""
     with bag.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.NONE)
         writer.start(profile="ros2")
@@ -155,16 +155,16 @@ def test_a_chunk_that_lost_bytes_does_not_pass_for_one_that_is_cut_off(bag: Path
         for step in range(400):
             writer.add_message(channel, START + step, stamped(START + step, [step, 0, 0, 0, 0, 0, 1]), 0)
         writer.finish()
-    whole, _ = told(bag)
+    whole, _ = messages_and_notes(bag)
     data = bag.read_bytes()
     bag.write_bytes(data[:10_000] + data[30_011:])
-    found, notes = told(bag)
+    found, notes = messages_and_notes(bag)
     assert set(found) <= set(whole)
     assert any("damaged or cut off" in note for note in notes)
 
 
 def hundred_poses(path: Path, enable_data_crcs: bool = False) -> int:
-    """Write a bag without chunks; answers the byte where its data end."""
+    """Write a bag without chunks; returns the offset of the end of its data."""
     with path.open("wb") as stream:
         writer = Writer(stream, use_chunking=False, enable_data_crcs=enable_data_crcs)
         writer.start(profile="ros2")
@@ -176,12 +176,12 @@ def hundred_poses(path: Path, enable_data_crcs: bool = False) -> int:
     return end
 
 
-def test_zeros_at_the_end_as_after_a_power_cut_cost_no_message_before_them(bag: Path) -> None:
-    """Without chunks, too: the last message is whole, though no record follows it."""
+def test_zeros_at_the_end_lose_no_message_before_them(bag: Path) -> None:
+    """Also without chunks: the last message is complete, although no record follows it."""
     end = hundred_poses(bag)
     data = bag.read_bytes()
     bag.write_bytes(data[:end] + bytes(5000))
-    found, notes = told(bag)
+    found, notes = messages_and_notes(bag)
     assert len(found) == 100
     assert any(f"at byte {end}, is damaged" in note for note in notes)
 
@@ -205,27 +205,27 @@ def test_messages_before_a_foreign_schema_or_encoding_are_used(bag: Path, what: 
         writer.finish()
     read = read_recording(bag)
     assert (len(read.slider), len(read.pusher)) == (50, 100)
-    said = "50 messages have type 'my_msgs/msg/Pose'" if what == "type" else "/slider/pose is encoded as 'json'"
-    assert any("/slider/pose" in note and said in note for note in read.notes)
+    expected = "50 messages have type 'my_msgs/msg/Pose'" if what == "type" else "/slider/pose is encoded as 'json'"
+    assert any("/slider/pose" in note and expected in note for note in read.notes)
 
 
-def test_a_summary_that_is_damaged_is_named_and_not_used(bag: Path) -> None:
-    """It is believed where its checksum is right and it stands right behind the data."""
+def test_damaged_summary_is_noted_and_ignored(bag: Path) -> None:
+    """A summary is used if its checksum is correct and it directly follows the data."""
     data = bytearray(bag.read_bytes())
-    whole, _ = told(bag)
+    whole, _ = messages_and_notes(bag)
     start, _, _ = struct.unpack_from("<QQI", data, len(data) - 28)
     at = data.index(b"/slider/pose", start)
     data[at : at + 12] = b"/slider/posf"
     bag.write_bytes(data)
-    messages, notes = told(bag)
+    messages, notes = messages_and_notes(bag)
     assert messages == whole
     assert any(f"at byte {start}: the summary's checksum is wrong" in note for note in notes)
     assert set(open_bag(bag).topics) == {"/slider/pose", "/pusher/pose", "/pusher/wrench"}
 
 
 @pytest.mark.parametrize("lie", [100, 70_000, 1 << 40, (1 << 64) - 1])
-def test_a_metadata_index_that_points_elsewhere_is_named_and_the_record_found(bag: Path, lie: int) -> None:
-    """Its checksum is right: a program that wrote nonsense, or somebody who means ill."""
+def test_wrong_metadata_index_is_noted_and_the_record_is_found(bag: Path, lie: int) -> None:
+    """The checksum is correct: a faulty or malicious program wrote the file."""
     data = bytearray(bag.read_bytes())
     start, _, _ = struct.unpack_from("<QQI", data, len(data) - 28)
     place = data.rindex(b"push_rig") - 29  # opcode, length, offset, length, length of the name
@@ -237,28 +237,28 @@ def test_a_metadata_index_that_points_elsewhere_is_named_and_the_record_found(ba
     assert any(f"at byte {lie}: " in note and "metadata" in note for note in opened.notes)
 
 
-def test_the_checksum_of_the_whole_data_is_checked_where_it_was_written(tmp_path: Path) -> None:
+def test_checksum_of_the_data_is_verified_if_present(tmp_path: Path) -> None:
     path = tmp_path / "sum.mcap"
     end = hundred_poses(path, enable_data_crcs=True)
-    assert told(path)[1] == []
+    assert messages_and_notes(path)[1] == []
     data = bytearray(path.read_bytes())
     data[end - 20] ^= 1
     path.write_bytes(data)
-    messages, notes = told(path)
+    messages, notes = messages_and_notes(path)
     assert len(messages) == 100
     assert notes == [f"{path} at byte {end}: the checksum of the data is wrong; they are damaged somewhere before it"]
 
 
-def test_one_damaged_file_of_several_leaves_the_others_in_use(tmp_path: Path) -> None:
+def test_other_files_are_used_if_one_is_damaged(tmp_path: Path) -> None:
     folder = tmp_path / "split"
     folder.mkdir()
     for part in range(4):
         write_bag(folder / f"split_{part}.mcap", push_messages(0.4))
-    whole = len(told(folder)[0]) // 4
+    whole = len(messages_and_notes(folder)[0]) // 4
     (folder / "split_0.mcap").write_bytes(b"")
     (folder / "split_1.mcap").write_bytes(b"no MCAP at all")
     (folder / "split_2.mcap").write_bytes((folder / "split_2.mcap").read_bytes()[:60])
-    messages, notes = told(folder)
+    messages, notes = messages_and_notes(folder)
     assert len(messages) == whole
     assert any("split_0.mcap: the file is empty" in note and "the other files are used" in note for note in notes)
     assert any("split_1.mcap: not an MCAP file" in note for note in notes)
@@ -269,18 +269,18 @@ def test_one_damaged_file_of_several_leaves_the_others_in_use(tmp_path: Path) ->
         open_bag(folder)
 
 
-def test_a_file_that_is_damaged_everywhere_is_read_in_time_and_does_not_fill_the_notes(tmp_path: Path) -> None:
-    """Every message is on a channel that nobody described: as many notes as messages would take for ever."""
+def test_file_with_damage_everywhere_is_read_in_bounded_time_with_bounded_notes(tmp_path: Path) -> None:
+    """Every message is on a channel without description; one note per message would be too slow."""
     record = struct.pack("<BQHIQQ", 5, 22 + 4, 7, 0, 0, 0) + b"\0\1\0\0"
     path = tmp_path / "wild.mcap"
     path.write_bytes(b"\x89MCAP0\r\n" + 50_000 * record)
-    messages, notes = told(path)
+    messages, notes = messages_and_notes(path)
     assert messages == []
     assert len(notes) < 100
     assert notes[-1] == f"{path}: further damage is not listed"
 
 
-def test_commands_end_with_0_or_1_and_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_on_damaged_bags_exit_with_0_or_1_and_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data = bag.read_bytes()
     model = str(REPOSITORY / "resource" / "simulated_square_abs.pushmodel")
     for content in (data[:40_000], data[:100], b"", b"x", data[:30_000] + bytes(9000) + data[39_000:]):
@@ -294,7 +294,7 @@ def test_commands_end_with_0_or_1_and_one_line(bag: Path, capsys: pytest.Capture
                 assert status == 0 and "bag.mcap at byte" in out
 
 
-def test_a_replay_plays_what_is_whole_and_says_so_and_refuses_what_is_nothing(bag: Path) -> None:
+def test_replay_plays_intact_messages_and_rejects_unreadable_bags(bag: Path) -> None:
     bag.write_bytes(bag.read_bytes()[:20_000])
     params = {"recording": bag, "exit_when_finished": True, "play.rate": 20.0, "wait_for_subscribers": 0.0}
     with node_process("push_replay", domain=free_domain(), params=params) as process:

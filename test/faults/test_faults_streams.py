@@ -1,4 +1,4 @@
-"""Streams that a lab really sees: what is wrong is counted by its kind, and no window is made of it."""
+"""Faults of streams as they occur in a lab: they are counted by kind and give no wrong window."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def of(recording: Recording, name: str) -> Stream:
 
 
 def changed(recording: Recording, streams: Mapping[str, Stream]) -> Recording:
-    """With other streams."""
+    """The same truth with other streams."""
     values: dict[str, Any] = dict(streams)
     return replace(recording, **values)
 
@@ -89,12 +89,12 @@ any_clean = st.sampled_from(list(CLEAN))
 with_wrench = st.sampled_from(["made up", "measured"])
 
 
-def test_the_clean_recordings_have_windows_to_lose() -> None:
+def test_clean_recordings_have_windows() -> None:
     assert [len(c.windows) for c in CLEAN.values()] >= [12, 12, 10]
     assert max(np.hypot(*w.displacement[:2]) for c in CLEAN.values() for w in c.windows) > 0.003
 
 
-# --- what a true window is -------------------------------------------------------------------------------------------
+# --- correct windows -------------------------------------------------------------------------------------------------
 
 
 def numbers(window: PushWindow) -> list[float]:
@@ -108,7 +108,7 @@ def at(stream: PoseStream, stamps: Sequence[int]) -> Array:
 
 
 def assert_true(windows: Sequence[PushWindow], truth: Clean, damaged: Sequence[tuple[int, int]], late: int = 0) -> None:
-    """Each window is one of the clean recording, or lies off the damage; all say what the clean recording saw.
+    """Each window is one of the clean recording, or lies away from the fault; all agree with the clean recording.
 
     damaged: from and to (ns). late: by how much (ns) the true time is ahead of the stamps.
     """
@@ -132,12 +132,12 @@ def place_in(stream: Stream, share: float, count: int = 1) -> int:
     return int(share * (len(stream) - count - 1)) + 1
 
 
-# --- samples that are not used ---------------------------------------------------------------------------------------
+# --- discarded samples -----------------------------------------------------------------------------------------------
 
 
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, back=st.integers(2, 60))
-def test_a_sample_that_comes_late_is_not_used_and_counted(which: str, name: str, share: float, back: int) -> None:
+def test_late_sample_is_discarded_and_counted(which: str, name: str, share: float, back: int) -> None:
     truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
     place = min(place_in(stream, share), len(stream) - back - 8)
     order = np.r_[0:place, place + 1 : place + back + 1, place, place + back + 1 : len(stream)]
@@ -148,7 +148,7 @@ def test_a_sample_that_comes_late_is_not_used_and_counted(which: str, name: str,
 
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 40))
-def test_samples_that_come_twice_are_used_once(which: str, name: str, share: float, count: int) -> None:
+def test_repeated_samples_are_used_once(which: str, name: str, share: float, count: int) -> None:
     truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
     place = place_in(stream, share, count)
     order = np.r_[0 : place + count, place : len(stream)]
@@ -165,9 +165,7 @@ def test_samples_that_come_twice_are_used_once(which: str, name: str, share: flo
     count=st.integers(1, 3),
     ahead=st.sampled_from([5 * PERIOD, SECOND, 30 * SECOND, DAY, 3650 * DAY]),
 )
-def test_a_stamp_from_the_future_costs_its_own_sample_only(
-    which: str, name: str, share: float, count: int, ahead: int
-) -> None:
+def test_future_stamp_discards_only_its_sample(which: str, name: str, share: float, count: int, ahead: int) -> None:
     truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
     place = place_in(stream, share, 12)
     stamp = stream.stamp.copy()
@@ -179,7 +177,7 @@ def test_a_stamp_from_the_future_costs_its_own_sample_only(
 
 @pytest.mark.parametrize("name", SENSORS)
 @pytest.mark.parametrize("stamp", [0, START - 3 * DAY, START + 3 * DAY])
-def test_a_first_or_last_stamp_of_another_time_is_not_used(name: str, stamp: int) -> None:
+def test_isolated_first_or_last_stamp_is_discarded(name: str, stamp: int) -> None:
     stream = of(MADE_UP.recording, name)
     for place in (0, len(stream) - 1):
         stamps = stream.stamp.copy()
@@ -195,25 +193,25 @@ def test_a_first_or_last_stamp_of_another_time_is_not_used(name: str, stamp: int
     name=st.sampled_from(["slider", "pusher"]),
     share=PLACES,
     count=st.integers(1, 3),
-    leap=st.floats(0.03, 2.0),
-    way=st.floats(-3.2, 3.2),
+    jump=st.floats(0.03, 2.0),
+    direction=st.floats(-3.2, 3.2),
 )
-def test_a_tracker_that_leaps_there_and_back_costs_the_samples_elsewhere(
-    which: str, name: str, share: float, count: int, leap: float, way: float
+def test_jump_away_and_back_discards_only_the_samples_away(
+    which: str, name: str, share: float, count: int, jump: float, direction: float
 ) -> None:
     truth, stream = CLEAN[which], CLEAN[which].recording.__getattribute__(name)
     place = place_in(stream, share, 12)
     x, y = stream.x.copy(), stream.y.copy()
-    x[place : place + count] += leap * np.cos(way)
-    y[place : place + count] += leap * np.sin(way)
+    x[place : place + count] += jump * np.cos(direction)
+    y[place : place + count] += jump * np.sin(direction)
     windows, counts = found_in(changed(truth.recording, {name: replace(stream, x=x, y=y)}))
-    assert counts[f"{name} jumps"] in (count, count + 1)  # one more where the slider itself was put elsewhere
+    assert counts[f"{name} jumps"] in (count, count + 1)  # one more where the slider itself was repositioned
     assert_is_as_without(windows, truth, name, range(place, place + count))
 
 
 @OFTEN
 @given(which=with_wrench, name=st.sampled_from(SENSORS), share=PLACES, count=st.integers(1, 3))
-def test_a_number_that_is_none_costs_its_own_sample_only(which: str, name: str, share: float, count: int) -> None:
+def test_nan_or_infinity_discards_only_its_sample(which: str, name: str, share: float, count: int) -> None:
     truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
     place, column = place_in(stream, share, count), "fx" if name == "wrench" else "x"
     values = getattr(stream, column).copy()
@@ -224,23 +222,23 @@ def test_a_number_that_is_none_costs_its_own_sample_only(which: str, name: str, 
 
 
 def assert_is_as_without(windows: list[PushWindow], truth: Clean, name: str, places: Sequence[int]) -> None:
-    """The windows are those of the recording without some samples, and true."""
+    """The windows equal those of the recording without some samples, and are correct."""
     stream = of(truth.recording, name)
     left, _ = found_in(changed(truth.recording, {name: taken(stream, np.delete(np.arange(len(stream)), places))}))
     assert [(w.push_id, w.start) for w in windows] == [(w.push_id, w.start) for w in left]
     for found, expected in zip(windows, left, strict=True):
         assert numbers(found) == pytest.approx(numbers(expected), rel=0.0, abs=1e-9)
-    if truth is not MEASURED:  # straight lines: what lies between the samples around is exact
+    if truth is not MEASURED:  # straight lines: interpolation is exact
         stamps = stream.stamp[list(places)].tolist()
         assert_true(windows, truth, [(stamp, stamp) for stamp in stamps])
 
 
-# --- damage that cuts a push -----------------------------------------------------------------------------------------
+# --- faults that interrupt a push ------------------------------------------------------------------------------------
 
 
 @OFTEN
 @given(which=any_clean, name=st.sampled_from(SENSORS), share=PLACES, length=st.floats(0.13, 2.0))
-def test_a_dropout_of_any_stream_is_spanned_by_no_window(which: str, name: str, share: float, length: float) -> None:
+def test_no_window_spans_a_dropout_of_any_stream(which: str, name: str, share: float, length: float) -> None:
     truth = CLEAN[which]
     if truth.recording.wrench is None and name == "wrench":
         return
@@ -259,13 +257,13 @@ def test_a_dropout_of_any_stream_is_spanned_by_no_window(which: str, name: str, 
 @given(
     which=any_clean,
     share=PLACES,
-    leap=st.floats(0.03, 0.5),
-    way=st.floats(-3.2, 3.2),
+    jump=st.floats(0.03, 0.5),
+    direction=st.floats(-3.2, 3.2),
     unseen=st.sampled_from([0.0, 0.1, 0.5]),
     tip_too=st.booleans(),
 )
-def test_an_object_that_is_reset_in_mid_push_ends_it(
-    which: str, share: float, leap: float, way: float, unseen: float, tip_too: bool
+def test_reset_during_a_push_ends_it(
+    which: str, share: float, jump: float, direction: float, unseen: float, tip_too: bool
 ) -> None:
     truth = CLEAN[which]
     slider, pusher = truth.recording.slider, truth.recording.pusher
@@ -274,13 +272,13 @@ def test_an_object_that_is_reset_in_mid_push_ends_it(
 
     def put(stream: PoseStream) -> PoseStream:
         late = stream.stamp > begin
-        x, y = stream.x + leap * np.cos(way) * late, stream.y + leap * np.sin(way) * late
+        x, y = stream.x + jump * np.cos(direction) * late, stream.y + jump * np.sin(direction) * late
         return rows(replace(stream, x=x, y=y), (stream.stamp <= begin) | (stream.stamp > end))
 
     reset = replace(truth.recording, slider=put(slider), pusher=put(pusher) if tip_too else pusher)
     windows, counts = found_in(reset)
     after = int(min(reset.slider.stamp[reset.slider.stamp > begin], default=begin + DAY))
-    if after < begin + DAY and not (tip_too and unseen):  # else it may have been pushed there
+    if after < begin + DAY and not (tip_too and unseen):  # otherwise it may have been pushed there
         assert counts["resets"] >= 1
     assert all(w.end <= begin + 1 or w.start >= after for w in windows)
     if tip_too:
@@ -290,15 +288,13 @@ def test_an_object_that_is_reset_in_mid_push_ends_it(
 
 
 @OFTEN
-@given(which=any_clean, share=PLACES, leap=st.floats(0.03, 0.5), way=st.floats(-3.2, 3.2))
-def test_a_tip_that_is_seen_elsewhere_from_one_sample_on_is_followed_by_no_window_across(
-    which: str, share: float, leap: float, way: float
-) -> None:
+@given(which=any_clean, share=PLACES, jump=st.floats(0.03, 0.5), direction=st.floats(-3.2, 3.2))
+def test_no_window_spans_a_lasting_jump_of_the_tip(which: str, share: float, jump: float, direction: float) -> None:
     truth = CLEAN[which]
     pusher = truth.recording.pusher
     place = place_in(pusher, share)
     late = np.arange(len(pusher)) > place
-    moved = replace(pusher, x=pusher.x + leap * np.cos(way) * late, y=pusher.y + leap * np.sin(way) * late)
+    moved = replace(pusher, x=pusher.x + jump * np.cos(direction) * late, y=pusher.y + jump * np.sin(direction) * late)
     windows, counts = found_in(replace(truth.recording, pusher=moved))
     assert counts["pusher jumps"] >= 1
     stamps = pusher.stamp[[place, place + 1]].tolist()
@@ -308,12 +304,10 @@ def test_a_tip_that_is_seen_elsewhere_from_one_sample_on_is_followed_by_no_windo
 
 @OFTEN
 @given(which=any_clean, share=PLACES, step=st.floats(0.1, 0.9))
-def test_a_clock_that_is_put_back_by_less_than_a_second_is_spanned_by_no_window(
-    which: str, share: float, step: float
-) -> None:
+def test_no_window_spans_a_clock_set_back_by_less_than_a_second(which: str, share: float, step: float) -> None:
     truth = CLEAN[which]
     when = int(truth.recording.slider.stamp[place_in(truth.recording.slider, share)])
-    back = round(step * SECOND) + 1_234_567  # no stamp comes twice
+    back = round(step * SECOND) + 1_234_567  # no stamp is repeated
     names = [name for name in SENSORS if getattr(truth.recording, name) is not None]
 
     def put_back(stream: Stream) -> Stream:
@@ -331,7 +325,7 @@ def test_a_clock_that_is_put_back_by_less_than_a_second_is_spanned_by_no_window(
 
 @OFTEN
 @given(which=any_clean, lag=st.floats(0.3, 8.0), sign=st.sampled_from([-1, 1]), force_too=st.booleans())
-def test_clocks_of_pusher_and_slider_that_are_apart_make_no_window_and_are_told(
+def test_clock_offset_of_the_pusher_gives_no_wrong_window_and_is_reported(
     which: str, lag: float, sign: int, force_too: bool
 ) -> None:
     recording, shift = CLEAN[which].recording, sign * round(lag * SECOND)
@@ -351,7 +345,7 @@ def test_clocks_of_pusher_and_slider_that_are_apart_make_no_window_and_are_told(
 
 
 @pytest.mark.parametrize("lag", [0.2, 0.4, 1.0])
-def test_a_tip_that_seems_to_go_into_the_slider_makes_no_window(lag: float) -> None:
+def test_tip_that_enters_the_outline_gives_no_window(lag: float) -> None:
     recording, shift = translating_push(Push(2.0, 4.0)), round(lag * SECOND)
     assert recording.wrench is not None
     early = {name: replace(of(recording, name), stamp=of(recording, name).stamp - shift) for name in SENSORS[1:]}
@@ -361,7 +355,7 @@ def test_a_tip_that_seems_to_go_into_the_slider_makes_no_window(lag: float) -> N
     assert counts["inside"] == (lag > 0.3)
 
 
-def test_clocks_of_a_good_recording_are_not_apart() -> None:
+def test_clocks_of_a_sound_recording_have_no_offset() -> None:
     for truth in CLEAN.values():
         assert abs(clock_offset(truth.recording.pusher, truth.recording.slider)) < CLOCK_TOLERANCE
         words = describe_recording_faults(truth.recording, found_in(truth.recording)[1])
@@ -377,10 +371,10 @@ def test_clocks_of_a_good_recording_are_not_apart() -> None:
     portion=st.integers(1, 90),
     order=st.permutations(SENSORS),
 )
-def test_time_that_jumps_back_keeps_the_windows_of_both_times(
+def test_clock_set_back_keeps_the_windows_of_both_times(
     which: str, cut: float, to: float, portion: int, order: list[str]
 ) -> None:
-    """As a replay does that is sought, or loops: what arrives first and in what portions does not matter."""
+    """As after a seek or in a looping replay: the order of arrival and the portions do not matter."""
     truth = CLEAN[which]
     first = truth.recording.slider.stamp[0]
     span = truth.recording.slider.stamp[-1] - first
@@ -400,7 +394,7 @@ def test_time_that_jumps_back_keeps_the_windows_of_both_times(
             if name in streams:
                 share = slice(begin * len(streams[name]) // longest, (begin + portion) * len(streams[name]) // longest)
                 add[name](taken(streams[name], share))  # type: ignore[operator,arg-type] # one adder for each kind
-                if begin:  # those that come later still tell the old time
+                if begin:  # those that follow still have the old time
                     windows += finder.take_ready()
     windows += finder.finish()
     assert_true(windows, truth, [])
@@ -408,11 +402,11 @@ def test_time_that_jumps_back_keeps_the_windows_of_both_times(
         assert finder.counts["clock_set_back"] == 1
         expected = [w.start for w in found_in(changed(truth.recording, until))[0]]
         assert [w.start for w in windows][: len(expected)] == expected
-        anew = [w for w in truth.windows if w.start >= back]
-        assert len(windows) - len(expected) >= len(anew) - 3  # a push that begins before it is tiled from there
+        later = [w for w in truth.windows if w.start >= back]
+        assert len(windows) - len(expected) >= len(later) - 3  # a push that begins before it is tiled from there
 
 
-def test_one_clock_that_is_set_back_alone_does_not_stop_the_others() -> None:
+def test_single_clock_set_back_does_not_block_the_other_streams() -> None:
     recording = translating_push(Push(0.5, 90.0))
     assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
@@ -432,6 +426,6 @@ def test_one_clock_that_is_set_back_alone_does_not_stop_the_others() -> None:
     assert_true(windows, clean(recording), [(START + 20 * SECOND, START + 1000 * SECOND)])
 
 
-def test_every_count_is_explained() -> None:
+def test_every_count_has_a_description() -> None:
     _, counts = found_in(MADE_UP.recording)
     assert set(counts) == set(FAULTS)

@@ -1,4 +1,4 @@
-"""Angles and planar frames: rigid motions undo each other and keep lengths."""
+"""Angles and planar frames: rigid motions are invertible and preserve lengths."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ poses = arrays(np.float64, (5, 3), elements=st.floats(-4.0, 4.0))
 
 
 @given(angles)
-def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(angle):
+def test_wrapped_angle_has_the_same_direction_within_half_a_turn(angle):
     wrapped = float(wrap_angle(np.array(angle)))
     assert -np.pi <= wrapped < np.pi
     assert [np.cos(wrapped), np.sin(wrapped)] == pytest.approx([np.cos(angle), np.sin(angle)], abs=1e-12)
@@ -45,19 +45,19 @@ def test_rotations_add_up_and_keep_lengths(vectors, first, second):
 
 
 @given(points, poses)
-def test_body_and_world_frames_undo_each_other(here, at):
+def test_body_and_world_transforms_are_inverse(here, at):
     assert to_world(to_body(here, at), at) == pytest.approx(here, abs=1e-12)
     assert to_body(to_world(here, at), at) == pytest.approx(here, abs=1e-12)
 
 
-def test_a_point_ahead_of_a_body_that_faces_left_is_left_of_it_in_the_world():
+def test_point_ahead_of_a_body_facing_left_is_to_its_left_in_the_world():
     pose = np.array([1.0, 2.0, np.pi / 2])
     assert to_world(np.array([0.5, 0.0]), pose) == pytest.approx([1.0, 2.5])
     assert to_body(np.array([1.0, 2.5]), pose) == pytest.approx([0.5, 0.0])
 
 
 @given(st.floats(-3.1, 3.1))
-def test_a_yaw_survives_its_quaternion(yaw):
+def test_yaw_is_recovered_from_its_quaternion(yaw):
     z, w = quaternion_of_yaw(np.array(yaw))
     zero = np.zeros(())
     assert z**2 + w**2 == pytest.approx(1.0)

@@ -25,7 +25,7 @@ GRID = (np.arange(400) + 0.37) / 400
 
 
 @EVERY_OUTLINE
-def test_contacts_run_counter_clockwise_at_even_speed(outline):
+def test_contacts_are_counter_clockwise_and_proportional_to_arc_length(outline):
     fine = np.arange(4000) / 4000
     points = outline.point(fine)
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -37,19 +37,19 @@ def test_contacts_run_counter_clockwise_at_even_speed(outline):
 
 
 @EVERY_OUTLINE
-def test_the_first_contact_is_the_first_vertex(outline):
+def test_first_contact_is_the_first_vertex(outline):
     assert outline.point(np.zeros(1))[0] == pytest.approx(outline.vertices[0], abs=1e-9)
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.0525, 0.0525), (0.0785, 0.0525), (0.03, 0.06)])
-def test_perimeter_and_area_of_an_ellipse_are_those_of_the_curve(a, b):
+def test_perimeter_and_area_of_an_ellipse_equal_those_of_the_curve(a, b):
     outline, large, small = ellipse(a, b), max(a, b), min(a, b)
     assert outline.perimeter == pytest.approx(4.0 * large * ellipe(1.0 - (small / large) ** 2), rel=1e-6)
     assert outline.area == pytest.approx(np.pi * a * b)
 
 
 @EVERY_OUTLINE
-def test_inward_normals_have_length_one_stand_on_the_outline_and_point_in(outline):
+def test_inward_normals_are_perpendicular_unit_vectors_into_the_slider(outline):
     normal, point = outline.inward_normal(GRID), outline.point(GRID)
     along = outline.point(GRID + 1e-6) - outline.point(GRID - 1e-6)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -61,7 +61,7 @@ def test_inward_normals_have_length_one_stand_on_the_outline_and_point_in(outlin
 
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 @pytest.mark.parametrize("offset", [-0.002, 0.0, 0.003])
-def test_a_point_off_the_outline_projects_back_to_its_contact(outline, offset):
+def test_point_off_the_outline_projects_back_to_its_contact(outline, offset):
     near_corner = np.min(np.abs(GRID[:, None] - outline.edge_starts[None]), axis=1) * outline.perimeter < 0.006
     contact = GRID if outline.semi_axes is not None else GRID[~near_corner]
     foot = outline.point(contact)
@@ -87,7 +87,7 @@ def test_no_boundary_point_is_nearer_than_the_projection(outline, x, y):
 
 @settings(max_examples=200, deadline=None)
 @given(some_outline, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
-def test_outside_the_normal_points_from_the_nearest_point_to_the_query(outline, x, y):
+def test_normal_outside_points_from_the_nearest_point_to_the_query(outline, x, y):
     point = np.array([[x, y]])
     found = outline.project(point)
     if found.distance[0] > 1e-6:
@@ -95,7 +95,7 @@ def test_outside_the_normal_points_from_the_nearest_point_to_the_query(outline, 
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.0785, 0.0525), (0.0525, 0.0525), (0.03, 0.06), (0.1, 0.02)])
-def test_an_ellipse_is_projected_on_from_deep_inside_and_from_its_axes(a, b):
+def test_projection_on_an_ellipse_works_deep_inside_and_on_its_axes(a, b):
     outline, draw = ellipse(a, b), np.random.default_rng(0).uniform(-0.12, 0.12, (400, 2))
     points = np.vstack([draw, draw * [1.0, 0.0], draw * [0.0, 1.0], draw * [1.0, 1e-5], np.zeros((1, 2))])
     boundary = outline.point(np.arange(2000) / 2000)
@@ -105,7 +105,7 @@ def test_an_ellipse_is_projected_on_from_deep_inside_and_from_its_axes(a, b):
     assert np.linalg.norm(found.point - points, axis=1) == pytest.approx(np.abs(found.distance), abs=1e-9)
 
 
-def test_at_a_corner_the_normal_turns_from_one_edge_to_the_next():
+def test_normal_at_a_corner_turns_from_one_edge_to_the_next():
     outline, corner = square(0.09), np.array([-0.045, -0.045])
     angles = np.linspace(np.pi, 1.5 * np.pi, 9)[1:-1]
     found = outline.project(corner + 0.005 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
@@ -118,7 +118,7 @@ def test_at_a_corner_the_normal_turns_from_one_edge_to_the_next():
 @CONVEX
 @given(st.floats(0.001, 0.02), contacts)
 @settings(max_examples=30, deadline=None)
-def test_sliding_along_changes_the_distance_by_nothing(name, radius, contact):
+def test_distance_is_constant_along_an_edge(name, radius, contact):
     outline = OUTLINES[name]
     at = outline.point(np.array([contact])) - radius * outline.inward_normal(np.array([contact]))
     assert outline.project(at).distance[0] == pytest.approx(radius, abs=1e-9)
@@ -126,7 +126,7 @@ def test_sliding_along_changes_the_distance_by_nothing(name, radius, contact):
 
 @settings(deadline=None)
 @given(some_outline, contacts)
-def test_edge_and_fraction_make_the_contact(outline, contact):
+def test_contact_is_recovered_from_edge_and_fraction(outline, contact):
     edge, fraction = outline.edge(np.array([contact]))
     assert 0.0 <= fraction[0] <= 1.0
     assert outline.contact_on_edge(int(edge[0]), float(fraction[0])) == pytest.approx(contact, abs=1e-12)
@@ -138,7 +138,7 @@ def test_edges_of_a_polygon_share_the_perimeter_by_their_length():
 
 
 @EVERY_OUTLINE
-def test_the_end_of_an_edge_stays_on_that_edge(outline):
+def test_end_of_an_edge_belongs_to_that_edge(outline):
     for edge in range(len(outline.edge_starts) - 1):
         contact = outline.contact_on_edge(edge, 1.0)
         assert outline.edge(np.array([contact]))[0][0] == edge
@@ -153,14 +153,14 @@ def test_rotational_symmetry(name, order):
     assert OUTLINES[name].rotational_symmetry == order
 
 
-def test_a_rectangle_has_half_turn_symmetry_and_an_off_centre_square_none():
+def test_rectangle_has_half_turn_symmetry_and_an_off_centre_square_none():
     rectangle = np.array([[-0.06, 0.03], [-0.06, -0.03], [0.06, -0.03], [0.06, 0.03]])
     assert Outline(rectangle).rotational_symmetry == 2
     assert Outline(square(0.09).vertices + 0.01).rotational_symmetry == 1
 
 
 @pytest.mark.parametrize("name", ["rect1", "ellip3", "hex"])
-def test_a_symmetric_outline_repeats_after_its_share_of_the_perimeter(name):
+def test_symmetric_outline_repeats_after_a_fraction_of_the_perimeter(name):
     outline = OUTLINES[name]
     turn = np.array(2.0 * np.pi / outline.rotational_symmetry)
     later = (GRID + 1.0 / outline.rotational_symmetry) % 1.0
@@ -169,18 +169,18 @@ def test_a_symmetric_outline_repeats_after_its_share_of_the_perimeter(name):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_shapes_of_the_set_lie_about_their_centroid(name):
+def test_origin_of_the_shapes_is_their_centroid(name):
     assert shape_outline(name).centroid == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
-def test_the_centroid_moves_with_the_outline():
+def test_centroid_moves_with_the_outline():
     assert TRIANGLE.centroid == pytest.approx([0.0, 0.0], abs=1e-15)
     assert Outline(TRIANGLE.vertices + [0.3, -0.2]).centroid == pytest.approx([0.3, -0.2])
     parts = np.array([[0.05, 0.02], [0.02, 0.07]]), np.array([0.1 * 0.04, 0.04 * 0.06])
     assert ELL.centroid == pytest.approx(np.average(parts[0], axis=0, weights=parts[1]))
 
 
-def test_the_first_edge_of_the_square_faces_the_negative_x_axis():
+def test_first_edge_of_the_square_faces_the_negative_x_axis():
     outline = shape_outline("rect1")
     assert outline.inward_normal(np.array([0.125]))[0] == pytest.approx([1.0, 0.0])
     assert outline.point(np.array([0.125]))[0] == pytest.approx([-0.045, 0.0])
@@ -195,11 +195,11 @@ def test_the_first_edge_of_the_square_faces_the_negative_x_axis():
         ([[0.0, 0.0], [1.0, np.nan], [0.0, 1.0]], "not finite"),
     ],
 )
-def test_an_outline_that_is_none_is_refused(vertices, message):
+def test_invalid_outline_is_rejected(vertices, message):
     with pytest.raises(RigError, match=message):
         Outline(np.array(vertices))
 
 
-def test_an_unknown_shape_is_refused_by_name():
+def test_unknown_shape_is_rejected_by_name():
     with pytest.raises(RigError, match="heptagon"):
         shape_outline("heptagon")

@@ -1,4 +1,4 @@
-"""Foreign recordings come in whole, in the contract's frames, and every repair is told; what is broken is refused."""
+"""Importers write complete recordings in the contract's frames, report every repair and reject invalid files."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ START = 1_460_088_637.25
 
 
 def _jumping(size: float, spread: int, at: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, the true heading and one with a jump of `size` that takes `spread` samples in between."""
+    """Times, the true heading and one with a jump of `size` over `spread` intermediate samples."""
     time = 0.004 * np.arange(120)
     true = 0.3 + 0.8 * time
     steps = np.clip((np.arange(120) - at + 1) / (spread + 1), 0.0, 1.0)
@@ -43,7 +43,7 @@ def _jumping(size: float, spread: int, at: int = 60) -> tuple[np.ndarray, np.nda
 
 @pytest.mark.parametrize("spread", [0, 2])
 @pytest.mark.parametrize("quarters", [-1, 1, 2])
-def test_a_jump_by_quarter_turns_is_undone_on_a_square(quarters: int, spread: int) -> None:
+def test_heading_jump_by_quarter_turns_is_undone_on_a_square(quarters: int, spread: int) -> None:
     time, true, jumping = _jumping(quarters * np.pi / 2, spread)
     repair = repair_heading(time, jumping, symmetry=4)
     difference = (repair.heading - true)[repair.keep]
@@ -52,7 +52,7 @@ def test_a_jump_by_quarter_turns_is_undone_on_a_square(quarters: int, spread: in
     assert np.ptp(difference) < 0.05, "one heading, off by whole turns of the symmetry at most"
 
 
-def test_a_jump_that_the_symmetry_does_not_explain_cuts_the_stream_and_the_longer_piece_stays() -> None:
+def test_heading_jump_against_the_symmetry_keeps_the_longer_piece() -> None:
     time, _, jumping = _jumping(np.pi / 2, spread=1, at=40)
     repair = repair_heading(time, jumping, symmetry=6)
     kept = np.flatnonzero(repair.keep)
@@ -60,7 +60,7 @@ def test_a_jump_that_the_symmetry_does_not_explain_cuts_the_stream_and_the_longe
     assert kept[0] >= 40 and kept[-1] == 119 and len(kept) == kept[-1] - kept[0] + 1
 
 
-def test_half_a_turn_is_nothing_to_an_ellipse_and_any_quarter_is_nothing_to_a_circle() -> None:
+def test_ellipse_is_symmetric_under_half_turns_and_circle_under_all() -> None:
     for size, symmetry in ((np.pi, 2), (np.pi / 2, 0)):
         time, _, jumping = _jumping(size, spread=0)
         assert repair_heading(time, jumping, symmetry).undone == 1
@@ -68,7 +68,7 @@ def test_half_a_turn_is_nothing_to_an_ellipse_and_any_quarter_is_nothing_to_a_ci
 
 
 @given(st.floats(-12.0, 12.0), st.floats(-10.0, 10.0))
-def test_a_heading_that_only_turns_is_kept_however_far_it_turns(start: float, speed: float) -> None:
+def test_continuous_heading_is_kept_over_many_turns(start: float, speed: float) -> None:
     time = 0.004 * np.arange(300)
     true = start + speed * time
     repair = repair_heading(time, wrap_angle(true), symmetry=4)
@@ -76,7 +76,7 @@ def test_a_heading_that_only_turns_is_kept_however_far_it_turns(start: float, sp
     np.testing.assert_allclose(np.diff(repair.heading), np.diff(true), atol=1e-9)
 
 
-def test_rows_are_sorted_and_repeated_stamps_dropped_and_both_are_told() -> None:
+def test_rows_are_sorted_without_repeated_stamps_and_both_are_reported() -> None:
     notes = Notes()
     samples = Samples(np.array([10, 30, 20, 20, 40]), np.array([[1.0], [3.0], [2.0], [9.0], [np.nan]]))
     clean = in_order(samples, "FILE", notes)
@@ -87,13 +87,13 @@ def test_rows_are_sorted_and_repeated_stamps_dropped_and_both_are_told() -> None
     )
 
 
-def test_of_a_stair_only_the_first_row_of_each_step_stays_and_rest_keeps_the_pace_of_the_steps() -> None:
+def test_only_the_first_of_repeated_positions_is_kept() -> None:
     x = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0])
     kept = without_repeats(Samples(np.arange(14), x[:, None]), "tip", Notes())
     assert kept.stamp.tolist() == [0, 2, 4, 6, 8, 11, 12]
 
 
-def test_a_stream_without_stairs_keeps_its_rest() -> None:
+def test_rest_is_kept_in_a_stream_without_repeated_positions() -> None:
     x = np.concatenate([np.zeros(9), np.arange(1.0, 20.0), np.full(9, 19.0)])
     assert len(without_repeats(Samples(np.arange(37), x[:, None]), "tip", Notes()).stamp) == 37
 
@@ -104,7 +104,7 @@ def test_unix_seconds_keep_their_precision(seconds: float) -> None:
 
 
 @given(st.floats(-2.5, 2.5), st.floats(0.5, 3.0))
-def test_a_heading_survives_the_loss_of_the_sign_of_qw(start: float, turned: float) -> None:
+def test_heading_is_recovered_without_the_sign_of_qw(start: float, turned: float) -> None:
     true = np.linspace(start, start + turned, 600)
     quaternion = np.column_stack([np.zeros(600), np.zeros(600), np.sin(true / 2)])
     np.testing.assert_allclose(headings(quaternion), true, atol=1e-6)
@@ -135,7 +135,7 @@ def _write_mit(folder: Path, streams: dict[str, object], shape: str = "rect1", p
     return path
 
 
-def test_an_mit_file_becomes_a_recording_that_reads_back(tmp_path: Path) -> None:
+def test_mit_file_becomes_a_readable_recording(tmp_path: Path) -> None:
     report = import_source("mit", [_write_mit(tmp_path, _mit_streams())], tmp_path / "out")
     recording = read_recording(report.written[0])
     assert report.recordings == report.pushes == 1
@@ -162,7 +162,7 @@ def test_hdf5_gives_the_same_recording_as_json(tmp_path: Path) -> None:
     np.testing.assert_array_equal(one.pusher.x, two.pusher.x)
 
 
-def test_a_folder_and_a_zip_are_read_through_and_a_broken_file_in_them_is_told(tmp_path: Path) -> None:
+def test_damaged_file_in_a_folder_or_zip_is_reported(tmp_path: Path) -> None:
     source = tmp_path / "set" / "deeper"
     source.mkdir(parents=True)
     _write_mit(source, _mit_streams(), push=0)
@@ -174,7 +174,7 @@ def test_a_folder_and_a_zip_are_read_through_and_a_broken_file_in_them_is_told(t
     assert len(report.dropped) == 1 and f"{_mit_name(push=1)}.json:2" in report.dropped[0]
 
 
-def test_the_quirks_of_the_set_are_repaired_and_told(tmp_path: Path) -> None:
+def test_irregularities_of_the_mit_set_are_repaired_and_reported(tmp_path: Path) -> None:
     streams = _mit_streams()
     streams["tip_pose"].insert(10, list(streams["tip_pose"][9]))
     streams["ft_wrench"][20], streams["ft_wrench"][21] = streams["ft_wrench"][21], streams["ft_wrench"][20]
@@ -189,7 +189,7 @@ def test_the_quirks_of_the_set_are_repaired_and_told(tmp_path: Path) -> None:
     assert any("object_pose: 1 jumps" in line for line in report.repaired)
 
 
-def test_without_forces_a_push_is_still_a_recording_without_a_pose_it_is_not(tmp_path: Path) -> None:
+def test_forces_are_optional_and_poses_are_required(tmp_path: Path) -> None:
     streams: dict[str, object] = {**_mit_streams(), "ft_wrench": []}
     report = import_source("mit", [_write_mit(tmp_path, streams)], tmp_path / "out")
     assert read_recording(report.written[0]).wrench is None
@@ -199,7 +199,7 @@ def test_without_forces_a_push_is_still_a_recording_without_a_pose_it_is_not(tmp
         import_source("mit", [_write_mit(tmp_path, streams)], tmp_path / "out2")
 
 
-def test_an_unknown_shape_is_named_and_a_rig_takes_its_place(tmp_path: Path) -> None:
+def test_unknown_shape_is_rejected_unless_a_rig_is_given(tmp_path: Path) -> None:
     path = _write_mit(tmp_path, _mit_streams(), shape="butter")
     with pytest.raises(ImportSourceError, match=r"'butter'.*rect1.*--rig"):
         import_source("mit", [path], tmp_path / "out")
@@ -221,7 +221,7 @@ def test_an_unknown_shape_is_named_and_a_rig_takes_its_place(tmp_path: Path) -> 
         ("\n\n{", ":3: not JSON"),
     ],
 )
-def test_what_is_no_file_of_the_set_is_refused_with_its_place(tmp_path: Path, content: str, words: str) -> None:
+def test_invalid_mit_file_is_rejected_with_the_position(tmp_path: Path, content: str, words: str) -> None:
     path = tmp_path / f"{_mit_name()}.json"
     path.write_text(content)
     with pytest.raises(ImportSourceError, match=words) as caught:
@@ -230,7 +230,7 @@ def test_what_is_no_file_of_the_set_is_refused_with_its_place(tmp_path: Path, co
     assert not (tmp_path / "out").exists(), "nothing half-written"
 
 
-def test_damaged_archives_and_hdf5_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_archives_and_hdf5_files_are_rejected(tmp_path: Path) -> None:
     for name in ("broken.zip", f"{_mit_name()}.h5", f"{_mit_name()}.txt"):
         (tmp_path / name).write_bytes(b"PK\x03\x04 no archive \x89HDF")
         with pytest.raises(ImportSourceError, match=r"cannot be read|suffix"):
@@ -258,7 +258,7 @@ def _square_csv(path: Path, columns: dict[str, list[float]] = SQUARE) -> Path:
     return path
 
 
-def test_the_square_table_turns_dy_and_keeps_edge_0_from_npz_and_csv_alike(tmp_path: Path) -> None:
+def test_square_table_reverses_dy_and_uses_edge_0(tmp_path: Path) -> None:
     np.savez(tmp_path / "pushes_a.npz", **{name: np.array(column) for name, column in SQUARE.items()})
     sources = [tmp_path / "pushes_a.npz", _square_csv(tmp_path / "pushes_b.csv.gz")]
     report = import_source("mit-square", sources, tmp_path / "out")
@@ -275,7 +275,7 @@ def test_the_square_table_turns_dy_and_keeps_edge_0_from_npz_and_csv_alike(tmp_p
         assert table.push_id.tolist() == ["3", "3", "12"] and table.covariates["row_id"].tolist() == [0, 7, 9]
 
 
-def test_a_faulty_square_table_is_refused_with_line_or_index(tmp_path: Path) -> None:
+def test_invalid_square_table_is_rejected_with_line_or_index(tmp_path: Path) -> None:
     bad = {**SQUARE, "dx": [0.004, "x", 0.002]}
     with pytest.raises(ImportSourceError, match=r"csv\.gz:3: dx_m is 'x'"):
         import_source("mit-square", [_square_csv(tmp_path / "t.csv.gz", bad)], tmp_path / "out")
@@ -301,7 +301,7 @@ def _quaternion(yaw: float) -> str:
 
 
 def _mlab_push(start: float = 1.4e9, forces: int = 60, poses: int = 80, y: float = 75.0) -> list[str]:
-    """The finger drives along -x of the world into the hypotenuse of a triangle that lies turned by 30 degrees."""
+    """The finger moves along -x of the world into the hypotenuse of a triangle rotated by 30 degrees."""
     yaw, turned = np.pi / 6, np.pi / 6 + 0.05
     tip_body = np.array([100.0, y - 25.0]) + 2.5 * np.array([1.0, 1.0]) / np.sqrt(2.0)
     tip = rotate(tip_body, np.array(yaw)) + np.array([600.0, 10.0])
@@ -321,7 +321,7 @@ def _write_log(folder: Path, lines: list[str], name: str = "exp_1.txt") -> Path:
     return folder / name
 
 
-def test_a_logged_push_becomes_a_row_whose_velocity_times_duration_is_the_travel_in_contact(tmp_path: Path) -> None:
+def test_velocity_times_duration_of_a_logged_push_is_its_travel_in_contact(tmp_path: Path) -> None:
     path = _write_log(tmp_path / "wood_30_90_30_30_30_90", ["1", *_mlab_push()])
     report = import_source("mlab", [path], tmp_path / "out")
     table = read_table(report.written[0])
@@ -340,13 +340,13 @@ def test_a_logged_push_becomes_a_row_whose_velocity_times_duration_is_the_travel
     assert table.covariates["normal_force"][0] != 0.0
 
 
-def test_quirks_of_the_logs_are_told_and_the_rest_is_kept(tmp_path: Path) -> None:
+def test_irregularities_of_mlab_logs_are_reported(tmp_path: Path) -> None:
     away = _mlab_push(1.4e9 + 100.0)
     away[0] = away[0].replace("600 10", "603 10", 1)
     lines = ["5", *_mlab_push(), *_mlab_push(1.4e9 - 50.0, forces=0), *_mlab_push(1.4e9 + 50.0, 2, 2), *away]
     report = import_source("mlab", [_write_log(tmp_path / "old", [*lines, *_mlab_push()[:30]])], tmp_path / "out")
     table = read_table(report.written[0])
-    told = "\n".join([*report.dropped, *report.repaired, *report.assumed])
+    text = "\n".join([*report.dropped, *report.repaired, *report.assumed])
     assert table.push_id.tolist() == ["old_exp_1/0", "old_exp_1/1", "old_exp_1/3"]
     np.testing.assert_allclose(table.covariates["elapsed_time"], [50.0, 0.0, 150.0], atol=1e-6)
     assert np.isnan(table.covariates["normal_force"]).tolist() == [False, True, False]
@@ -359,10 +359,10 @@ def test_quirks_of_the_logs_are_told_and_the_rest_is_kept(tmp_path: Path) -> Non
         "moved by hand",
         "contains no configuration",
     ):
-        assert words in told, words
+        assert words in text, words
 
 
-def test_a_log_without_a_count_is_read_to_its_end(tmp_path: Path) -> None:
+def test_log_without_a_count_is_read_to_its_end(tmp_path: Path) -> None:
     report = import_source("mlab", [_write_log(tmp_path / "patch", [*_mlab_push(), *_mlab_push()])], tmp_path / "out")
     assert report.pushes == 2 and any("number of pushes is missing" in line for line in report.repaired)
     assert load_rig(report.written[1]).support_points is None
@@ -372,7 +372,7 @@ def test_a_log_without_a_count_is_read_to_its_end(tmp_path: Path) -> None:
     ("line", "text", "words"),
     [(5, "1 2", ":5: '1 2', expected force: 3"), (4, "1.5", ":4: 1.5"), (4, "-1", ":4"), (2, "a b", ":2: 'a b'")],
 )
-def test_a_broken_line_of_a_log_is_refused_with_its_number(tmp_path: Path, line: int, text: str, words: str) -> None:
+def test_invalid_line_of_a_log_is_rejected_with_its_number(tmp_path: Path, line: int, text: str, words: str) -> None:
     lines = ["1", *_mlab_push()]
     lines[line - 1] = text
     with pytest.raises(ImportSourceError, match=words):
@@ -380,14 +380,14 @@ def test_a_broken_line_of_a_log_is_refused_with_its_number(tmp_path: Path, line:
     assert not (tmp_path / "out").exists()
 
 
-def test_the_load_shares_of_three_points_balance_the_weight() -> None:
+def test_load_shares_of_three_points_balance_the_weight() -> None:
     points = np.array([[-0.04, -0.04], [0.04, -0.02], [-0.04, 0.08]])
     np.testing.assert_allclose(load_shares(points), [0.25, 0.5, 0.25], atol=1e-12)
     np.testing.assert_allclose(load_shares(points) @ points, 0.0, atol=1e-12)
 
 
 @given(st.floats(0.05, 0.95), st.integers(0, 2), st.floats(-1.0, 1.0), st.floats(0.001, 0.02))
-def test_the_first_touch_is_where_the_path_was_aimed(fraction: float, edge: int, angle: float, away: float) -> None:
+def test_first_touch_is_where_the_path_meets_the_outline(fraction: float, edge: int, angle: float, away: float) -> None:
     outline = triangle()
     contact = np.array([float(outline.contact_on_edge(edge, fraction))])
     direction = rotate(outline.inward_normal(contact)[0], np.array(angle))
@@ -412,7 +412,7 @@ def _write_mcube(folder: Path, tip_stop: int = 200) -> Path:
     return folder
 
 
-def test_an_mcube_run_comes_into_one_frame_on_one_clock_with_the_force_against_the_push(tmp_path: Path) -> None:
+def test_mcube_run_has_one_frame_and_clock_and_a_force_against_the_push(tmp_path: Path) -> None:
     report = import_source("mcube", [_write_mcube(tmp_path / "St_block")], tmp_path / "out")
     recording = read_recording(report.written[0])
     rig, wrench = recording.rig, recording.wrench
@@ -424,12 +424,12 @@ def test_an_mcube_run_comes_into_one_frame_on_one_clock_with_the_force_against_t
     pushing = wrench.stamp > wrench.stamp[0] + 1_500_000_000
     np.testing.assert_allclose(wrench.fy[pushing], -2.0, atol=1e-6)
     np.testing.assert_allclose(wrench.fx, 0.0, atol=1e-6)
-    told = "\n".join([*report.dropped, *report.repaired, *report.assumed])
+    text = "\n".join([*report.dropped, *report.repaired, *report.assumed])
     for words in ("stops 2.0 s before", "15 ms late", "not measured", "surface unknown", "tared by 0.100, -2.100 N"):
-        assert words in told, words
+        assert words in text, words
 
 
-def test_a_broken_mcube_file_is_refused_with_its_line_and_a_cut_one_is_told(tmp_path: Path) -> None:
+def test_invalid_mcube_file_is_rejected_with_its_line_and_a_truncated_one_is_reported(tmp_path: Path) -> None:
     folder = _write_mcube(tmp_path / "St_block")
     ft = folder / "metal_1_ft.txt"
     lines = ft.read_text().splitlines()
@@ -483,7 +483,7 @@ def _write_bag(path: Path, topics: dict[str, tuple[str, str | None, list[dict[st
 
 
 def _filled(store: Any, kind: str, values: dict[str, object]) -> Any:
-    """A message of zeros with some values set; 'body' (x, y, qx, qy, qz, qw) stands for one pose of a list."""
+    """A message of zeros with some values set; 'body' (x, y, qx, qy, qz, qw) is a pose in a list."""
     message = _zeros(store, kind)
     for place, value in values.items():
         *path, last = place.split(".")
@@ -517,7 +517,7 @@ def _stamp(seconds: float, lead: float = 0.0) -> dict[str, object]:
     return {"t": seconds, "header.stamp.sec": whole, "header.stamp.nanosec": round((seconds + lead - whole) * 1e9)}
 
 
-def test_an_mcube_bag_gives_the_frames_of_the_text_files(tmp_path: Path) -> None:
+def test_mcube_bag_has_the_frames_of_the_text_files(tmp_path: Path) -> None:
     start, half = 1_439_494_853.0, np.sqrt(0.5)
     body, force, tip = [], [], []
     for k in range(300):
@@ -542,7 +542,7 @@ def test_an_mcube_bag_gives_the_frames_of_the_text_files(tmp_path: Path) -> None
     assert recording.wrench.fy[250] == pytest.approx(-2.0) and recording.wrench.fx[250] == pytest.approx(0.0)
 
 
-def test_an_mlab_bag_uses_the_bags_clock_and_gets_no_rig_of_its_own(tmp_path: Path) -> None:
+def test_mlab_bag_uses_bag_time_and_has_no_rig(tmp_path: Path) -> None:
     mocap, force, robot = [], [], []
     for k in range(240):
         at, x = 1_435_287_970.0 + 0.01667 * k, 500.0 + max(0.0, 0.1 * (k - 80))
@@ -565,12 +565,12 @@ def test_an_mlab_bag_uses_the_bags_clock_and_gets_no_rig_of_its_own(tmp_path: Pa
     np.testing.assert_allclose(recording.slider.heading, np.pi / 2, atol=1e-9)
     assert recording.wrench.stamp[0] == recording.slider.stamp[0] == recording.pusher.stamp[0]
     assert recording.wrench.fx[-1] == pytest.approx(-0.7) and recording.wrench.fy[-1] == pytest.approx(0.0)
-    told = "\n".join([*report.dropped, *report.repaired, *report.assumed])
+    text = "\n".join([*report.dropped, *report.repaired, *report.assumed])
     for words in ("1 of 240 frames", "by 364.500 s", "without a push_rig record", "--rig"):
-        assert words in told, words
+        assert words in text, words
 
 
-def test_other_and_damaged_bags_are_refused(tmp_path: Path) -> None:
+def test_unknown_and_damaged_bags_are_rejected(tmp_path: Path) -> None:
     force = ("geometry_msgs/msg/WrenchStamped", None, [_stamp(1.0 + 0.1 * k) for k in range(20)])
     path = _write_bag(tmp_path / "other.bag", {"/netft_data": force})
     with pytest.raises(ImportSourceError, match=r"topics found: /netft_data .*accepted: mcube .*mlab"):
@@ -585,7 +585,7 @@ def test_other_and_damaged_bags_are_refused(tmp_path: Path) -> None:
 # --- all kinds ----------------------------------------------------------------------------------------------------
 
 
-def test_nothing_is_written_over_and_one_failure_writes_nothing(tmp_path: Path) -> None:
+def test_import_overwrites_nothing_and_a_failure_writes_nothing(tmp_path: Path) -> None:
     good, out = _write_mit(tmp_path, _mit_streams()), tmp_path / "out"
     import_source("mit", [good], out)
     with pytest.raises(ImportSourceError, match="exists already"):
@@ -598,7 +598,7 @@ def test_nothing_is_written_over_and_one_failure_writes_nothing(tmp_path: Path) 
     assert not (tmp_path / "out2").exists()
 
 
-def test_an_unknown_kind_and_an_empty_call_are_refused(tmp_path: Path) -> None:
+def test_unknown_kind_and_missing_source_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ImportSourceError, match=r"'mitt'.*mit-square"):
         import_source("mitt", [tmp_path], tmp_path / "out")
     with pytest.raises(ImportSourceError, match="no source"):
@@ -608,7 +608,7 @@ def test_an_unknown_kind_and_an_empty_call_are_refused(tmp_path: Path) -> None:
             import_source(kind, [tmp_path], tmp_path / "out")
 
 
-def test_a_report_is_json_and_words(tmp_path: Path) -> None:
+def test_report_has_json_and_text(tmp_path: Path) -> None:
     report = import_source("mit", [_write_mit(tmp_path, _mit_streams())], tmp_path / "out")
     content = json.loads(json.dumps(report.to_json()))
     assert content["recordings"] == 1 and content["written"] == [str(report.written[0])]

@@ -1,4 +1,4 @@
-"""What holds for every push, every pose and every way to sample it, whichever hypothesis thinks of.
+"""Properties of every push, pose and sampling, checked by hypothesis.
 
 Round trips of single messages are in test_msg_adapters.py, rigid motions of the world in test_windows.py, sides of a
 square in test_push_model.py and test_served_model.py: here is what these leave open.
@@ -59,7 +59,7 @@ def windows_of(recording: Recording) -> list[PushWindow]:
 
 
 def through_messages(recording: Recording) -> Recording:
-    """What a node that subscribes gets: every sample a message on the wire, headings as quaternions."""
+    """The recording as a subscribing node receives it: serialized messages, headings as quaternions."""
     wrench = recording.wrench
     assert wrench is not None
     forces = zip(wrench.stamp.tolist(), wrench.fx, wrench.fy, wrench.torque, strict=True)
@@ -85,10 +85,10 @@ def received(kind: SampleRules, messages: list[PoseStamped] | list[WrenchStamped
 
 @settings(max_examples=15, deadline=None)
 @given(shift=st.tuples(METRES, METRES), turn=TURNS, contact=st.floats(0.0, 0.999))
-def test_windows_survive_the_messages_wherever_the_world_frame_lies(
+def test_windows_are_the_same_after_ros_messages_in_any_world_frame(
     shift: tuple[float, float], turn: float, contact: float
 ) -> None:
-    """Any turn: also one at which the quaternion's heading jumps by a whole turn in the middle of a push."""
+    """Any rotation, also one with which the heading wraps during a push."""
     here = translating_push(contact=contact)
     there = through_messages(moved(here, np.array(shift), turn))
     for a, b in zip(windows_of(here), windows_of(there), strict=True):
@@ -106,7 +106,7 @@ def simulated() -> Recording:
 
 
 def mirrored(recording: Recording) -> Recording:
-    """Seen in a mirror along the world's x axis, through messages."""
+    """The mirror image about the world's x axis, through messages."""
     wrench = recording.wrench
     assert wrench is not None
     there = replace(
@@ -120,7 +120,7 @@ def mirrored(recording: Recording) -> Recording:
 
 @settings(max_examples=4, deadline=None)
 @given(turn=TURNS)
-def test_the_mirror_image_of_a_recording_has_the_mirror_images_of_its_windows(turn: float) -> None:
+def test_mirrored_recording_has_mirrored_windows(turn: float) -> None:
     outline = shape_outline("rect1")
     here, there = simulated(), mirrored(moved(simulated(), np.zeros(2), turn))
     windows = windows_of(here)
@@ -134,7 +134,7 @@ def test_the_mirror_image_of_a_recording_has_the_mirror_images_of_its_windows(tu
         assert a.covariates["tangential_force"] == pytest.approx(-b.covariates["tangential_force"], abs=1e-9)
 
 
-# --- windows: how finely the streams were sampled --------------------------------------------------------------------
+# --- windows: sampling rates of the streams ------ --------------------------------------------------------------------
 
 RATES = st.floats(60.0, 1000.0)
 
@@ -153,7 +153,7 @@ def test_windows_do_not_depend_on_the_rates_of_the_streams(
     for k, (a, b) in enumerate(zip(expected, found, strict=True)):
         assert (a.start - b.start) * 1e-9 == pytest.approx(0.0, abs=sample)
         assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-6)
-        # The slider sets off within the first window, between two samples.
+        # The slider starts to move within the first window, between two samples.
         assert a.displacement == pytest.approx(b.displacement, abs=1e-9 if k else push.speed * sample)
 
 
@@ -187,7 +187,7 @@ def tabulated(shape: str, kind: str) -> TabulatedModel:
     turn=TURNS,
     slider=st.tuples(METRES, METRES, TURNS),
 )
-def test_a_slider_turned_onto_itself_ends_where_it_would_have_ended(
+def test_prediction_is_invariant_to_rotational_symmetry(
     shape: str,
     kind: str,
     from_table: bool,
@@ -196,7 +196,7 @@ def test_a_slider_turned_onto_itself_ends_where_it_would_have_ended(
     turn: float,
     slider: tuple[float, float, float],
 ) -> None:
-    """The same tip meets another side: the outcome in the world is the same, the heading ahead by the turn."""
+    """The same tip touches another side: the outcome in the world is the same, the heading differs by the rotation."""
     outline = shape_outline(shape)
     order = outline.rotational_symmetry
     turned = turn if order == 0 else 2.0 * np.pi / order * round(turn)
@@ -205,13 +205,13 @@ def test_a_slider_turned_onto_itself_ends_where_it_would_have_ended(
     here = tip_at(outline.point(np.array([contact]))[0], outline.inward_normal(np.array([contact]))[0], slider, angle)
     there = replace(here, slider=np.array([x, y, heading + turned]))
     a, b = slider_after(predictor, here), slider_after(predictor, there)
-    # A table keeps a value once for all sides; the contact is found again from the turned poses, to rounding.
+    # A table stores one value for all sides; the contact is recomputed from the rotated poses, up to rounding.
     assert b.pose - a.pose == pytest.approx([0.0, 0.0, turned], abs=1e-7)
     assert b.covariance == pytest.approx(a.covariance, rel=1e-5, abs=1e-13)
 
 
 def tip_at(point: Array, normal: Array, slider: tuple[float, float, float], angle: float) -> WorldPush:
-    """The tip touches this point of the outline and drives at this angle from the normal."""
+    """The tip touches this point of the outline and moves at this angle from the normal."""
     x, y, heading = slider
     turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
     aside = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -233,7 +233,7 @@ def test_covariances_are_symmetric_and_positive_definite_in_and_out_of_the_domai
 ) -> None:
     predictor = tabulated(shape, kind) if from_table else model_of(shape, kind)
     if kind == "analytical":
-        velocity = min(velocity, 0.2)  # mechanics is integrated along the way: metres take minutes, and are refused
+        velocity = min(velocity, 0.2)  # mechanics rejects paths of metres, which would take minutes
     prediction: Prediction = predictor.predict_rows(np.array([[velocity, contact, angle]]), np.array([0.2]))
     (total,), (process,) = prediction.covariance, prediction.process_covariance
     for covariance in (total, process):

@@ -1,4 +1,4 @@
-"""Bags in all the forms that rosbag2 and others write them, whole and damaged; and others read ours."""
+"""Bags as written by rosbag2 and other tools, intact and damaged; other tools read our bags."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def pose_topics(frame_id: str = "world") -> Topics:
 
 
 def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options: object) -> Path:
-    """A file by the mcap package's own writer; metadata=(name, record) goes to its end, encoding is the channels'."""
+    """A file written by the mcap package; metadata=(name, record) is at its end, encoding is that of the channels."""
     metadata, encoding = options.pop("metadata", None), str(options.pop("encoding", "cdr"))
     with path.open("wb") as stream:
         writer = Writer(stream, **options)
@@ -56,7 +56,7 @@ def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options:
     return path
 
 
-def test_a_file_and_a_folder_with_and_without_metadata_yaml_read_alike(recording: Recording, tmp_path: Path) -> None:
+def test_file_and_folder_with_and_without_metadata_yaml_read_equally(recording: Recording, tmp_path: Path) -> None:
     write_recording(tmp_path / "push", recording)
     shutil.copytree(tmp_path / "push", tmp_path / "copy")
     (tmp_path / "copy" / "metadata.yaml").unlink()
@@ -70,8 +70,8 @@ def test_a_file_and_a_folder_with_and_without_metadata_yaml_read_alike(recording
 
 
 @pytest.mark.parametrize("listed", [True, False])
-def test_several_files_are_read_in_the_bags_order(tmp_path: Path, listed: bool) -> None:
-    """By number, so that file 10 comes after file 2; or as metadata.yaml has them."""
+def test_several_files_are_read_in_the_order_of_the_bag(tmp_path: Path, listed: bool) -> None:
+    """By number, so that file 10 comes after file 2, or in the order of metadata.yaml."""
     parts = [2, 10, 1] if listed else [1, 2, 10]
     for place, part in enumerate(parts):
         one = {k: (kind, m[place : place + 1]) for k, (kind, m) in pose_topics().items()}
@@ -94,10 +94,10 @@ def test_several_files_are_read_in_the_bags_order(tmp_path: Path, listed: bool) 
     ],
     ids=["zstd", "lz4", "none", "unchunked", "no index", "no statistics"],
 )
-def test_every_way_of_packing_an_mcap_file_is_accepted(
+def test_every_chunking_and_compression_of_mcap_is_accepted(
     tmp_path: Path, recording: Recording, options: dict[str, object]
 ) -> None:
-    """The rig stands at the file's end; it is found with the index and without."""
+    """The rig is at the end of the file; it is found with and without an index."""
     assert recording.rig is not None
     record = ("push_rig", recording.rig.to_record())
     path = write_mcap(tmp_path / "a.mcap", pose_topics(), metadata=record, **options)
@@ -109,7 +109,7 @@ def test_every_way_of_packing_an_mcap_file_is_accepted(
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_all_that_stands_before_a_cut_is_used_and_the_cut_is_noted(
+def test_data_before_a_cut_are_used_and_the_cut_is_noted(
     recording: Recording, tmp_path: Path, compression: str
 ) -> None:
     write_recording(tmp_path / "whole.mcap", recording, compression=compression)
@@ -128,8 +128,8 @@ def test_all_that_stands_before_a_cut_is_used_and_the_cut_is_noted(
     assert counts[2] > 0
 
 
-def test_a_file_without_its_last_bytes_loses_no_message(recording: Recording, tmp_path: Path) -> None:
-    """A recorder that is killed writes no summary and no end."""
+def test_file_without_its_last_bytes_loses_no_message(recording: Recording, tmp_path: Path) -> None:
+    """A killed recorder writes no summary and no footer."""
     write_recording(tmp_path / "a.mcap", recording)
     data = (tmp_path / "a.mcap").read_bytes()
     whole = [m.data for m in open_bag(tmp_path / "a.mcap").messages()]
@@ -139,7 +139,7 @@ def test_a_file_without_its_last_bytes_loses_no_message(recording: Recording, tm
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
-def test_a_damaged_chunk_is_left_out_and_noted(tmp_path: Path, compression: CompressionType) -> None:
+def test_damaged_chunk_is_skipped_and_noted(tmp_path: Path, compression: CompressionType) -> None:
     path = write_mcap(tmp_path / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
     offsets = chunk_offsets(path)
     data = bytearray(path.read_bytes())
@@ -158,9 +158,7 @@ def test_a_damaged_chunk_is_left_out_and_noted(tmp_path: Path, compression: Comp
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6), st.data()
 )
-def test_no_damage_whatever_is_more_than_a_note_or_a_recording_error(
-    hits: list[tuple[float, int]], data: st.DataObject
-) -> None:
+def test_any_damage_gives_a_note_or_a_recording_error(hits: list[tuple[float, int]], data: st.DataObject) -> None:
     compression = data.draw(st.sampled_from([CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE]))
     with tempfile.TemporaryDirectory() as folder:
         path = write_mcap(Path(folder) / "a.mcap", pose_topics(), chunk_size=2000, compression=compression)
@@ -186,7 +184,7 @@ def chunk_offsets(path: Path) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reason"),
     [
         (b"", "the file is empty"),
         (b"velocity,contact\n1,2\n", "not an MCAP file"),
@@ -196,20 +194,20 @@ def chunk_offsets(path: Path) -> list[int]:
         (b"\x89MCAP0\r\n" + b"\xff" * 200, "no topic /slider/pose"),
     ],
 )
-def test_a_file_that_is_no_recording_is_named_and_told_what_it_is(tmp_path: Path, content: bytes, told: str) -> None:
+def test_file_of_another_format_is_rejected_by_format(tmp_path: Path, content: bytes, reason: str) -> None:
     (tmp_path / "thing.mcap").write_bytes(content)
-    with pytest.raises(RecordingError, match=f"thing.mcap: .*{told}"):
+    with pytest.raises(RecordingError, match=f"thing.mcap: .*{reason}"):
         read_recording(tmp_path / "thing.mcap")
 
 
-def test_a_folder_without_recordings_and_a_path_to_nothing_are_errors(tmp_path: Path) -> None:
+def test_folder_without_recordings_and_missing_path_are_errors(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"contains no \.mcap file"):
         read_recording(tmp_path)
     with pytest.raises(RecordingError, match=r"absent\.mcap: cannot be read"):
         read_recording(tmp_path / "absent.mcap")
 
 
-def test_a_missing_topic_is_told_with_the_topics_that_are_there(tmp_path: Path) -> None:
+def test_missing_topic_is_reported_with_the_existing_topics(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / "a.mcap", {"/vicon/square/square": pose_topics()["/slider/pose"]})
     with pytest.raises(RecordingError, match=r"no topic /slider/pose and /pusher/pose .*/vicon/square/square"):
         read_recording(path)
@@ -222,7 +220,7 @@ def test_topics_can_have_other_names(tmp_path: Path) -> None:
     assert len(read.slider) == len(read.pusher) == N
 
 
-def test_a_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
+def test_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp_path: Path) -> None:
     poses = pose_topics()
     wrong = {**poses, "/slider/pose": (WRENCH, encode(STAMP, POSES[:, :6], WRENCH_STAMPED))}
     with pytest.raises(RecordingError, match="topic /slider/pose is of type 'geometry_msgs/msg/WrenchStamped'"):
@@ -233,7 +231,7 @@ def test_a_topic_of_another_type_or_encoding_or_without_messages_is_an_error(tmp
         read_recording(write_mcap(tmp_path / "none.mcap", {**poses, "/pusher/pose": (POSE, [])}))
 
 
-def test_samples_that_say_nothing_are_dropped_and_counted(tmp_path: Path) -> None:
+def test_unusable_samples_are_discarded_and_counted(tmp_path: Path) -> None:
     values = POSES.copy()
     values[3, 0], values[5, 1], values[7, 3:] = np.nan, np.inf, 0.0
     messages = encode(STAMP, values, POSE_STAMPED)
@@ -247,7 +245,7 @@ def test_samples_that_say_nothing_are_dropped_and_counted(tmp_path: Path) -> Non
     assert len(read.pusher) == N
 
 
-def test_a_tip_needs_no_orientation(tmp_path: Path) -> None:
+def test_tip_needs_no_orientation(tmp_path: Path) -> None:
     values = POSES.copy()
     values[:, 3:] = 0.0
     tip = {"/pusher/pose": (POSE, encode(STAMP, values, POSE_STAMPED))}
@@ -257,7 +255,7 @@ def test_a_tip_needs_no_orientation(tmp_path: Path) -> None:
     assert any("/pusher/pose: 40 samples have no orientation" in note for note in read.notes)
 
 
-def test_a_quaternion_gives_its_heading_whatever_its_length_and_sign(tmp_path: Path) -> None:
+def test_heading_does_not_depend_on_norm_and_sign_of_the_quaternion(tmp_path: Path) -> None:
     heading = np.linspace(-3.1, 3.1, N)
     values = POSES.copy()
     values[:, 5], values[:, 6] = -1.7 * np.sin(heading / 2.0), -1.7 * np.cos(heading / 2.0)
@@ -271,7 +269,7 @@ def test_another_frame_is_noted(tmp_path: Path) -> None:
     assert any("/slider/pose: frame_id 'vicon' is treated as 'world'" in note for note in read.notes)
 
 
-def test_header_stamps_count_not_log_times_and_file_order_is_kept(tmp_path: Path) -> None:
+def test_header_stamps_are_used_and_file_order_is_kept(tmp_path: Path) -> None:
     stamp = STAMP.copy()
     stamp[[4, 5]] = stamp[[5, 4]]
     messages = encode(stamp, POSES, POSE_STAMPED)
@@ -304,7 +302,7 @@ def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
         np.testing.assert_array_equal(scalar.stamp, STAMP if "float" in name else other)
 
 
-def test_a_rig_that_is_missing_is_told_with_how_to_give_it(tmp_path: Path, recording: Recording) -> None:
+def test_missing_rig_is_reported_with_how_to_give_it(tmp_path: Path, recording: Recording) -> None:
     path = write_mcap(tmp_path / "a.mcap", pose_topics())
     with pytest.raises(
         RigError, match=r"no push_rig record; give it with --rig FILE\.yaml or the node parameter 'rig'"
@@ -314,7 +312,7 @@ def test_a_rig_that_is_missing_is_told_with_how_to_give_it(tmp_path: Path, recor
 
 
 @pytest.mark.parametrize("form", ["json", "mapping", "keys"])
-def test_the_rig_may_stand_in_custom_data_of_metadata_yaml(tmp_path: Path, recording: Recording, form: str) -> None:
+def test_rig_is_read_from_custom_data_of_metadata_yaml(tmp_path: Path, recording: Recording, form: str) -> None:
     assert recording.rig is not None
     record = recording.rig.to_record()
     custom = {"json": {"push_rig": json.dumps(record)}, "mapping": {"push_rig": record}, "keys": record}[form]
@@ -324,9 +322,7 @@ def test_the_rig_may_stand_in_custom_data_of_metadata_yaml(tmp_path: Path, recor
     assert require_rig(read_recording(tmp_path)).to_record() == record
 
 
-def test_the_rig_may_stand_in_the_copy_of_metadata_yaml_that_rosbag2_keeps_in_the_file(
-    tmp_path: Path, recording: Recording
-) -> None:
+def test_rig_is_read_from_the_metadata_record_of_rosbag2(tmp_path: Path, recording: Recording) -> None:
     assert recording.rig is not None
     custom = {"custom_data": {"push_rig": json.dumps(recording.rig.to_record())}}
     record = ("rosbag2", {"serialized_metadata": yaml.safe_dump(custom)})
@@ -334,7 +330,7 @@ def test_the_rig_may_stand_in_the_copy_of_metadata_yaml_that_rosbag2_keeps_in_th
     assert require_rig(read_recording(path)).to_record() == recording.rig.to_record()
 
 
-def test_two_rigs_that_differ_are_noted_and_the_files_own_counts(tmp_path: Path, recording: Recording) -> None:
+def test_rig_of_the_file_takes_precedence_and_a_different_one_is_noted(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "a", recording)
     text = (tmp_path / "a" / "metadata.yaml").read_text()
     (tmp_path / "a" / "metadata.yaml").write_text(text.replace("plywood", "delrin"))
@@ -344,7 +340,7 @@ def test_two_rigs_that_differ_are_noted_and_the_files_own_counts(tmp_path: Path,
 
 
 @pytest.mark.parametrize("text", ["{", "rosbag2_bagfile_information: 3", "other: {}", ""])
-def test_a_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, text: str) -> None:
+def test_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, text: str) -> None:
     write_recording(tmp_path / "a", recording)
     (tmp_path / "a" / "metadata.yaml").write_text(text)
     read = read_recording(tmp_path / "a")
@@ -352,7 +348,7 @@ def test_a_damaged_metadata_yaml_is_noted(tmp_path: Path, recording: Recording, 
     assert any("metadata.yaml: cannot be read" in note for note in read.notes)
 
 
-def test_a_listed_file_that_is_gone_is_noted(tmp_path: Path, recording: Recording) -> None:
+def test_missing_listed_file_is_noted(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "a", recording)
     text = (tmp_path / "a" / "metadata.yaml").read_text()
     listed = "  relative_file_paths:\n  - a_0.mcap\n"
@@ -366,7 +362,7 @@ def test_a_listed_file_that_is_gone_is_noted(tmp_path: Path, recording: Recordin
 # Writing
 
 
-def test_a_failed_write_leaves_the_earlier_bag_and_nothing_beside_it(tmp_path: Path, recording: Recording) -> None:
+def test_failed_write_leaves_the_earlier_bag_and_no_temporary_file(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "a", recording)
     before = (tmp_path / "a" / "a_0.mcap").read_bytes()
     with pytest.raises(RuntimeError, match="power cut"), BagWriter(tmp_path / "a") as writer:
@@ -377,21 +373,21 @@ def test_a_failed_write_leaves_the_earlier_bag_and_nothing_beside_it(tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["a", "a.mcap"])
-def test_an_earlier_bag_is_replaced(tmp_path: Path, recording: Recording, name: str) -> None:
+def test_earlier_bag_is_replaced(tmp_path: Path, recording: Recording, name: str) -> None:
     write_recording(tmp_path / name, recording)
     write_recording(tmp_path / name, replace(recording, wrench=None))
     assert read_recording(tmp_path / name).wrench is None
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
-def test_a_folder_that_holds_something_else_is_not_replaced(tmp_path: Path, recording: Recording) -> None:
+def test_folder_with_other_files_is_not_replaced(tmp_path: Path, recording: Recording) -> None:
     (tmp_path / "notes.txt").write_text("dear diary")
     with pytest.raises(RecordingError, match="exists and is not a bag"):
         write_recording(tmp_path, recording)
     assert (tmp_path / "notes.txt").read_text() == "dear diary"
 
 
-def test_what_cannot_be_written_is_refused(tmp_path: Path, recording: Recording) -> None:
+def test_invalid_recording_is_not_written(tmp_path: Path, recording: Recording) -> None:
     with pytest.raises(RecordingError, match="compression: 'rar', give one of zstd, lz4, none"):
         write_recording(tmp_path / "a", recording, compression="rar")
     early = replace(recording, pusher=replace(recording.pusher, stamp=recording.pusher.stamp - 2 * 10**18))
@@ -406,7 +402,7 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path, recording: Recording)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_messages_stand_in_order_of_log_time_which_is_the_header_stamp(tmp_path: Path, recording: Recording) -> None:
+def test_messages_are_in_order_of_log_time_which_is_the_header_stamp(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "a.mcap", recording)
     messages = list(open_bag(tmp_path / "a.mcap").messages())
     times = [m.log_time for m in messages]
@@ -415,21 +411,25 @@ def test_messages_stand_in_order_of_log_time_which_is_the_header_stamp(tmp_path:
     assert [m.log_time for m in slider] == recording.slider.stamp.tolist()
 
 
-def test_metadata_yaml_is_what_jazzys_rosbag2_asks_for(tmp_path: Path, recording: Recording) -> None:
+def test_metadata_yaml_has_the_format_of_rosbag2_jazzy(tmp_path: Path, recording: Recording) -> None:
     """The keys are those that rosbag2_storage/yaml.hpp reads; custom_data must be text throughout."""
     write_recording(tmp_path / "a", recording)
-    told = yaml.safe_load((tmp_path / "a" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert (told["version"], told["storage_identifier"], told["ros_distro"]) == (9, "mcap", "jazzy")
-    counts = {t["topic_metadata"]["name"]: t["message_count"] for t in told["topics_with_message_count"]}
+    info = yaml.safe_load((tmp_path / "a" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert (info["version"], info["storage_identifier"], info["ros_distro"]) == (
+        9,
+        "mcap",
+        "jazzy",
+    )
+    counts = {t["topic_metadata"]["name"]: t["message_count"] for t in info["topics_with_message_count"]}
     assert counts == {"/slider/pose": 250, "/pusher/pose": 250, "/pusher/wrench": 250, "/table/temperature": 10}
-    assert told["message_count"] == told["files"][0]["message_count"] == 760
-    assert told["relative_file_paths"] == [told["files"][0]["path"]] == ["a_0.mcap"]
-    assert told["starting_time"]["nanoseconds_since_epoch"] == recording.slider.stamp[0]
+    assert info["message_count"] == info["files"][0]["message_count"] == 760
+    assert info["relative_file_paths"] == [info["files"][0]["path"]] == ["a_0.mcap"]
+    assert info["starting_time"]["nanoseconds_since_epoch"] == recording.slider.stamp[0]
     last = recording.pusher.stamp[-1] + 1_000_000
-    assert told["duration"]["nanoseconds"] == last - recording.slider.stamp[0]
-    assert (told["compression_format"], told["compression_mode"]) == ("", "")
-    assert all(isinstance(value, str) for value in told["custom_data"].values())
-    for topic in told["topics_with_message_count"]:
+    assert info["duration"]["nanoseconds"] == last - recording.slider.stamp[0]
+    assert (info["compression_format"], info["compression_mode"]) == ("", "")
+    assert all(isinstance(value, str) for value in info["custom_data"].values())
+    for topic in info["topics_with_message_count"]:
         described = topic["topic_metadata"]
         assert described["serialization_format"] == "cdr" and described["type_description_hash"].startswith("RIHS01_")
         (qos,) = described["offered_qos_profiles"]
@@ -439,7 +439,7 @@ def test_metadata_yaml_is_what_jazzys_rosbag2_asks_for(tmp_path: Path, recording
 # Others read it
 
 
-def test_the_mcap_packages_decoder_reads_it(tmp_path: Path, recording: Recording) -> None:
+def test_decoder_of_the_mcap_package_reads_our_bags(tmp_path: Path, recording: Recording) -> None:
     reader = pytest.importorskip("mcap_ros2.reader")
     write_recording(tmp_path / "a.mcap", recording)
     found = list(reader.read_ros2_messages(str(tmp_path / "a.mcap"), topics=["/slider/pose"]))
@@ -450,7 +450,7 @@ def test_the_mcap_packages_decoder_reads_it(tmp_path: Path, recording: Recording
     assert [m.wrench.force.y for m in force] == recording.wrench.fy.tolist()
 
 
-def test_rosbags_reads_it_and_we_read_what_rosbags_writes(tmp_path: Path, recording: Recording) -> None:
+def test_package_rosbags_reads_our_bags_and_we_read_its_bags(tmp_path: Path, recording: Recording) -> None:
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     from rosbags.typesys import Stores, get_typestore
 
@@ -475,7 +475,7 @@ def test_rosbags_reads_it_and_we_read_what_rosbags_writes(tmp_path: Path, record
 
 
 @pytest.mark.parametrize("mode", ["MESSAGE", "FILE"])
-def test_what_rosbag2_compresses_on_top_of_mcap_is_unpacked(tmp_path: Path, recording: Recording, mode: str) -> None:
+def test_bags_compressed_by_rosbag2_are_decompressed(tmp_path: Path, recording: Recording, mode: str) -> None:
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     from rosbags.typesys import Stores, get_typestore
 
@@ -497,18 +497,18 @@ def test_what_rosbag2_compresses_on_top_of_mcap_is_unpacked(tmp_path: Path, reco
             read_recording(tmp_path / "packed")
 
 
-def test_messages_that_cannot_be_unpacked_are_dropped_and_counted(tmp_path: Path, recording: Recording) -> None:
+def test_messages_that_cannot_be_decompressed_are_skipped_and_counted(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "a", recording)
     text = (tmp_path / "a" / "metadata.yaml").read_text()
-    told = text.replace("compression_format: ''", "compression_format: zstd")
-    (tmp_path / "a" / "metadata.yaml").write_text(told.replace("compression_mode: ''", "compression_mode: MESSAGE"))
+    changed = text.replace("compression_format: ''", "compression_format: zstd")
+    (tmp_path / "a" / "metadata.yaml").write_text(changed.replace("compression_mode: ''", "compression_mode: MESSAGE"))
     bag = open_bag(tmp_path / "a")
     assert list(bag.messages()) == []
     (note,) = bag.notes
     assert re.fullmatch(r".*a_0\.mcap at byte \d+: 760 messages cannot be decompressed and were skipped", note)
 
 
-def test_definitions_and_hashes_are_those_of_ros(tmp_path: Path) -> None:
+def test_definitions_and_hashes_equal_those_of_ros(tmp_path: Path) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     for kind in (POSE, WRENCH, FLOAT64):
@@ -520,7 +520,7 @@ def test_definitions_and_hashes_are_those_of_ros(tmp_path: Path) -> None:
         assert ours.hash_rihs01(kind.name) == kind.type_hash
 
 
-def test_a_file_whose_summary_is_cut_off_is_whole_but_says_so(tmp_path: Path, recording: Recording) -> None:
+def test_file_without_summary_is_read_completely_with_a_note(tmp_path: Path, recording: Recording) -> None:
     write_recording(tmp_path / "whole.mcap", recording)
     data = (tmp_path / "whole.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[:-30])

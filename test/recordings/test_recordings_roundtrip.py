@@ -1,4 +1,4 @@
-"""What is written as a recording is read back: the same streams, whatever they hold and however they are packed."""
+"""A written recording reads back with the same streams, for any content and compression."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def assert_same_pose(read: PoseStream, written: PoseStream) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(recordings, st.sampled_from(COMPRESSIONS), st.booleans())
-def test_any_recording_reads_back_as_it_was_written(written: Recording, compression: str, bare: bool) -> None:
+def test_any_recording_reads_back_unchanged(written: Recording, compression: str, bare: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / ("any.mcap" if bare else "any")
         write_recording(path, written, compression=compression)
@@ -87,7 +87,7 @@ def test_any_recording_reads_back_as_it_was_written(written: Recording, compress
 
 @settings(max_examples=30, deadline=None)
 @given(scalars())
-def test_a_scalar_without_header_is_stamped_by_log_time_and_so_comes_in_order_of_time(scalar: ScalarStream) -> None:
+def test_scalar_without_header_has_log_time_as_stamp(scalar: ScalarStream) -> None:
     nothing = PoseStream(np.zeros(1, np.int64), *np.zeros((4, 1)))
     with tempfile.TemporaryDirectory() as folder:
         write_recording(Path(folder) / "a.mcap", Recording("a", None, nothing, nothing, None, {"/s": scalar}))
@@ -98,7 +98,7 @@ def test_a_scalar_without_header_is_stamped_by_log_time_and_so_comes_in_order_of
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_the_rig_and_all_streams_of_a_push_survive(recording: Recording, tmp_path: Path, compression: str) -> None:
+def test_rig_and_all_streams_of_a_push_read_back(recording: Recording, tmp_path: Path, compression: str) -> None:
     write_recording(tmp_path / "push", recording, compression=compression)
     read = read_recording(tmp_path / "push")
     assert recording.rig is not None and read.rig is not None
@@ -110,7 +110,7 @@ def test_the_rig_and_all_streams_of_a_push_survive(recording: Recording, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["push", "push.mcap"])
-def test_the_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Path, name: str) -> None:
+def test_same_recording_gives_the_same_bytes(recording: Recording, tmp_path: Path, name: str) -> None:
     for folder in ("first", "second"):
         write_recording(tmp_path / folder / name, recording)
     first, second = ([p for p in sorted((tmp_path / k).rglob("*")) if p.is_file()] for k in ("first", "second"))
@@ -123,7 +123,7 @@ LAYOUTS = st.builds(Layout, st.booleans(), st.integers(1, 7), st.just(8)) | st.j
 
 @settings(max_examples=80, deadline=None)
 @given(stamps(0), LAYOUTS, st.text(max_size=20), st.data())
-def test_columns_survive_cdr_with_any_frame_id(
+def test_columns_read_back_from_cdr_with_any_frame_id(
     stamp: np.ndarray, layout: Layout, frame: str, data: st.DataObject
 ) -> None:
     frame = frame.replace("\0", "")
@@ -137,13 +137,13 @@ def test_columns_survive_cdr_with_any_frame_id(
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.binary(max_size=100), max_size=10), LAYOUTS)
-def test_no_bytes_whatever_break_the_decoder(messages: list[bytes], layout: Layout) -> None:
+def test_decoder_accepts_any_bytes(messages: list[bytes], layout: Layout) -> None:
     decoded = decode(messages, layout)
     assert decoded.values.shape == (len(messages), layout.count)
     assert not decoded.valid[[len(m) < 4 + layout.count * layout.size for m in messages]].any()
 
 
-def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_places() -> None:
+def test_messages_of_different_frames_lengths_and_byte_orders_keep_their_order() -> None:
     layout = Layout(header=True, count=2)
     stamp, values = np.arange(6, dtype=np.int64) * 10**9 + 5, np.arange(12.0).reshape(6, 2)
     frames = ["", "w", "world", "a_long_frame_name", "world", "w"]

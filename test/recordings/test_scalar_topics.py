@@ -1,4 +1,4 @@
-"""What a scalar topic is worth when a window begins: the same read at once and while everything arrives."""
+"""The value of a scalar topic at the start of a window is the same offline and online."""
 
 from __future__ import annotations
 
@@ -41,33 +41,33 @@ def at(found: ScalarTrack, time: float) -> float | None:
 # --- one topic -------------------------------------------------------------------------------------------------------
 
 
-def test_the_value_is_linear_between_samples_and_constant_beyond_them() -> None:
+def test_value_is_linear_between_samples_and_constant_beyond_them() -> None:
     warmth = track((1.0, 10.0), (2.0, 20.0), (4.0, 0.0))
     assert [at(warmth, time) for time in (0.0, 1.0, 1.25, 2.0, 3.5, 4.0, 90.0)] == [10, 10, 12.5, 20, 5, 0, 0]
     assert at(ScalarTrack(), 1.0) is None
 
 
-def test_over_a_long_gap_it_keeps_what_was_sent_last() -> None:
+def test_value_stays_constant_in_a_long_gap() -> None:
     warmth = track((0.0, 1.0), (5.0, 2.0), (10.1, 3.0))
     assert at(warmth, 2.5) == 1.5
     assert [at(warmth, time) for time in (5.1, 10.0)] == [2.0, 2.0]
 
 
-def test_samples_that_do_not_come_later_are_refused_and_counted() -> None:
+def test_samples_without_increasing_stamp_are_discarded_and_counted() -> None:
     warmth = track((1.0, 1.0), (1.0, 5.0), (0.9, 6.0), (2.0, 2.0))
     warmth.add(stream((2.0, 7.0), (3.0, 3.0)))
     assert warmth.discarded == 3
     assert [at(warmth, time) for time in (1.0, 1.5, 2.5)] == [1.0, 1.5, 2.5]
 
 
-def test_a_clock_that_is_set_back_begins_it_anew() -> None:
+def test_clock_set_back_restarts_the_topic() -> None:
     warmth = track((100.0, 1.0), (101.0, 2.0), (3.0, 7.0))
     assert at(warmth, 100.0) == 7.0 and not warmth.known_at(START + 4 * SECOND)
     warmth.add(stream((5.0, 9.0)))
     assert at(warmth, 4.0) == 8.0
 
 
-def test_what_is_forgotten_makes_no_difference_later() -> None:
+def test_forgetting_old_samples_does_not_change_later_values() -> None:
     samples = [(0.1 * k, float(k % 7)) for k in range(100)]
     whole, part = track(*samples), track(*samples)
     part.forget_before(START + round(5.05 * SECOND))
@@ -86,7 +86,7 @@ def warmth_of(windows: list[PushWindow]) -> list[float | None]:
 
 
 def fed(recording: Recording, finder: WindowFinder, begin: float, end: float) -> None:
-    """The sensors' samples from begin to end (s), the scalars not."""
+    """The sensors' samples from begin to end (s), without scalars."""
     low, high = START + round(begin * SECOND), START + round(end * SECOND)
     wrench = recording.wrench
     assert wrench is not None
@@ -107,7 +107,7 @@ def noisy(rate: float, seed: int = 0) -> ScalarStream:
 
 @pytest.mark.parametrize("late", [0.0, 0.35, 1.7], ids="late by {} s".format)
 @pytest.mark.parametrize("rate", [40.0, 1.3])
-def test_in_portions_it_is_the_same_as_at_once_however_late_it_comes(late: float, rate: float) -> None:
+def test_covariate_is_the_same_for_late_samples_in_portions(late: float, rate: float) -> None:
     recording = with_warmth(noisy(rate))
     expected, finder, found = find_windows(recording, square_rig()), WindowFinder(square_rig()), []
     assert len({*warmth_of(expected)}) == len(expected) > 3
@@ -120,7 +120,7 @@ def test_in_portions_it_is_the_same_as_at_once_however_late_it_comes(late: float
     assert warmth_of(found) == warmth_of(expected)
 
 
-def test_a_window_waits_for_the_sample_after_its_start_but_not_for_ever() -> None:
+def test_window_waits_for_the_next_sample_for_a_limited_time() -> None:
     recording = replace(translating_push(Push(0.5, 1.6), tail=8.0), scalars={WARMTH: stream((0.0, 1.0))})
     finder, count = WindowFinder(square_rig()), len(find_windows(recording, square_rig()))
     finder.add_scalar(WARMTH, recording.scalars[WARMTH])
@@ -131,7 +131,7 @@ def test_a_window_waits_for_the_sample_after_its_start_but_not_for_ever() -> Non
     assert warmth_of(windows) == [1.0] * count and count > 3
 
 
-def test_a_topic_that_has_said_nothing_gives_no_covariate() -> None:
+def test_topic_without_samples_gives_no_covariate() -> None:
     recording, finder = translating_push(), WindowFinder(square_rig())
     finder.add_scalar(WARMTH, stream())
     fed(recording, finder, 0.0, 10.0)
@@ -140,14 +140,14 @@ def test_a_topic_that_has_said_nothing_gives_no_covariate() -> None:
     assert windows and warmth_of(windows) == [None] * len(windows)
 
 
-# --- what arrives ----------------------------------------------------------------------------------------------------
+# --- messages --------------------------------------------------------------------------------------------------------
 
 
 def tick(seconds: int, rest: int, order: str = "<") -> bytes:
     return bytes([0, order == "<", 0, 0]) + struct.pack(f"{order}iI", seconds, rest)
 
 
-def test_a_message_is_dated_by_the_last_tick_before_it() -> None:
+def test_message_gets_the_time_of_the_last_clock_message_before_it() -> None:
     times = ClockHistory()
     times.put(tick(7, 5), 100)
     times.put(tick(8, 6, ">"), 200)
@@ -164,7 +164,7 @@ def float64(value: float) -> bytes:
     return b"\0\1\0\0" + struct.pack("<d", value)
 
 
-def test_messages_wait_until_their_time_can_be_told() -> None:
+def test_messages_wait_until_their_time_is_known() -> None:
     buffer = ScalarBuffer("std_msgs/msg/Float64")
     for k in range(4):
         buffer.put(float64(k), 10 * k)
@@ -175,7 +175,7 @@ def test_messages_wait_until_their_time_can_be_told() -> None:
     assert len(buffer.take(10**9, lambda sent: sent, None)) == 0
 
 
-def test_useless_messages_are_counted_by_kind() -> None:
+def test_unusable_messages_are_counted_by_kind() -> None:
     buffer = ScalarBuffer("std_msgs/msg/Float32")
     for data in (b"\0\1\0\0" + struct.pack("<f", 0.5), b"\0\1", b"\0\1\0\0" + struct.pack("<f", np.inf)):
         buffer.put(data, 5)
@@ -183,7 +183,7 @@ def test_useless_messages_are_counted_by_kind() -> None:
     assert dict(buffer.rejected) == {"unreadable": 1, "not finite": 1}
 
 
-def test_a_full_buffer_drops_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_buffer_drops_the_oldest_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scalar_buffer, "LIMIT", 100)
     buffer = ScalarBuffer("std_msgs/msg/Float64")
     for k in range(305):
@@ -201,7 +201,7 @@ def samples(recording: Recording, end: float, **named: float) -> Samples:
     return Samples(rows(recording.slider, last), rows(recording.pusher, last), none, found)
 
 
-def test_a_scalar_that_is_behind_is_waited_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_late_scalar_is_waited_for_a_limited_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(stream_sync, "monotonic", lambda: now[0])
     recording = translating_push(Push(0.5, 8.0))

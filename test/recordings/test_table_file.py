@@ -1,4 +1,4 @@
-"""Push tables as CSV: exact there and back; a fault is told with file, line, column, value and what is accepted."""
+"""Push tables as CSV: they read back exactly; an error names file, line, column, value and what is accepted."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def tables(draw: st.DrawFn) -> PushTable:
 
 @settings(max_examples=60, deadline=None)
 @given(tables(), st.sampled_from(["a.csv", "a.csv.gz"]))
-def test_a_table_reads_back_to_the_same_numbers(table: PushTable, name: str) -> None:
+def test_table_reads_back_to_the_same_numbers(table: PushTable, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         write_table(Path(folder) / name, table)
         read = read_table(Path(folder) / name)
@@ -58,7 +58,7 @@ def test_a_table_reads_back_to_the_same_numbers(table: PushTable, name: str) -> 
     np.testing.assert_array_equal(read.covariates["warmth, mean"], table.covariates["warmth, mean"])
 
 
-def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
     table = read_table(written(tmp_path / "a.csv", GOOD))
     for name in ("b.csv.gz", "c.csv.gz"):
         write_table(tmp_path / name, table)
@@ -84,7 +84,7 @@ def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
         ("push_id", "", "a name, the same for all windows of one push"),
     ],
 )
-def test_a_value_that_is_not_accepted_is_told(tmp_path: Path, column: str, value: str, accepted: str) -> None:
+def test_invalid_value_is_rejected_by_name(tmp_path: Path, column: str, value: str, accepted: str) -> None:
     cells = dict(zip(HEADER.split(","), GOOD.split(","), strict=True)) | {column: value}
     path = written(tmp_path / "a.csv", GOOD, "", ",".join(cells.values()))
     with pytest.raises(TableError) as raised:
@@ -93,7 +93,7 @@ def test_a_value_that_is_not_accepted_is_told(tmp_path: Path, column: str, value
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reason"),
     [
         (f"{HEADER}\n{GOOD}\n0.02,0.25\n", "line 3: 2 cells, the header has 8"),
         (f"{HEADER}\n{GOOD},5\n", "line 2: 9 cells, the header has 8"),
@@ -106,21 +106,21 @@ def test_a_value_that_is_not_accepted_is_told(tmp_path: Path, column: str, value
         (b"\x1f\x8b\x08\x00cut", "cannot be read as CSV"),
     ],
 )
-def test_a_file_that_is_no_table_is_told(tmp_path: Path, content: str | bytes, told: str) -> None:
+def test_file_without_a_table_is_rejected_by_name(tmp_path: Path, content: str | bytes, reason: str) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(TableError) as raised:
         read_table(path)
-    assert str(raised.value).startswith(str(path)) and told in str(raised.value)
+    assert str(raised.value).startswith(str(path)) and reason in str(raised.value)
 
 
-def test_a_file_that_is_absent_is_told(tmp_path: Path) -> None:
+def test_missing_file_is_rejected_by_name(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"absent\.csv: cannot be read"):
         read_table(tmp_path / "absent.csv")
 
 
-def test_further_columns_of_numbers_are_covariates_and_words_are_left_out(tmp_path: Path) -> None:
-    """Columns come in any order; an empty cell of a covariate is not known; a mark of byte order does no harm."""
+def test_further_numeric_columns_are_covariates_and_text_is_ignored(tmp_path: Path) -> None:
+    """Columns can be in any order; an empty cell of a covariate is unknown; a byte order mark is accepted."""
     header = "\ufeffoperator,warmth,push_id,dtheta,dy,dx,duration,angle,contact,velocity"
     rows = [f"Ann,{warmth},p,0.3,0.2,0.1,0.5,-1,0.75,0.04" for warmth in ("21.5", "", "nan")]
     path = written(tmp_path / "a.csv", *rows, header=header)
@@ -131,13 +131,13 @@ def test_further_columns_of_numbers_are_covariates_and_words_are_left_out(tmp_pa
     np.testing.assert_array_equal(table.covariates["warmth"], [21.5, np.nan, np.nan])
 
 
-def test_a_recording_is_told_from_a_table_by_its_path(tmp_path: Path) -> None:
+def test_recordings_and_tables_are_distinguished_by_path(tmp_path: Path) -> None:
     assert is_recording(tmp_path) and is_recording(tmp_path / "a.mcap")
     assert not is_recording(tmp_path / "a.csv") and not is_recording(tmp_path / "a.csv.gz")
 
 
 @pytest.mark.parametrize("name", ["a.b.csv", "a.b.csv.gz"])
-def test_the_rig_stands_beside_the_table(tmp_path: Path, rig: Rig, name: str) -> None:
+def test_rig_of_a_table_is_read_from_its_rig_yaml(tmp_path: Path, rig: Rig, name: str) -> None:
     assert rig_of_table(tmp_path / name) is None
     with pytest.raises(RigError, match=r"a\.b\.csv.*: no push_rig in .*a\.b\.rig\.yaml; give it with --rig"):
         load_rig_for([tmp_path / name])
@@ -145,7 +145,7 @@ def test_the_rig_stands_beside_the_table(tmp_path: Path, rig: Rig, name: str) ->
     assert load_rig_for([tmp_path / name]).to_record() == rig.to_record()
 
 
-def test_rigs_of_several_data_must_have_the_same_bodies(tmp_path: Path, recording: Recording, rig: Rig) -> None:
+def test_rigs_of_several_data_must_have_the_same_geometry(tmp_path: Path, recording: Recording, rig: Rig) -> None:
     write_recording(tmp_path / "square", recording)
     write_recording(tmp_path / "on_delrin", replace(recording, rig=replace(rig, surface="delrin")))
     hexagon = replace(rig, shape="hex", outline=shape_outline("hex"))
@@ -158,7 +158,7 @@ def test_rigs_of_several_data_must_have_the_same_bodies(tmp_path: Path, recordin
     assert load_rig_for([tmp_path / "hexagon"], tmp_path / "given.yaml").shape == "rect1"
 
 
-def test_pushes_of_different_tables_stay_different_and_a_copy_stays_one(tmp_path: Path) -> None:
+def test_different_pushes_stay_different_and_copies_stay_one(tmp_path: Path) -> None:
     first = written(tmp_path / "first.csv", GOOD)
     copy = written(tmp_path / "copy.csv", GOOD)
     other = written(tmp_path / "other.csv", GOOD.replace("0.25", "0.5"))
@@ -166,7 +166,7 @@ def test_pushes_of_different_tables_stay_different_and_a_copy_stays_one(tmp_path
     assert load_data([first, other]).pushes == ["first.csv/a", "other.csv/a"]
 
 
-def test_a_recording_loads_as_the_table_of_its_windows(tmp_path: Path, recording: Recording, rig: Rig) -> None:
+def test_recording_loads_as_the_table_of_its_windows(tmp_path: Path, recording: Recording, rig: Rig) -> None:
     write_recording(tmp_path / "push", recording)
     table = load_data([tmp_path / "push"])
     assert len(table) > 0
@@ -180,7 +180,7 @@ def test_a_recording_loads_as_the_table_of_its_windows(tmp_path: Path, recording
     np.testing.assert_array_equal(load_data([tmp_path / "bare"], rig).outcomes, table.outcomes)
 
 
-def test_data_without_a_push_is_told(tmp_path: Path, recording: Recording) -> None:
+def test_data_without_a_push_are_rejected_by_name(tmp_path: Path, recording: Recording) -> None:
     away = replace(recording, pusher=replace(recording.pusher, x=recording.pusher.x - 1.0), wrench=None)
     write_recording(tmp_path / "away", away)
     with pytest.raises(RecordingError, match="away: no push was found"):

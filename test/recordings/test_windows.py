@@ -1,4 +1,4 @@
-"""What a push window is, on recordings whose truth is known."""
+"""Push windows of recordings with a known motion."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_windows_tile_the_contact_end_to_end_from_first_touch() -> None:
     assert [w.index for w in windows] == [0, 1, 2, 3, 4]
 
 
-def test_a_translating_slider_moves_along_the_push_and_nowhere_else() -> None:
+def test_translating_slider_moves_only_along_the_push() -> None:
     for window in windows_of(translating_push(Push(speed=0.03), contact=0.4)):
         assert window.displacement == pytest.approx([0.006, 0.0, 0.0], abs=1e-12)
         assert (window.velocity, window.contact) == pytest.approx((0.03, 0.4), abs=1e-9)
@@ -38,7 +38,7 @@ def test_a_translating_slider_moves_along_the_push_and_nowhere_else() -> None:
         assert window.duration == pytest.approx(0.2, abs=1e-12)
 
 
-def test_the_force_on_the_slider_is_what_it_exerts_on_the_pusher_turned_round() -> None:
+def test_force_on_the_slider_is_opposite_to_the_measured_wrench() -> None:
     for window in windows_of(translating_push()):
         assert window.covariates["normal_force"] == pytest.approx(2.0, abs=0.2)
         assert window.covariates["tangential_force"] == pytest.approx(0.0, abs=1e-9)
@@ -50,9 +50,7 @@ def test_the_force_on_the_slider_is_what_it_exerts_on_the_pusher_turned_round() 
     turn=st.floats(-7.0, 7.0),
     contact=st.floats(0.0, 0.999),
 )
-def test_windows_do_not_depend_on_where_the_world_frame_lies(
-    shift: tuple[float, float], turn: float, contact: float
-) -> None:
+def test_windows_do_not_depend_on_the_world_frame(shift: tuple[float, float], turn: float, contact: float) -> None:
     here = translating_push(contact=contact)
     there = moved(here, np.array(shift), turn)
     for a, b in zip(windows_of(here), windows_of(there), strict=True):
@@ -62,7 +60,7 @@ def test_windows_do_not_depend_on_where_the_world_frame_lies(
 
 @settings(max_examples=20, deadline=None)
 @given(cuts=st.lists(st.integers(1, 239), max_size=12, unique=True), order=st.permutations(range(3)))
-def test_portions_and_interleaving_do_not_matter(cuts: list[int], order: list[int]) -> None:
+def test_windows_do_not_depend_on_portions_and_interleaving(cuts: list[int], order: list[int]) -> None:
     recording = translating_push()
     assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
@@ -86,7 +84,7 @@ def test_portions_and_interleaving_do_not_matter(cuts: list[int], order: list[in
         assert (a.velocity, a.contact, a.angle) == pytest.approx((b.velocity, b.contact, b.angle), abs=1e-12)
 
 
-def test_a_finer_sampling_gives_the_same_windows() -> None:
+def test_finer_sampling_gives_the_same_windows() -> None:
     coarse, fine = windows_of(translating_push(rate=100.0)), windows_of(translating_push(rate=500.0))
     assert len(coarse) == len(fine)
     for a, b in zip(coarse, fine, strict=True):
@@ -102,17 +100,17 @@ def test_no_window_spans_a_dropout(stream: str) -> None:
     take = wrench_rows if stream == "wrench" else rows
     windows = windows_of(replace(recording, **{stream: take(getattr(recording, stream), keep)}))
     assert windows and all((w.end - START) * 1e-9 < 1.22 or (w.start - START) * 1e-9 > 1.2 for w in windows)
-    assert len({w.push_id for w in windows}) == 1  # one push all the same: its windows are not independent
+    assert len({w.push_id for w in windows}) == 1  # still one push: its windows are not independent
 
 
-def test_a_gap_of_three_periods_is_no_dropout() -> None:
+def test_gap_of_three_periods_is_no_dropout() -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     time = (recording.slider.stamp - START) * 1e-9
     gappy = replace(recording, slider=rows(recording.slider, (time < 1.195) | (time > 1.215)))
     assert len(windows_of(gappy)) == len(windows_of(recording))
 
 
-def test_a_reset_of_the_slider_ends_the_push() -> None:
+def test_reset_of_the_slider_ends_the_push() -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     time = (recording.slider.stamp - START) * 1e-9
     late = time > 1.5
@@ -126,21 +124,21 @@ def test_a_reset_of_the_slider_ends_the_push() -> None:
     assert len({w.push_id for w in windows}) == 2
 
 
-def test_a_lifted_tip_is_not_in_contact() -> None:
+def test_lifted_tip_is_not_in_contact() -> None:
     recording = translating_push()
     pusher = recording.pusher
     lifted = PoseStream(pusher.stamp, pusher.x, pusher.y, pusher.z + 0.05, pusher.heading)
     assert windows_of(replace(recording, pusher=lifted)) == []
 
 
-def test_no_force_means_no_contact_however_near_the_tip() -> None:
+def test_near_tip_without_force_is_not_in_contact() -> None:
     recording = translating_push()
     assert recording.wrench is not None
     silent = replace(recording.wrench, fx=0.0 * recording.wrench.fx, fy=0.0 * recording.wrench.fy)
     assert windows_of(replace(recording, wrench=silent)) == []
 
 
-def test_a_bias_of_the_sensor_is_not_contact() -> None:
+def test_bias_of_the_force_sensor_is_not_contact() -> None:
     recording = translating_push(Push(begin=0.7, end=1.6))
     assert recording.wrench is not None
     biased = replace(recording.wrench, fx=recording.wrench.fx + 5.0, fy=recording.wrench.fy - 3.0)
@@ -149,7 +147,7 @@ def test_a_bias_of_the_sensor_is_not_contact() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.005, 0.02, 0.1])
-def test_without_a_wrench_contact_begins_where_the_gap_shrinks_no_more(speed: float) -> None:
+def test_contact_without_wrench_begins_when_the_gap_stops_shrinking(speed: float) -> None:
     push = Push(begin=0.8, end=2.1, speed=speed)
     windows = windows_of(replace(translating_push(push), wrench=None))
     assert len(windows) == 6
@@ -158,7 +156,7 @@ def test_without_a_wrench_contact_begins_where_the_gap_shrinks_no_more(speed: fl
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_push_from_rest_in_contact_has_a_first_window_of_its_own_motion(seed: int) -> None:
+def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     rng, rate = np.random.default_rng(seed), 250.0
     time = np.arange(0.0, 2.5, 1.0 / rate)
     driven = 0.02 * np.maximum(time - 1.0, 0.0)  # at rest in contact for a second, then 20 mm/s at once
@@ -169,7 +167,7 @@ def test_a_push_from_rest_in_contact_has_a_first_window_of_its_own_motion(seed: 
     still = np.zeros_like(time)
     recording = Recording("rest", rig, pose_stream(time, slider, still), pose_stream(time, pusher, still), None)
     first = windows_of(recording)[0]
-    assert first.velocity == pytest.approx(0.02, rel=0.5)  # the fit may hold the moment of setting off
+    assert first.velocity == pytest.approx(0.02, rel=0.5)  # the fit may include the start of the motion
     assert abs(first.angle) < 0.45
     assert first.displacement[0] > 0.9 * 0.004
 
@@ -198,13 +196,13 @@ def test_two_contacts_are_two_pushes() -> None:
     assert len(table) == 2 * len(windows_of(first))
 
 
-def test_a_stride_overlaps_windows_for_training() -> None:
+def test_short_stride_gives_overlapping_windows() -> None:
     tiled, overlapping = windows_of(translating_push()), windows_of(translating_push(), WindowOptions(stride=0.05))
     assert len(overlapping) > 3 * len(tiled)
     assert all(b.start - a.start == 50_000_000 for a, b in itertools.pairwise(overlapping))
 
 
-def test_late_and_repeated_stamps_are_refused_and_counted() -> None:
+def test_late_and_repeated_stamps_are_discarded_and_counted() -> None:
     recording = translating_push()
     assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
@@ -216,12 +214,12 @@ def test_late_and_repeated_stamps_are_refused_and_counted() -> None:
     assert finder.counts["refused"] == 6
 
 
-def test_a_clock_set_back_begins_anew_and_loses_no_window() -> None:
+def test_clock_set_back_loses_no_window() -> None:
     recording = translating_push()
     assert recording.rig is not None and recording.wrench is not None
     finder = WindowFinder(recording.rig)
     found = []
-    for _ in range(3):  # as a looped replay does
+    for _ in range(3):  # as in a looped replay
         finder.add_wrench(recording.wrench)
         finder.add_pusher(recording.pusher)
         finder.add_slider(recording.slider)
@@ -231,7 +229,7 @@ def test_a_clock_set_back_begins_anew_and_loses_no_window() -> None:
     assert len(found) == 3 * len(windows_of(recording))
 
 
-def test_at_a_vertex_the_contact_belongs_to_the_edge_it_slid_along() -> None:
+def test_contact_at_a_vertex_belongs_to_the_edge_it_slid_along() -> None:
     recording = translating_push(Push(begin=0.5, end=2.5))
     rig = recording.rig
     assert rig is not None

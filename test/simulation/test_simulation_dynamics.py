@@ -1,4 +1,4 @@
-"""The simulated slider obeys Newton, Euler and Coulomb, and in the slow limit the mechanics of quasi-static pushing."""
+"""The simulated slider obeys Newton-Euler dynamics and Coulomb friction, and at low speed quasi-static mechanics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ACCELERATION = 2.5
 
 
 def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, friction: float = FRICTION) -> Physics:
-    """n equal sliders of evenly shared load on an even table."""
+    """n equal sliders with uniform load on a uniform table."""
     points = support_points(slider.outline)
     return Physics(
         outline=slider.outline,
@@ -47,7 +47,7 @@ def push(
 
 
 def let_go(physics: Physics, velocity: Array, duration: float = 0.25) -> Motion:
-    """Sliders set in motion, the rod far away."""
+    """Free motion of sliders with initial velocities, far from the rod."""
     n = len(velocity)
     away = PusherPath(np.full((n, 2), 1.0), np.tile([1.0, 0.0], (n, 1)), np.full(n, 0.01), np.full(n, 0.01), 1.0)
     still = np.zeros((n, 3))
@@ -69,7 +69,7 @@ def turned(plan: PushPlan, speed: float) -> PushPlan:
 
 
 def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, sticks: bool, steps: int = 100) -> Array:
-    """Where quasi-static pushes over `distance` beyond the touch bring sliders (n, 3).
+    """Poses (n, 3) after quasi-static pushes over `distance` beyond the touch.
 
     The slider's twist is the one of least frictional power that the contact allows (Peshkin and Sanderson 1988): a
     sticking contact hands on the tip's velocity, a frictionless one its normal part.
@@ -105,7 +105,7 @@ def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, st
 
 
 def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: float) -> Array:
-    """Where the sliders (n, 3) are once the tips have gone `distance` beyond the commanded touch."""
+    """Poses (n, 3) when the tips have travelled `distance` beyond the commanded touch."""
     inward = physics.outline.inward_normal(plan.contact)
     goal = physics.outline.point(plan.contact) - physics.radius * inward + distance * rotate(inward, plan.angle)
     reached = np.argmin(np.linalg.norm(motion.pusher - goal[:, None], axis=2), axis=1)
@@ -123,7 +123,7 @@ def test_slow_push_minimises_dissipation(shape: str, contact_friction: float, st
     physics = even_physics(slider_named(shape), len(SLOW), contact_friction)
     expected = least_dissipation_path(physics, SLOW, 0.01, sticks)
     found = at_distance(push(physics, SLOW), SLOW, physics, 0.01)
-    assert np.all(np.abs(found - expected)[:, :2] < 1e-4)  # 1 % of the way
+    assert np.all(np.abs(found - expected)[:, :2] < 1e-4)  # 1 % of the distance
     assert np.all(np.abs(found - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
 
 
@@ -139,11 +139,11 @@ def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
 
 @given(st.floats(0.05, 0.4), st.floats(-np.pi, np.pi), st.sampled_from(["rect1", "ellip3", "hex"]))
 @settings(max_examples=8, deadline=None)
-def test_free_slider_stops_when_friction_has_dissipated_its_energy(speed: float, way: float, shape: str) -> None:
-    velocity = np.array([[speed * np.cos(way), speed * np.sin(way), 0.0]])
+def test_free_slider_stops_when_friction_has_dissipated_its_energy(speed: float, direction: float, shape: str) -> None:
+    velocity = np.array([[speed * np.cos(direction), speed * np.sin(direction), 0.0]])
     end = travelled(let_go(even_physics(slider_named(shape), 1), velocity))[0]
     assert np.hypot(*end[:2]) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
-    assert np.arctan2(end[1], end[0]) == pytest.approx(way, abs=1e-3)
+    assert np.arctan2(end[1], end[0]) == pytest.approx(direction, abs=1e-3)
     assert abs(end[2]) < 1e-6
 
 
@@ -180,7 +180,7 @@ def test_outcome_converges_with_smaller_time_steps() -> None:
     plan = random_pushes(12, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7))
     physics = even_physics(slider_named("ellip2"), 12)
     path = pusher_path(plan, physics.outline, RADIUS, np.zeros((12, 3)), ACCELERATION)
-    ends = [travelled(push(physics, plan, rest=0.1, time_step=way / path.speed)) for way in (8e-5, 4e-5, 1e-5)]
+    ends = [travelled(push(physics, plan, rest=0.1, time_step=step / path.speed)) for step in (8e-5, 4e-5, 1e-5)]
     coarse, usual = (relative(end - ends[-1], ends[-1]) for end in ends[:2])
     assert np.all(usual < 0.005)
     assert np.all(usual < coarse)
@@ -221,9 +221,9 @@ def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
     motion = push(physics, plan)
     gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
     gap = gap.reshape(motion.time.shape)
-    stopping_way = plan.speed * physics.mass / DAMPING  # of a slider that a damper alone stops
+    stopping_distance = plan.speed * physics.mass / DAMPING  # of a slider that a damper alone stops
     yielding = 2.0 * FRICTION * physics.mass * GRAVITY / STIFFNESS
-    assert np.all(np.min(gap, axis=1) > -stopping_way - yielding)
+    assert np.all(np.min(gap, axis=1) > -stopping_distance - yielding)
     assert np.all(gap[:, -1] > 0.0)
     assert np.all(motion.wrench[:, -1] == 0.0)
     assert np.max(np.abs(motion.slider[:, -1] - motion.slider[:, -20])) < 1e-7

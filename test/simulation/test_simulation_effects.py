@@ -1,4 +1,4 @@
-"""What acts beside the plain rig does to pushes what mechanics says, and nothing where nothing is asked for."""
+"""Changes to the plain rig have the effects that mechanics predicts, and changes of zero have none."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from push_predictor.simulation.slider import support_points
 from push_predictor.simulation.surface import Surface
 from push_predictor.types import Array
 
-GLASS = Surface("glass", 0.2, 0.0, 0.02, 0.0, 0.0)  # alike everywhere, nothing left to chance
+GLASS = Surface("glass", 0.2, 0.0, 0.02, 0.0, 0.0)  # uniform and without noise
 QUIET = Sensors(tracker_noise=0.0, heading_noise=0.0, tip_noise=0.0, dropout_interval=0.0)
 
 
@@ -31,7 +31,7 @@ def spec_of(plan: PushPlan, **options: object) -> SimulationSpec:
 
 
 def middle_pushes(angle: Array, speed: float = 0.02) -> PushPlan:
-    """At the middle of the lowest side."""
+    """Pushes at the middle of the lowest side."""
     n = len(angle)
     return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, 0.012))
 
@@ -118,7 +118,7 @@ def test_lower_table_friction_changes_the_force_but_not_the_motion() -> None:
 
 
 def _largest_force(spec: SimulationSpec) -> float:
-    """Median over the pushes' middles, N."""
+    """Median force at the middle of the pushes, N."""
     (batch,) = run_pushes(spec)
     force = np.hypot(batch.motion.wrench[..., 0], batch.motion.wrench[..., 1])
     return float(np.median(force[force > 0.0]))
@@ -150,14 +150,14 @@ def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     left = x * -heading[1] if abs(heading[1]) > 0.5 else support_points(spec.slider.outline)[:, 1] * heading[0]
     loaded = replace(spec, changes=Changes(load=lambda moment: 30.0 * left[None, :]))
     assert abs(mean_outcome(spec)[2]) < abs(mean_outcome(loaded)[2])
-    assert mean_outcome(loaded)[2] > 0.005  # the heavy left side stays behind: it turns to the left
+    assert mean_outcome(loaded)[2] > 0.005  # the loaded left side lags, so the slider turns left
 
 
 def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
     plan = middle_pushes(np.zeros(1))
 
     def turned(heading: float) -> Array:
-        """What the grain does to a push of a slider with this heading."""
+        """The effect of the grain on a push of a slider with this heading."""
         grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.travelled), 1)))
         spec = replace(spec_of(plan), turn_spread=1.0)
         return _at_heading(replace(spec, changes=grain), heading) - _at_heading(spec, heading)
@@ -169,7 +169,7 @@ def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() 
 
 
 def _at_heading(spec: SimulationSpec, heading: float) -> Array:
-    """The mean outcome where the slider is put down with this heading."""
+    """The mean outcome of pushes of a slider with this heading."""
     drawn = float(spec.rng(1).standard_normal((1, 3))[0, 2])
     return mean_outcome(replace(spec, turn_spread=heading / drawn))
 
@@ -223,14 +223,14 @@ def test_conditions_equal_the_covariates_of_the_window_finder() -> None:
 
     table = _found(simulate(replace(spec, changes=Changes(contact_friction=note))))
     first = table.take(np.unique(table.push_id, return_index=True)[1])
-    told, order = seen[0], np.argsort(seen[0].row)
+    conditions, order = seen[0], np.argsort(seen[0].row)
     rows = order[first.covariates["push_index"].astype(int)]
     for name, error in (("elapsed_time", 0.6), ("dwell_time", 0.1), ("slider_x", 3e-4), ("slider_heading", 3e-3)):
-        assert told.values[name][rows] == pytest.approx(first.covariates[name], abs=error), name
-    away = wrap_angle(told.values["push_heading"][rows] - first.covariates["push_heading"])
+        assert conditions.values[name][rows] == pytest.approx(first.covariates[name], abs=error), name
+    away = wrap_angle(conditions.values["push_heading"][rows] - first.covariates["push_heading"])
     assert away == pytest.approx(0.0, abs=0.02)
-    assert np.corrcoef(told.values["slid_distance"][rows], first.covariates["slid_distance"])[0, 1] > 0.99
-    assert told.values["room/light"][rows] == pytest.approx(0.5 * told.values["elapsed_time"][rows])
+    assert np.corrcoef(conditions.values["slid_distance"][rows], first.covariates["slid_distance"])[0, 1] > 0.99
+    assert conditions.values["room/light"][rows] == pytest.approx(0.5 * conditions.values["elapsed_time"][rows])
 
 
 def _found(recording: Recording) -> PushTable:

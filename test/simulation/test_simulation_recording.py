@@ -1,4 +1,4 @@
-"""A simulated recording looks like one from a rig: streams on their own clocks, noise, gaps, resets, a lifted tip."""
+"""A simulated recording has the properties of a real one: separate stamps, noise, dropouts, resets, a lifted tip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings whose truth is known exactly: a pusher that drives straight, a slider that follows a given motion."""
+"""Recordings with an exactly known motion: a pusher on a straight line, a slider with a given motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def square_rig() -> Rig:
 
 
 def square_pushes(count: int, seed: int = 0) -> tuple[PushTable, Rig]:
-    """Windows of the square on ABS by the analytical model, three a push; noise that grows with the angle."""
+    """Windows of the square on ABS by the analytical model, three per push, with noise that grows with the angle."""
     rng, rig = np.random.default_rng(seed), replace(square_rig(), surface="abs")
     inputs = np.column_stack([np.full(count, 0.02), rng.random(count), rng.uniform(-1.0, 1.0, count)])
     duration = np.full(count, 0.2)
@@ -61,7 +61,7 @@ class Push:
 def translating_push(
     push: Push = Push(), *, contact: float = 0.125, rate: float = 100.0, tail: float = 0.8
 ) -> Recording:
-    """The slider is pushed from rest at the origin, by a tip that always drives at the push's speed towards it."""
+    """The slider is pushed from rest at the origin by a tip that always moves at the speed of the push."""
     rig = square_rig()
     time = np.arange(0.0, push.end + tail, 1.0 / rate)
     driven = np.clip(time, push.begin, push.end) - push.begin
@@ -86,12 +86,12 @@ def stamps(time: Array) -> IntArray:
 
 
 def pose_stream(time: Array, position: Array, heading: Array) -> PoseStream:
-    """A stream in the plane z = 0."""
+    """A pose stream in the plane z = 0."""
     return PoseStream(stamps(time), position[:, 0], position[:, 1], np.zeros_like(time), heading)
 
 
 def moved(recording: Recording, shift: Array, turn: float) -> Recording:
-    """The same recording seen from a world that is turned by `turn` (rad) and shifted (2,) m."""
+    """The recording in a world that is rotated by `turn` (rad) and shifted (2,) m."""
     wrench = recording.wrench
     assert wrench is not None
     force = rotate(np.column_stack([wrench.fx, wrench.fy]), np.array(turn))
@@ -109,15 +109,15 @@ def _moved_pose(stream: PoseStream, shift: Array, turn: float) -> PoseStream:
 
 
 def rows(stream: PoseStream, keep: np.ndarray) -> PoseStream:
-    """The samples that `keep` (mask, indices or slice) names."""
+    """The samples selected by `keep` (mask, indices or slice)."""
     return PoseStream(stream.stamp[keep], stream.x[keep], stream.y[keep], stream.z[keep], stream.heading[keep])
 
 
 def wrench_rows(stream: WrenchStream, keep: np.ndarray) -> WrenchStream:
-    """The same of a wrench."""
+    """The wrench samples selected by `keep`."""
     return WrenchStream(stream.stamp[keep], stream.fx[keep], stream.fy[keep], stream.torque[keep])
 
 
 def triangle() -> Outline:
-    """A right triangle about its centroid: no symmetry at all."""
+    """A right triangle about its centroid, without symmetry."""
     return Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))
