@@ -1,4 +1,4 @@
-"""push_predictor trace: the residual loop, from recordings to an extended model."""
+"""push_predictor trace: find what a model fails to explain on new pushes, and extend the model by it."""
 
 from __future__ import annotations
 
@@ -27,25 +27,29 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "trace",
-        "Find what a model leaves over on new pushes, trace it to an effect that the model lacks, add the effect, and "
-        "measure before and after on pushes held out from the search.",
+        "Find what a model fails to explain on new pushes and trace it to an effect. Add the effect to the model and "
+        "compare before and after on held-out pushes.",
         "push_predictor trace bags/new --model abs.pushmodel --report trace.html --save-model extended.pushmodel",
     )
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     parser.add_argument("--model", required=True, type=Path, metavar="MODEL", help="the deployed model")
     parser.add_argument(
-        "--covariates", metavar="NAME,...", help="drivers to try, topic:/NAME for a recorded scalar; default: all"
+        "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
     )
-    parser.add_argument("--alpha", type=float, default=0.01, help="family-wise level (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="of the bootstrap (default %(default)s)")
-    parser.add_argument("--report", type=Path, metavar="OUT.html", help="write a page with pictures")
-    parser.add_argument("--save-model", type=Path, metavar="EXTENDED", help="write the extended model, if there is one")
+    parser.add_argument(
+        "--alpha", type=float, default=0.01, help="family-wise significance level (default %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="K", help="seed of the bootstrap (default %(default)s)")
+    parser.add_argument("--report", type=Path, metavar="OUT.html", help="write an HTML page with figures")
+    parser.add_argument(
+        "--save-model", type=Path, metavar="EXTENDED", help="write the extended model, if the trace extends it"
+    )
     add_rig(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Trace, write what was asked for, say what was found."""
+    """Trace, write the files asked for, print the verdict."""
     from push_predictor.recordings.rig import load_rig
     from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.trace import trace_data
@@ -72,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
 def _names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise RequestError("--covariates", text, "names with commas between them")
+        raise RequestError("--covariates", text, "names separated by commas")
     return list(dict.fromkeys(names))
 
 
@@ -83,7 +87,7 @@ def _write_report(path: Path, found: Trace) -> None:
 
 
 def _save(path: Path | None, found: Trace) -> bool:
-    """Save the extended model where there is one; else say so."""
+    """Save the extended model; warn if there is none."""
     from push_predictor.models.store.model_file import save_model
 
     if path is None:
@@ -103,5 +107,5 @@ def _print(found: Trace, options: argparse.Namespace, saved: bool) -> None:
     if options.report is not None:
         print(f"report: {options.report}")
     if saved and found.extended is not None:
-        needs = ", ".join(found.extended.needs) or "nothing more"
-        print(f"extended model: {options.save_model}; a request must bring {needs}")
+        needs = ", ".join(found.extended.needs) or "no further covariates"
+        print(f"extended model: {options.save_model}; requests need {needs}")

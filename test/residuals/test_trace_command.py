@@ -71,7 +71,7 @@ def test_trace_of_a_table_writes_json_and_extended_model(
     assert set(result) >= SECTION_5 and result["pushes"] == {"analysis": 42, "held_out": 18}
     assert result["effects"][0]["covariate"] == "elapsed_time" and result["motion_model_changed"]
     assert load_model(model).needs == ("elapsed_time",)
-    assert "a request must bring elapsed_time" in capsys.readouterr().out
+    assert "requests need elapsed_time" in capsys.readouterr().out
 
 
 def test_options_reach_the_trace(place: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str]) -> None:

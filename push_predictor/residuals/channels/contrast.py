@@ -1,7 +1,7 @@
-"""New windows against the training windows: what is there in the one and not in the other, on any recorded quantity.
+"""New windows against training windows: regressions whose coefficients are the change since training.
 
-Rows of both tables are stacked; a column that lives on the new rows alone, beside the same column on all rows in the
-controls, has as its coefficient the new relation less that of the training windows.
+The rows of both tables are stacked. A column that is nonzero on the new rows alone, with the same column on all rows
+among the controls, has as its coefficient the new relation minus that in training.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 DRAWS = 1000
 FOLDS = 5
-GROSS = 5.0  # robust standard deviations; windows farther out are left aside
+GROSS = 5.0  # robust standard deviations; windows farther out are rejected
 TRIMMING_ROUNDS = 4
-FEWEST_PUSHES = 12  # of a table that is to be relied on
+FEWEST_PUSHES = 12  # of a training table that is used
 MAD_TO_SD = 1.4826
 COLLINEAR = (
     1e-6  # share of a column's square that the controls leaves; below it the column cannot be told from the controls
@@ -31,7 +31,7 @@ COLLINEAR = (
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """What may explain a quantity: columns (n, k, p), zero outside the new rows; shared (n, m) with training."""
+    """A candidate for a recorded quantity: columns (n, k, p), zero on training rows; shared (n, m): on all rows."""
 
     mechanism: str
     covariate: str
@@ -40,25 +40,25 @@ class Contrast:
     shared: Array
 
     def take(self, rows: BoolArray) -> Contrast:
-        """The given rows."""
+        """The contrast on the given rows."""
         return replace(self, columns=self.columns[rows], shared=self.shared[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class Stacked:
-    """n rows, the training windows first: their table, which are new, the block of pushes each belongs to."""
+    """n rows of the tables, training windows first: which rows are new (n,), and the block of pushes of each (n,)."""
 
     tables: tuple[PushTable, ...]
     new: BoolArray
     block: IntArray
 
     def joined(self, columns: list[Array]) -> Array:
-        """What was computed table by table, one after the other."""
+        """Columns of all tables, one after the other."""
         return np.concatenate(columns)
 
 
 def stacked(windows: PushTable, baseline: PushTable | None, needed: tuple[str, ...]) -> Stacked:
-    """The new windows after those of the baseline, which is left out where it lacks what is needed or is tiny."""
+    """Training windows, then new windows; the former are dropped if they lack a needed covariate or are few."""
     usable = (
         baseline is not None
         and all(name in baseline.covariates for name in needed)
@@ -74,7 +74,7 @@ def stacked(windows: PushTable, baseline: PushTable | None, needed: tuple[str, .
 
 
 def block_diagonal(columns: list[Array]) -> Array:
-    """Columns of each table (n_k, m), each on its own rows alone: (sum n_k, sum m)."""
+    """Columns (n_k, m) of each table as a block-diagonal matrix (sum n_k, sum m)."""
     wide = np.zeros((sum(map(len, columns)), sum(c.shape[1] for c in columns)))
     row = column = 0
     for part in columns:
@@ -84,19 +84,19 @@ def block_diagonal(columns: list[Array]) -> Array:
 
 
 def inliers(z: Array, columns: Array, controls: Array) -> BoolArray:
-    """Rows (n,) of z (n, k) that lie within GROSS of their fit by the controls (n, m) and the columns (n, k, p)."""
+    """Rows (n,) of z (n, k) within GROSS deviations of their fit by controls (n, m) and columns (n, k, p)."""
     keep = np.ones(len(z), dtype=np.bool_)
     for _ in range(TRIMMING_ROUNDS):
-        left = np.column_stack(
-            [_left(z[:, k], np.column_stack([controls, columns[:, k]]), keep) for k in range(z.shape[1])]
+        residual = np.column_stack(
+            [_residual(z[:, k], np.column_stack([controls, columns[:, k]]), keep) for k in range(z.shape[1])]
         )
-        spread = MAD_TO_SD * np.median(np.abs(left[keep]), axis=0)
-        keep = np.all(np.abs(left) <= GROSS * np.maximum(spread, np.finfo(float).tiny), axis=1)
+        spread = MAD_TO_SD * np.median(np.abs(residual[keep]), axis=0)
+        keep = np.all(np.abs(residual) <= GROSS * np.maximum(spread, np.finfo(float).tiny), axis=1)
     return keep
 
 
 def screen_contrasts(z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0) -> Screened:
-    """Screen what is tried on z (n, k); each has taken out of it what it shares with the training windows."""
+    """Screen contrasts on z (n, k), with the controls and the columns shared with training regressed out."""
     scores = [block_scores(z, each.columns, np.column_stack([controls, each.shared]), block) for each in tried]
     return screen(scores, seed)
 
@@ -104,12 +104,12 @@ def screen_contrasts(z: Array, tried: Sequence[Contrast], controls: Array, block
 def best_and_rivals(
     z: Array, tried: Sequence[Contrast], controls: Array, block: IntArray, seed: int = 0
 ) -> list[Contrast]:
-    """The one with the largest gain out of sample, then those that are not surely worse: 95 % of paired draws."""
+    """The contrast with the largest cross-validated gain, then those not significantly worse at 5 %."""
     gains = [_gains(z, each, controls, block) for each in tried]
     order = np.argsort([-float(gain.sum()) for gain in gains], kind="stable").tolist()
     best = gains[order[0]]
     weights = _weights(len(best), seed)
-    level = 0.05 / max(len(order) - 1, 1)  # the best was chosen among them all, so that it looks better than it is
+    level = 0.05 / max(len(order) - 1, 1)  # Bonferroni: the best was selected among all of them
     alike = [k for k in order[1:] if float(np.quantile(weights @ (best - gains[k]), level)) <= 0.0]
     return [tried[k] for k in (order[0], *alike)]
 
@@ -117,39 +117,39 @@ def best_and_rivals(
 def estimate_with_draws(
     z: Array, columns: Array, controls: Array, shared: Array, block: IntArray, seed: int = 0
 ) -> tuple[Array, Array]:
-    """Coefficients (p,) of columns (n, k, p) for z (n, k), and draws (DRAWS, p) of them: blocks drawn anew."""
+    """Coefficients (p,) of columns (n, k, p) for z (n, k), and bootstrap draws (DRAWS, p) of them by block."""
     residualizer = Residualizer(np.column_stack([controls, shared]))
-    left, flat = residualizer(z), residualizer(columns)
+    residual, flat = residualizer(z), residualizer(columns)
     p = flat.shape[2]
     square = sums_by(block, np.einsum("nkp,nkq->npq", flat, flat).reshape(len(z), -1)).reshape(-1, p, p)
-    score = sums_by(block, np.einsum("nkp,nk->np", flat, left))
+    score = sums_by(block, np.einsum("nkp,nk->np", flat, residual))
     weights = _weights(len(score), seed)
     draws = _solved(np.tensordot(weights, square, axes=1), weights @ score)
     return _solved(square.sum(axis=0)[None], score.sum(axis=0)[None])[0], draws
 
 
 def is_identifiable(each: Contrast, controls: Array) -> bool:
-    """Whether every column of it holds something that the controls (n, m) and what is shared do not."""
+    """Whether no column is collinear with the controls (n, m) and the shared columns."""
     residualizer = Residualizer(np.column_stack([controls, each.shared]))
-    size, left = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, residualizer(each.columns)))
-    return bool(np.all(left > COLLINEAR * size) and np.all(size > 0.0))
+    size, residual = (np.sum(values**2, axis=(0, 1)) for values in (each.columns, residualizer(each.columns)))
+    return bool(np.all(residual > COLLINEAR * size) and np.all(size > 0.0))
 
 
 def robust_deviation(values: Array) -> float:
-    """Standard deviation of values (n,), whatever their tails."""
+    """Robust standard deviation of values (n,), from the median absolute deviation."""
     return float(MAD_TO_SD * np.median(np.abs(values - np.median(values))))
 
 
 def _gains(z: Array, each: Contrast, controls: Array, block: IntArray) -> Array:
-    """Gain (b,) in nats of each block, fitted on the folds that it is not in."""
+    """Cross-validated gain (b,) in nats of each block."""
     residualizer = Residualizer(np.column_stack([controls, each.shared]))
-    left, flat = Residualizer(controls)(z), residualizer(each.columns)
+    residual, flat = Residualizer(controls)(z), residualizer(each.columns)
     gains = np.zeros((len(z), 1))
     for fold in range(FOLDS):
         test = block % FOLDS == fold
         x = flat[~test].reshape(-1, flat.shape[2])
-        after = left - flat @ np.linalg.lstsq(x, left[~test].ravel(), rcond=None)[0]
-        before_log, after_log = (_log_density(r[test], np.mean(r[~test] ** 2, axis=0)) for r in (left, after))
+        after = residual - flat @ np.linalg.lstsq(x, residual[~test].ravel(), rcond=None)[0]
+        before_log, after_log = (_log_density(r[test], np.mean(r[~test] ** 2, axis=0)) for r in (residual, after))
         gains[test, 0] = after_log - before_log
     return sums_by(block, gains)[:, 0]
 
@@ -163,11 +163,11 @@ def _weights(blocks: int, seed: int) -> Array:
     return draws.astype(np.float64)
 
 
-def _left(z: Array, design: Array, rows: BoolArray) -> Array:
+def _residual(z: Array, design: Array, rows: BoolArray) -> Array:
     coefficients = np.linalg.lstsq(design[rows], z[rows], rcond=None)[0]
     return np.asarray(z - design @ coefficients)
 
 
 def _solved(square: Array, score: Array) -> Array:
-    """Coefficients (d, p) of d systems, of least length where one is singular."""
+    """Minimum-norm solutions (d, p) of d linear systems."""
     return np.asarray(np.einsum("dpq,dq->dp", np.linalg.pinv(square, rcond=1e-12, hermitian=True), score))

@@ -1,8 +1,8 @@
-"""Putting a measurement error right where it was made: in the stream, so that the windows can be cut again.
+"""Correct a measurement error in the stream where it occurred, so that the windows can be cut again.
 
-The tracker's stream is brought to the robot's frame and clock, since the pusher's command, the contact and the push
-frame are told in these; a tool offset goes out of the pusher's stream, a bias out of the wrench. A push table keeps no
-streams: its windows cannot be cut again.
+The tracker's stream is moved to the robot's frame and clock, in which the pusher, the contact and the push frame are
+expressed. A tool offset is subtracted from the pusher's stream, a bias from the wrench. A push table contains no
+streams, so its windows cannot be cut again.
 """
 
 from __future__ import annotations
@@ -17,16 +17,15 @@ from push_predictor.recordings.streams import PoseStream, Recording
 
 
 def correct(recording: Recording, mechanism: str, values: Sequence[float]) -> Recording:
-    """The recording without an error of measurement.
+    """The recording without a measurement error; values: its parameters, as in MeasurementFault.values.
 
-    values: the error's parameters as MeasurementFault.values gives them. clock_offset (s): the slider's stamps come
-    late; frame_rotation (rad): the tracker's frame shows the slider turned about the world's origin; frame_shift (m,
-    m): it shows it shifted; tool_offset (m, m): the pusher's stream shows the tip shifted; wrench_bias (N, N): the
-    sensor reads too much, in world axes. Raises KeyError for another mechanism.
+    clock_offset (s): the slider's stamps are late. frame_rotation (rad): the slider appears rotated about the world's
+    origin. frame_shift (m, m): the slider appears shifted. tool_offset (m, m): the pusher appears shifted. wrench_bias
+    (N, N): the sensor reads too much, in world axes. Raises KeyError for another mechanism.
     """
     corrected = CORRECTIONS[mechanism](recording, *values)
-    told = ", ".join(f"{value:.3g}" for value in values)
-    return replace(corrected, notes=(*recording.notes, f"corrected for {mechanism} ({told})"))
+    sizes = ", ".join(f"{value:.3g}" for value in values)
+    return replace(corrected, notes=(*recording.notes, f"corrected for {mechanism} ({sizes})"))
 
 
 def _clock(recording: Recording, lateness: float) -> Recording:

@@ -1,4 +1,4 @@
-"""Where the force of each window lies on the limit surface: its load, its direction, what a bias would do to both."""
+"""The force of each window on the limit surface: its load, its direction, and the effect of a sensor bias on both."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ FORCES = ("normal_force", "tangential_force")
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Of each window: log of the load on the limit surface, direction (rad, from the inward normal), what the
-    prediction says of it, and the change of the two (n, 2, 2) per N of bias in the world."""
+    """Per window: log load on the limit surface, direction (rad, from the inward normal), and predicted direction.
+
+    bias (n, 2, 2): change of load and direction per N of sensor bias in the world.
+    """
 
     size: Array
     direction: Array
@@ -27,7 +29,7 @@ class Load:
 
 
 def loads(table: PushTable, physics: AnalyticalPush) -> Load:
-    """Load, direction and their sensitivity to a bias, of windows with both forces."""
+    """Load, direction and their sensitivity to a bias, for windows with both forces."""
     normal_force, left_force = (table.covariates[name] for name in FORCES)
     velocity, contact, angle = table.inputs.T
     normal = physics.outline.inward_normal(contact)
@@ -47,7 +49,7 @@ def loads(table: PushTable, physics: AnalyticalPush) -> Load:
 
 
 def _world_axes(table: PushTable, angle: Array) -> Array:
-    """Inward normal and its left in the world (n, 2, 2), rows; zero where no heading was recorded."""
+    """Inward normal and its left in the world (n, 2, 2), as rows; zero if no heading was recorded."""
     heading = table.covariates.get("push_heading")
     if heading is None:
         return np.zeros((len(table), 2, 2))
@@ -56,7 +58,7 @@ def _world_axes(table: PushTable, angle: Array) -> Array:
 
 
 def inputs_of(table: PushTable, physics: AnalyticalPush, most: int) -> Array:
-    """A basis (n, m) of the model's inputs, at most so many columns: few pushes bear no more, and need no more."""
+    """A basis (n, m) of the model's inputs with at most that many columns, for tables of few pushes."""
     velocity, contact, angle = table.inputs.T
     turn = 2.0 * np.pi * contact
     normal = physics.outline.inward_normal(contact)

@@ -1,13 +1,13 @@
-"""Errors of the measurement itself: clocks that disagree, a tracker's frame turned or shifted against the robot's.
+"""The measurement channel: clock offsets, and rotations or shifts of the tracker's frame against the robot's.
 
-While the tip pushes, the gap between tip and outline is zero; what the windows' contact_gap shows instead is the
-measurement. Of the slider's stream (the tracker's), against the robot's frame and clock: a shift s in the world opens
-the gap by -n.s (n: outward normal at the contact), a turn e about the world's origin by -n.(e x contact point), stamps
-that come late by d by -v cos(angle) d. Whatever depends on the contact alone is geometry (radius, outline, a marker's
-place on the slider) and is taken out, as is the give of the contact under its force.
+While the pusher pushes, the gap between pusher and outline is zero; a measured gap is a measurement error. A shift s of
+the slider's stream in the world opens the gap by -n.s (n: outward normal at the contact). A rotation e about the
+world's origin opens it by -n.(e x contact point), and stamps that are late by d by -v cos(angle) d. A gap that depends
+on the contact point alone is geometry (radius, outline, marker position). It is regressed out, as is the compliance of
+the contact under its force.
 
-The clock is judged on windows after a push's first: at the touch the slider was at rest, and a late stream shows that
-rest. Later windows hold under acceleration too, v being the speed at the window's start.
+The clock is judged on windows after a push's first: at first contact the slider is at rest, and a late stream still
+shows it at rest. Later windows are valid under acceleration too; v is the speed at the window's start.
 """
 
 from __future__ import annotations
@@ -45,17 +45,19 @@ PARAMETERS = {
     "frame_rotation": (("turn of the tracker's frame", "rad"),),
     "frame_shift": (("shift of the tracker's frame along x", "m"), ("shift of the tracker's frame along y", "m")),
 }
-ALIKE = {"frame_shift": ("tool_offset",)}  # a tip that is off by -s, as long as the tool does not turn
-MOST_EDGES = 8  # of an outline whose edges are told apart; others are smooth
+ALIKE = {"frame_shift": ("tool_offset",)}  # equivalent to a tool offset of -s, as long as the tool does not rotate
+MOST_EDGES = 8  # of an outline whose edges are treated separately; others count as smooth
 FEWEST_ROWS = 2.0  # per column
-CORNER = 0.002  # m; contacts as near to a corner may be on either side of it
-LEAST_SIZE = 1.0  # of an effect on the gap, root mean square, in units of the gap's noise
+CORNER = 0.002  # m; contacts closer to a corner may be on either side of it
+LEAST_SIZE = 1.0  # root mean square effect on the gap, in units of the gap's noise
 
 
 @dataclass(frozen=True)
 class MeasurementFault:
-    """One error with its parameters (the slider's stream against the robot's), family-wise p, and the names of what
-    these data cannot tell from it. size: root mean square of what it does to the gap, m (to the force, N)."""
+    """A measurement error with its parameters (slider's stream against the robot's) and family-wise p value.
+
+    rivals: errors that fit equally well. size: root mean square effect on the gap, m (on the force, N).
+    """
 
     mechanism: str
     parameters: tuple[Sized, ...]
@@ -71,9 +73,9 @@ class MeasurementFault:
 
 @dataclass(frozen=True)
 class MeasurementFinding:
-    """errors: the strongest first, none where the measurement is sound; tested: all that was tried.
+    """Errors found, strongest first, and all candidates tested.
 
-    noise: robust standard deviation of the gap, m. against_training: whether the training windows' own gap was
+    noise: robust standard deviation of the gap, m. against_training: whether the gap of the training windows was
     subtracted.
     """
 
@@ -85,7 +87,7 @@ class MeasurementFinding:
 
 @dataclass(frozen=True, eq=False)
 class _Gap:
-    """The gap z (n, 1) m, its controls (n, m), blocks of pushes, what is tried, which rows are new."""
+    """The gap z (n, 1) m with its controls (n, m), blocks of pushes (n,), contrasts, and which rows are new (n,)."""
 
     z: Array
     controls: Array
@@ -101,9 +103,9 @@ class _Gap:
 def measurement_errors(
     windows: PushTable, baseline: PushTable | None, rig: Rig, alpha: float = 0.01, seed: int = 0
 ) -> MeasurementFinding | None:
-    """Errors of measurement in new windows that the baseline (the model's training windows) does not have.
+    """Measurement errors in new windows that the baseline (the model's training windows) does not have.
 
-    None where the windows do not tell: no contact_gap or pose, or too few of them.
+    None if the windows do not determine them: no contact_gap, no pose, or too few windows.
     """
     if any(name not in windows.covariates for name in NEEDED):
         return None
@@ -147,7 +149,7 @@ def _gap_of(both: Stacked, outline: Outline) -> _Gap:
 
 
 def _geometry(table: PushTable, outline: Outline) -> Array:
-    """What a gap may be without any of the mechanisms (n, m): a function of the contact, give, shock of the touch."""
+    """Controls of the gap (n, m): a function of the contact point, compliance, transient of the first window."""
     shape = _edges(table.inputs[:, 1], outline) if len(outline.vertices) <= MOST_EDGES else _around(table.inputs[:, 1])
     first = 1.0 - _settled(table)
     columns = [shape, first, first * table.inputs[:, 0], first * table.inputs[:, 0] * np.cos(table.inputs[:, 2])]
@@ -157,7 +159,7 @@ def _geometry(table: PushTable, outline: Outline) -> Array:
 
 
 def _off_corners(table: PushTable, outline: Outline) -> PushTable:
-    """The windows whose normal is beyond doubt."""
+    """Windows that are not close to a corner, where the normal is ambiguous."""
     if len(outline.vertices) > MOST_EDGES:
         return table
     edge, fraction = outline.edge(table.inputs[:, 1])
@@ -183,29 +185,29 @@ def _settled(table: PushTable) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was found, its family-wise p, the names of what cannot be told from it."""
+    """A contrast found, its family-wise p value, and the names of its rivals."""
 
-    what: Contrast
+    contrast: Contrast
     p_value: float
     rivals: tuple[str, ...]
 
 
 def _searched(gap: _Gap, alpha: float, seed: int, against_training: bool) -> MeasurementFinding:
-    """Strongest first, each looked for in what those before it leave."""
-    controls, left = gap.controls, list(gap.tried)
+    """Select errors one by one, strongest first, each with those before it regressed out."""
+    controls, remaining = gap.controls, list(gap.tried)
     found: list[_Found] = []
     tested: tuple[Tested, ...] = ()
-    while left:
-        p_values = screen_contrasts(gap.z, left, controls, gap.block, seed).p_value.tolist()
-        tested = tested or tuple(Tested(t.mechanism, CONSTANT, p) for t, p in zip(left, p_values, strict=True))
-        significant = {t.mechanism: p for t, p in zip(left, p_values, strict=True) if p <= alpha}
+    while remaining:
+        p_values = screen_contrasts(gap.z, remaining, controls, gap.block, seed).p_value.tolist()
+        tested = tested or tuple(Tested(t.mechanism, CONSTANT, p) for t, p in zip(remaining, p_values, strict=True))
+        significant = {t.mechanism: p for t, p in zip(remaining, p_values, strict=True) if p <= alpha}
         if not significant:
             break
-        alike = best_and_rivals(gap.z, [t for t in left if t.mechanism in significant], controls, gap.block, seed)
+        alike = best_and_rivals(gap.z, [t for t in remaining if t.mechanism in significant], controls, gap.block, seed)
         best = alike[0]
         found.append(_Found(best, significant[best.mechanism], _names(alike)))
         controls = np.column_stack([controls, best.columns[:, 0]])
-        left = [t for t in left if t is not best and is_identifiable(t, controls)]
+        remaining = [t for t in remaining if t is not best and is_identifiable(t, controls)]
     errors, noise = _sized(gap, found, seed)
     return MeasurementFinding(errors, tested, noise, against_training)
 
@@ -216,8 +218,8 @@ def _names(alike: Sequence[Contrast]) -> tuple[str, ...]:
 
 
 def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[MeasurementFault, ...], float]:
-    """Estimates of all errors together; those that are lost in the noise of a single window are left out."""
-    columns = [f.what.columns for f in found]
+    """Joint estimates of all errors; those smaller than the noise of a single window are dropped."""
+    columns = [f.contrast.columns for f in found]
     residualizer = Residualizer(np.column_stack([gap.controls, *(c[:, 0] for c in columns)]))
     noise = robust_deviation(residualizer(gap.z)[:, 0])
     if not found:
@@ -226,11 +228,11 @@ def _sized(gap: _Gap, found: Sequence[_Found], seed: int) -> tuple[tuple[Measure
     values, draws = estimate_with_draws(gap.z, np.concatenate(columns, axis=2), gap.controls, nothing, gap.block, seed)
     errors, begin = [], 0
     for each in found:
-        part = slice(begin, begin := begin + each.what.columns.shape[2])
-        size = float(np.sqrt(np.mean((each.what.columns[gap.new, 0] @ values[part]) ** 2)))
+        part = slice(begin, begin := begin + each.contrast.columns.shape[2])
+        size = float(np.sqrt(np.mean((each.contrast.columns[gap.new, 0] @ values[part]) ** 2)))
         if size >= LEAST_SIZE * noise:
-            parameters = _parameters(each.what.mechanism, values[part], draws[:, part])
-            errors.append(MeasurementFault(each.what.mechanism, parameters, each.p_value, each.rivals, size))
+            parameters = _parameters(each.contrast.mechanism, values[part], draws[:, part])
+            errors.append(MeasurementFault(each.contrast.mechanism, parameters, each.p_value, each.rivals, size))
     return tuple(errors), noise
 
 

@@ -1,6 +1,7 @@
-"""Effects on the scatter: what makes outcomes vary more, once effects on their mean are out.
+"""The variance channel: covariates that the noise of the outcomes depends on, after effects on the mean.
 
-By ranks of the squared residuals, so that a few wild pushes decide nothing; the inputs are taken out as in the search.
+The test uses ranks of the squared residuals, so that a few outlying pushes decide nothing. The inputs are regressed out
+as in the search on the mean.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from push_predictor.types import Array
 
 TINY = 1e-12
 ALL = "all"
-MATERIAL = 1.25  # ratio to training that counts: a base that saw few pushes is somewhat wrong about its own scatter
+MATERIAL = 1.25  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
 
 
 @dataclass(frozen=True, eq=False)
 class VarianceEffect:
-    """A driver of the scatter. outputs: which vary with it; p_value: family-wise.
+    """An effect on the variance of some outputs, with its family-wise p value.
 
-    ratio: deviation of the residuals where the driver makes it largest over that where it makes it smallest, by the
-    basis fitted; for a constant, new data over training data.
+    ratio: largest over smallest standard deviation of the residuals along the covariate, as fitted; for a constant
+    effect, new data over training data.
     """
 
     covariate: str
@@ -44,9 +45,9 @@ class VarianceEffect:
 
 @dataclass(frozen=True, eq=False)
 class VarianceFinding:
-    """found: significant drivers of the scatter, each once, the strongest first; tested: all, with their p values.
+    """Significant effects, strongest first, one per covariate; tested: all of them.
 
-    rivals: drivers that are as significant, but nothing of the first's trend is left for them.
+    rivals: covariates that are no longer significant after the trend of the first is removed.
     """
 
     found: tuple[VarianceEffect, ...]
@@ -66,32 +67,32 @@ class _Trial:
 def variance_effects(
     model: PushModel,
     evidence: Evidence,
-    left: Array,
+    z: Array,
     alpha: float,
     seed: int = 0,
     *,
     names: Sequence[str] | None = None,
     baseline: Baseline | None = None,
 ) -> VarianceFinding:
-    """Test the scatter of residuals left (n, 3), mean effects out, against every driver and against training.
+    """Test the variance of residuals z (n, 3), without mean effects, against every covariate and against training.
 
-    What differs from training is told where nothing drives it.
+    A difference from training is reported only if no covariate explains it.
     """
-    first = _tested(model, evidence, left, alpha, seed, names, baseline)
+    first = _tested(model, evidence, z, alpha, seed, names, baseline)
     driven = tuple(s for s in first.found if s.covariate != CONSTANT)
     if len(driven) < 2:
         return replace(first, found=driven or first.found)
-    levelled = left / _trend(evidence, left, driven[0])
+    levelled = z / _trend(evidence, z, driven[0])
     again = {s.covariate for s in _tested(model, evidence, levelled, alpha, seed, names, baseline).found}
     found = (driven[0], *(s for s in driven[1:] if s.covariate in again))
     return replace(first, found=found, rivals=tuple(s.covariate for s in driven[1:] if s.covariate not in again))
 
 
-def _trend(evidence: Evidence, left: Array, scatter: VarianceEffect) -> Array:
-    """Relative deviation (n, 3) of the residuals as a driver has it, one in the outputs that it does not touch."""
-    values = scatter.basis.values(evidence.table.covariates, len(left))
-    on = np.array([name in scatter.outputs for name in OUTPUTS])
-    size = _log_squares(left)[:, on].mean(axis=1)
+def _trend(evidence: Evidence, z: Array, effect: VarianceEffect) -> Array:
+    """Relative standard deviation (n, 3) of the residuals by an effect; 1 in outputs that it does not concern."""
+    values = effect.basis.values(evidence.table.covariates, len(z))
+    on = np.array([name in effect.outputs for name in OUTPUTS])
+    size = _log_squares(z)[:, on].mean(axis=1)
     design = np.column_stack([np.ones(len(values)), values])
     slope, *_ = np.linalg.lstsq(design, size, rcond=None)
     fitted = design @ slope
@@ -101,18 +102,18 @@ def _trend(evidence: Evidence, left: Array, scatter: VarianceEffect) -> Array:
 def _tested(
     model: PushModel,
     evidence: Evidence,
-    left: Array,
+    z: Array,
     alpha: float,
     seed: int,
     names: Sequence[str] | None,
     baseline: Baseline | None,
 ) -> VarianceFinding:
     controls = inputs_basis(model, evidence.table).columns
-    size = _log_squares(Residualizer(controls)(left))
+    size = _log_squares(Residualizer(controls)(z))
     trials = [t for name, basis in _bases(evidence, names) for t in _along(evidence, size, controls, name, basis)]
     there = 0
     if baseline is not None:
-        constant = _constant(model, evidence, left, baseline)
+        constant = _constant(model, evidence, z, baseline)
         there = len(constant[0].score.rows) - len(trials[0].score.rows) if trials else 0
         trials = [*(_padded(t, there) for t in trials), *constant]
     return _finding(trials, alpha, seed) if trials else VarianceFinding((), ())
@@ -127,23 +128,26 @@ def _bases(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, D
 
 
 def _along(evidence: Evidence, size: Array, controls: Array, name: str, basis: DriverBasis) -> list[_Trial]:
-    """A driver against the scatter of each output, and against that of all."""
+    """One covariate against the variance of each output, and of all outputs."""
     values = basis.values(evidence.table.covariates, len(size))
-    z, block = normal_scores(size), evidence.block
+    ranks, block = normal_scores(size), evidence.block
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
-    return [_Trial(name, basis, output, block_scores(z, on[:, :, None] * values[:, None, :], controls, block),
-                   float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum())))))
-            for output, on in _outputs(len(values))]  # fmt: skip
+    trials = []
+    for output, on in _outputs(len(values)):
+        scores = block_scores(ranks, on[:, :, None] * values[:, None, :], controls, block)
+        ratio = float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum()))))
+        trials.append(_Trial(name, basis, output, scores, ratio))
+    return trials
 
 
-def _constant(model: PushModel, evidence: Evidence, left: Array, baseline: Baseline) -> list[_Trial]:
-    """The scatter in the new data against that in training, at like inputs."""
+def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline) -> list[_Trial]:
+    """The variance in the new data against that in training, with the inputs regressed out."""
     tables = (evidence.table, baseline.evidence.table)
     controls = inputs_basis(model, _inputs_of(tables)).columns
-    # As they are: what a base learnt wrongly adds to both alike, and taking it out would not take it out of both alike.
-    parts = (_log_squares(left), _log_squares(baseline.evidence.z))
-    z, new = normal_scores(np.vstack(parts)), np.arange(len(controls)) < len(left)
+    # Not residualised: errors of the base enter both parts alike, but regression would not remove them alike.
+    parts = (_log_squares(z), _log_squares(baseline.evidence.z))
+    z, new = normal_scores(np.vstack(parts)), np.arange(len(controls)) < len(z)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
@@ -183,8 +187,8 @@ def _finding(trials: list[_Trial], alpha: float, seed: int) -> VarianceFinding:
     return VarianceFinding(tuple(s for s in tested if s.p_value <= alpha and _counts(s)), tested)
 
 
-def _counts(scatter: VarianceEffect) -> bool:
-    return scatter.covariate != CONSTANT or abs(np.log(scatter.ratio)) > np.log(MATERIAL)
+def _counts(effect: VarianceEffect) -> bool:
+    return effect.covariate != CONSTANT or abs(np.log(effect.ratio)) > np.log(MATERIAL)
 
 
 def _effect(trials: list[_Trial], screened: Screened, k: int) -> VarianceEffect:

@@ -1,13 +1,13 @@
-"""The wrench channel: what changes the force of a push and need not change its motion.
+"""The wrench channel: effects on the force of a push, which need not change its motion.
 
-Quasi-statically the force on the slider lies on the limit surface (f / fmax)^2 + (m / mmax)^2 = 1 whatever the motion,
-so every window's mean force gives fmax, its friction on the surface, by itself: L^2 = fn^2 + ft^2 + (moment / c)^2. The
-contact friction and the direction of the push only choose the place on the surface. log L is searched for drivers as
-the motion's residuals are; a bias of the sensor, constant in the world, also turns the force, which is held against the
-direction that the model predicts. Nothing here touches the motion model.
+Quasi-statically the force on the slider lies on the limit surface (f / fmax)^2 + (m / mmax)^2 = 1, whatever the motion.
+So the mean force of every window determines fmax, its friction on the surface: L^2 = fn^2 + ft^2 + (moment / c)^2. The
+contact friction and the push direction only select a point on the surface. log L is searched for covariates like the
+residuals of the motion. A bias of the sensor, constant in the world, also rotates the force, which is compared with the
+direction that the model predicts. Nothing here changes the motion model.
 
-What the training windows have too (a place that grips better, a topic that matters) is subtracted where they tell it.
-The window finder sets the sensor to zero between pushes: a bias shows only where it comes with the contact.
+Relations that the training windows have too (a place with more friction, a topic that matters) are subtracted. The
+window finder zeroes the sensor between pushes, so a bias is visible only if it occurs during contact.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.types import Array, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
-LEAST_FORCE = 0.05  # of the median normal force; below it a window tells nothing
+LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 MOST_TERMS = 3
 PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
-OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # tell nothing of the surface: inputs, or outcomes
-COMPARED = (*PLACE, *HEADINGS, "velocity")  # differ on any table: news only against the training windows
+OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
+COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
 SESSION = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
 
 
@@ -67,10 +67,10 @@ class WrenchEffect:
 
 @dataclass(frozen=True)
 class WrenchFinding:
-    """effects: the strongest first, none where the force is as it was; tested: all that was tried.
+    """Effects found, strongest first, and all candidates tested.
 
-    against_training: whether the training windows' own relations were subtracted. noise: robust standard deviation
-    of the logarithm of the force from window to window.
+    noise: robust standard deviation of the logarithm of the force between windows. against_training: whether the
+    relations in the training windows were subtracted.
     """
 
     effects: tuple[WrenchEffect, ...]
@@ -84,10 +84,10 @@ NOTHING = WrenchFinding((), (), float("nan"), False)
 
 @dataclass(frozen=True, eq=False)
 class _Force:
-    """z (n, 2): log load, direction less its prediction (rad), each in robust deviations (unit (2,)); see limit_load.
+    """z (n, 2): log load, and direction minus its prediction (rad), each in robust deviations, unit (2,).
 
-    controls (n, m) of the model's inputs; level (n, 1) of the new windows, no column where they stand alone; block (n,)
-    of pushes; what is tried; the new windows.
+    controls (n, m): of the model's inputs. level (n, 1): 1 on new windows, no column without training windows. block
+    (n,): of pushes. table: the new windows.
     """
 
     z: Array
@@ -101,14 +101,14 @@ class _Force:
 
     @property
     def levelled(self) -> Array:
-        """The controls with the level."""
+        """The controls and the level."""
         return np.column_stack([self.controls, self.level])
 
 
 def wrench_effects(
     table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float = 0.01, seed: int = 0
 ) -> WrenchFinding:
-    """What drives the force of new windows, beside what drives it in the baseline (the model's training windows)."""
+    """Effects on the force of new windows that differ from the baseline (the model's training windows)."""
     if any(name not in table.covariates for name in FORCES):
         return NOTHING
     windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
@@ -119,7 +119,7 @@ def wrench_effects(
 
 
 def _pressing(table: PushTable) -> PushTable:
-    """The windows in which the pusher presses."""
+    """Windows in which the pusher presses against the slider."""
     if any(name not in table.covariates for name in FORCES) or not len(table):
         return table
     force = table.covariates["normal_force"]
@@ -135,30 +135,30 @@ def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
     tried = [_of_friction(stack, unit, *pair) for pair in _drivers(stack)]
     tried.append(_of_bias(stack, unit, stack.joined([load.bias for load in each])))
     rows = inliers(z / unit, np.zeros((len(z), 2, 0)), controls)
-    told = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
+    kept = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
     compared = len(stack.tables) > 1
     return _Force(
-        z[rows] / unit, unit, controls[rows], _level(stack)[rows], stack.block[rows], told, stack.tables[-1], compared
+        z[rows] / unit, unit, controls[rows], _level(stack)[rows], stack.block[rows], kept, stack.tables[-1], compared
     )
 
 
 def _level(stack: Stacked) -> Array:
-    """One on the new windows (n, 1), no column where they stand alone."""
+    """1 on the new windows (n, 1); no column without training windows."""
     return stack.new[:, None].astype(np.float64)[:, : len(stack.tables) - 1]
 
 
 def _drivers(stack: Stacked) -> list[tuple[str, DriverBasis]]:
-    """Drivers of the surface's friction; level and place only where there are others to compare them with."""
+    """Covariates of the surface friction; level and place only if there are training windows to compare with."""
     table, before = stack.tables[-1], stack.tables[:-1]
     known = [name for name in COMPARED if all(name in t.covariates for t in before) and before]
-    left_out = (*OWN, *(name for name in COMPARED if name not in known))
-    kept = {name: column for name, column in table.covariates.items() if name not in left_out}
+    excluded = (*OWN, *(name for name in COMPARED if name not in known))
+    kept = {name: column for name, column in table.covariates.items() if name not in excluded}
     bases = screening_bases(replace(table, covariates=kept))
     return [(CONSTANT, DriverBasis("constant")), *bases] if before else bases
 
 
 def _of_friction(stack: Stacked, unit: Array, covariate: str, basis: DriverBasis) -> Contrast:
-    """A change of the load, not of its direction, over the new windows; about their mean unless it is the level."""
+    """A change of the load, not of its direction, on the new windows; centred unless it is the level."""
     table = stack.tables[-1]
     values = basis.values(table.covariates, len(table))
     values = values if covariate == CONSTANT else values - values.mean(axis=0)
@@ -179,32 +179,32 @@ def _of_bias(stack: Stacked, unit: Array, bias: Array) -> Contrast:
 
 
 def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
-    """Drivers first, strongest first; the level of the force is told only where nothing drives it."""
-    z, left = force.z, list(force.tried)
+    """Select effects, strongest first; the level of the force counts only if no covariate explains it."""
+    z, remaining = force.z, list(force.tried)
     effects: list[WrenchEffect] = []
     tested: tuple[Tested, ...] = ()
-    while left and len(effects) < MOST_TERMS:
-        p_values = screen_contrasts(z, left, force.controls, force.block, seed).p_value.tolist()
-        tested = tested or tuple(Tested(t.mechanism, t.covariate, p) for t, p in zip(left, p_values, strict=True))
-        significant = [t for t, p in zip(left, p_values, strict=True) if p <= alpha]
+    while remaining and len(effects) < MOST_TERMS:
+        p_values = screen_contrasts(z, remaining, force.controls, force.block, seed).p_value.tolist()
+        tested = tested or tuple(Tested(t.mechanism, t.covariate, p) for t, p in zip(remaining, p_values, strict=True))
+        significant = [t for t, p in zip(remaining, p_values, strict=True) if p <= alpha]
         driven = [t for t in significant if not _is_level(t)]
         if not (driven or (significant and not effects)):
             break
         best, alike = _chosen(force, z, driven or significant, seed)
         values, draws = estimate_with_draws(z, best.columns, force.controls, best.shared, force.block, seed)
-        p_value = p_values[next(k for k, t in enumerate(left) if t is best)]
+        p_value = p_values[next(k for k, t in enumerate(remaining) if t is best)]
         sized = _sized(force, best, values, draws)
         effects.append(
             WrenchEffect(best.mechanism, best.covariate, best.basis.name, sized, p_value, _names(best, alike))
         )
         z = z - best.columns @ values
-        left = [t for t in left if t is not best]
+        remaining = [t for t in remaining if t is not best]
     noise = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
     return WrenchFinding(tuple(effects), tested, noise, force.against_training)
 
 
 def _chosen(force: _Force, z: Array, significant: Sequence[Contrast], seed: int) -> tuple[Contrast, list[Contrast]]:
-    """The best, in the simplest basis of its driver that is not surely worse, and all that are not."""
+    """The best contrast in the simplest basis that is not significantly worse, and all rivals."""
     controls = force.controls if _is_level(significant[0]) else force.levelled
     alike = best_and_rivals(z, significant, controls, force.block, seed)
     same = [t for t in alike if (t.mechanism, t.covariate) == (alike[0].mechanism, alike[0].covariate)]
@@ -216,7 +216,7 @@ def _is_level(tried: Contrast) -> bool:
 
 
 def _names(best: Contrast, alike: Sequence[Contrast]) -> tuple[str, ...]:
-    """Rivals by driver, or by mechanism where that differs."""
+    """Rivals by covariate, or by mechanism where that differs."""
     names = [t.covariate if t.mechanism == SURFACE_FRICTION else WRENCH_BIAS for t in (best, *alike)]
     return tuple(name for name in dict.fromkeys(names[1:]) if name != names[0])
 
@@ -235,7 +235,7 @@ def _sized(force: _Force, best: Contrast, values: Array, draws: Array) -> tuple[
 
 
 def _over_range(force: _Force, best: Contrast) -> Array:
-    """Rows (k, p) of the basis over the new windows, in units of z: one difference if it is one column."""
+    """Rows (k, p) of the basis over the new windows, in units of z; one difference for a basis of one column."""
     if best.covariate == CONSTANT:
         return np.array([[1.0 / force.unit[0]]])
     table = force.table
