@@ -141,7 +141,7 @@ def _step_of_means(tabulated: TabulatedModel, slider: Array, step: Sequence[floa
     drive, meeting = start_drive(rig.outline, rig.pusher_radius, slider, np.array([step[:3]]))
     for window in range(windows.count):
         if window:
-            meeting = drive.meet(slider, meeting, window * windows.duration, windows.duration)
+            meeting = drive.contact_at(slider, meeting, window * windows.duration, windows.duration)
         if not meeting.in_contact[0]:
             break
         prediction = tabulated.predict_rows(meeting.touch.inputs, np.array([windows.asked]))

@@ -1,1 +1,4 @@
-"""What a planner builds on single predictions: poses in the world, sequences of pushes, the choice among them."""
+"""Planning with single predictions: slider poses in the world, rollouts of push sequences, the choice of a push.
+
+Import `choose`, `goal`, `repertoire`, `rollout` and `slider_pose`; the other modules are their parts.
+"""

@@ -1,20 +1,20 @@
-"""Which push next: to a goal with the fewest pushes at a given probability.
+"""Choose the next push: reach a goal with the fewest pushes at a given probability.
 
-Seen from the slider, push a moves it by D_a ~ N(mean, covariance) (repertoire.py), and e is the displacement that is
-left to the goal. One push reaches it with probability
+In the slider's frame, push a moves the slider by D_a ~ N(mean, covariance) (repertoire.py), and e is the remaining
+displacement to the goal. One push reaches the goal with probability
 
     P_a(e) = Pr(|D_a - e| within the goal's tolerances),        R(e) = max_a P_a(e).
 
-If the likeliest push has P_a(e) >= p it is chosen: that is one push at probability p, and of those that aim at the
-middle the one that scatters least. Otherwise the push is chosen that leaves the fewest to be expected, with e' what it
-leaves and d the distance in longest pushes:
+If the most probable push has P_a(e) >= p, it is chosen: one push suffices, and of the pushes that aim at the goal the
+one with the least noise wins. Otherwise the push with the smallest expected number of pushes is chosen, with e' the
+displacement that remains after it and d the distance in units of the longest push:
 
     J(a) = 1 + E h(e'),     h(e') = 0 within the tolerances, else 1 + (1 - R(e')) (1 + d(e')).
 
-That is: one more push if it succeeds, and if it does not, one to mend it and as many as the way is long. Far from the
-goal R is 0 and J asks for the shortest way that is left, which scatter lengthens; near it J asks for a place from where
-a predictable push leads home. A covariance of zero makes R 0 or 1, the expectations vanish, and the nearest mean wins.
-(Bertsekas, Dynamic Programming and Optimal Control, ch. 6: one-step lookahead with an approximate cost to go.)
+That is one more push if it succeeds; if it fails, one to correct it and as many as the distance requires. Far from the
+goal R is 0, and J prefers the shortest remaining distance. Near the goal J prefers a pose from which a predictable push
+reaches it. With zero covariance R is 0 or 1, the expectations vanish, and the nearest mean wins.
+Source: Bertsekas, Dynamic Programming and Optimal Control, ch. 6: one-step lookahead with an approximate cost to go.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from push_predictor.planning.goal import Goal
 from push_predictor.planning.repertoire import DRAWS, Repertoire, StraightPushes
 from push_predictor.types import Array, IntArray
 
-DRAWS_AHEAD, OUTCOMES = 32, 16  # of a second push, of what the first may leave; powers of two fill evenly
-SHORTLIST = 64  # first pushes of two whose outcomes are looked at
-NEIGHBOURS = 16  # second pushes of two: those whose means come nearest
-LEAST = 1e-6  # m, rad; a way is measured by the longest push, even if no push moves or none turns
-TIE = 1e-6  # what a distance of one tolerance counts against a probability
+DRAWS_AHEAD, OUTCOMES = 32, 16  # samples of a second push, of a first push; powers of two suit Sobol points
+SHORTLIST = 64  # candidates for the first of two pushes
+NEIGHBOURS = 16  # candidates for the second push: those with the nearest means
+SMALLEST_PUSH = 1e-6  # m, rad; avoids division by zero if no push moves or turns the slider
+TIE = 1e-6  # weight of the distance (in tolerances) against the probability, to break ties
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,7 +62,7 @@ class Choice:
 
 
 def choose_push(repertoire: Repertoire, slider: Array, goal: Goal, probability: float = 0.9) -> Choice | None:
-    """The next push on a slider at (3: x, y m, heading rad); None where the goal is reached.
+    """Choose the next push for a slider at (3: x, y m, heading rad); None if the goal is reached.
 
     Raises RequestError for a probability outside (0, 1) and a slider whose pose is not finite.
     """
@@ -74,40 +74,42 @@ def choose_push(repertoire: Repertoire, slider: Array, goal: Goal, probability: 
     ahead = goal.ahead(slider)
     if goal.reached(ahead):
         return None
-    outlook = _Outlook(repertoire, goal)
-    reach = outlook.reach(np.arange(len(repertoire)), ahead, DRAWS)
-    best = int(np.argmax(reach - TIE * outlook.tolerances(ahead - repertoire.mean)))
+    lookahead = _Lookahead(repertoire, goal)
+    reach = lookahead.reach(np.arange(len(repertoire)), ahead, DRAWS)
+    best = int(np.argmax(reach - TIE * lookahead.tolerances(ahead - repertoire.mean)))
     if reach[best] >= probability:
         return _choice(repertoire, best, slider, float(reach[best]), 1.0 / float(reach[best]))
-    rows = np.argsort(outlook.cost(goal.left(ahead, repertoire.mean)), kind="stable")[:SHORTLIST]
-    left = goal.left(ahead, repertoire.outcomes[rows, :OUTCOMES])
-    expected = 1.0 + outlook.cost(left).mean(axis=1)
+    rows = np.argsort(lookahead.cost(goal.remaining(ahead, repertoire.mean)), kind="stable")[:SHORTLIST]
+    remaining = goal.remaining(ahead, repertoire.outcomes[rows, :OUTCOMES])
+    expected = 1.0 + lookahead.cost(remaining).mean(axis=1)
     best = int(rows[np.argmin(expected)])
     return _choice(repertoire, best, slider, float(reach[best]), float(expected.min()))
 
 
 @dataclass(frozen=True, eq=False)
-class _Outlook:
-    """What the pushes of a repertoire promise for a goal."""
+class _Lookahead:
+    """Probabilities and costs of the pushes of a repertoire with respect to a goal."""
 
     repertoire: Repertoire
     goal: Goal
 
     def reach(self, rows: IntArray, ahead: Array, draws: int) -> Array:
-        """Probabilities (...) that pushes rows (...) leave nothing of ahead (..., 3)."""
-        beside = self.repertoire.outcomes[rows, :draws] - ahead[..., None, :]
-        return np.asarray(self.goal.reached(beside).mean(axis=-1))
+        """Probabilities (...) that pushes rows (...) reach the goal at the displacements ahead (..., 3)."""
+        error = self.repertoire.outcomes[rows, :draws] - ahead[..., None, :]
+        return np.asarray(self.goal.reached(error).mean(axis=-1))
 
     def cost(self, ahead: Array) -> Array:
-        """Pushes to be expected (...) where ahead (..., 3) is left: h of the module."""
+        """Expected number of pushes (...) for remaining displacements ahead (..., 3): h of the module."""
         count = min(NEIGHBOURS, len(self.repertoire))
         nearest = self._tree.query(ahead * self._scale, range(1, count + 1))[1]
         reach = self.reach(nearest, ahead[..., None, :], DRAWS_AHEAD).max(axis=-1)
-        way = np.hypot(np.hypot(ahead[..., 0], ahead[..., 1]) / self._longest, np.abs(ahead[..., 2]) / self._widest)
-        return np.where(self.goal.reached(ahead), 0.0, 1.0 + (1.0 - reach) * (1.0 + way))
+        distance = np.hypot(
+            np.hypot(ahead[..., 0], ahead[..., 1]) / self._longest, np.abs(ahead[..., 2]) / self._widest
+        )
+        return np.where(self.goal.reached(ahead), 0.0, 1.0 + (1.0 - reach) * (1.0 + distance))
 
     def tolerances(self, ahead: Array) -> Array:
-        """How far (...) it is, in tolerances of the goal."""
+        """Distance (...) in units of the goal's tolerances."""
         return np.asarray(np.linalg.norm(ahead * self._scale, axis=-1))
 
     @cached_property
@@ -121,11 +123,11 @@ class _Outlook:
 
     @cached_property
     def _longest(self) -> float:
-        return max(LEAST, float(np.hypot(*self.repertoire.mean[:, :2].T).max()))
+        return max(SMALLEST_PUSH, float(np.hypot(*self.repertoire.mean[:, :2].T).max()))
 
     @cached_property
     def _widest(self) -> float:
-        return max(LEAST, float(np.abs(self.repertoire.mean[:, 2]).max()))
+        return max(SMALLEST_PUSH, float(np.abs(self.repertoire.mean[:, 2]).max()))
 
 
 def _choice(repertoire: Repertoire, row: int, slider: Array, probability: float, expected: float) -> Choice:

@@ -1,4 +1,4 @@
-"""Where a slider is to be brought: a pose and how far from it is near enough."""
+"""The goal of a planner: a pose with tolerances."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from push_predictor.types import Array, BoolArray
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """All poses within `distance` m of pose (3: x, y m, heading rad) whose heading is within `turn` rad of it.
+    """All poses within `distance` m and `turn` rad of pose (3: x, y m, heading rad).
 
-    turn None: any heading will do, as for a circle. symmetry: how many headings of a whole turn look the same
-    (Outline.rotational_symmetry; 1 where a slider's sides are told apart). Raises RequestError.
+    turn None accepts any heading, as for a circle. symmetry: number of equivalent headings in a full turn
+    (Outline.rotational_symmetry; 1 if the slider's sides differ). Raises RequestError.
     """
 
     pose: Array
@@ -35,25 +35,25 @@ class Goal:
         if self.symmetry < 1:
             raise RequestError("goal symmetry", self.symmetry, "1 or more; a circle has turn None")
 
-    def left(self, ahead: Array, moved: Array) -> Array:
-        """What is left (..., 3) of displacements ahead (..., 3) after displacements moved (..., 3), seen from there.
+    def remaining(self, ahead: Array, moved: Array) -> Array:
+        """Displacements (..., 3) that remain of ahead (..., 3) after displacements moved (..., 3).
 
-        All in body frames: x, y in m and the shortest turn, rad.
+        All in the body frame before the displacement: x, y in m and the shortest rotation in rad.
         """
         return np.concatenate([to_body(ahead[..., :2], moved), self.shortest(ahead[..., 2:] - moved[..., 2:])], axis=-1)
 
     def ahead(self, sliders: Array) -> Array:
-        """The displacement (..., 3) that is left to the goal, in the body frames of sliders (..., 3)."""
-        return self.left(self.pose, sliders)
+        """Displacements (..., 3) from sliders (..., 3) to the goal, in their body frames."""
+        return self.remaining(self.pose, sliders)
 
     def shortest(self, turn: Array) -> Array:
-        """Turns (any shape, rad) less those that cannot be seen; zero where any heading will do."""
+        """Shortest equivalent rotations (any shape, rad); zero if any heading is accepted."""
         if self.turn is None:
             return np.zeros_like(turn)
         period = 2.0 * np.pi / self.symmetry
         return np.asarray(turn - period * np.rint(turn / period))
 
     def reached(self, ahead: Array) -> BoolArray:
-        """Whether what is left (..., 3), as `ahead` gives it, is near enough: (...)."""
+        """Whether displacements to the goal (..., 3) are within the tolerances, (...)."""
         near = ahead[..., 0] ** 2 + ahead[..., 1] ** 2 <= self.distance**2
         return near if self.turn is None else near & (np.abs(self.shortest(ahead[..., 2])) <= self.turn)

@@ -1,7 +1,7 @@
-"""A push carried out on many samples of the slider's pose at once, window by window.
+"""Simulate one push on many samples of the slider's pose, window by window.
 
-The pusher is put at the commanded contact of every sample and then drives straight on in the world: where it touches
-in the second and later windows follows from where it is and where the sample has gone.
+The pusher starts at the commanded contact of every sample and moves in a straight line in the world. In later windows
+the contact follows from the positions of the pusher and of the sample.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from push_predictor.planning.push_windows import PushWindows, windows_of
 from push_predictor.planning.straight_drive import TipContact, start_drive
 from push_predictor.types import Array, BoolArray
 
-# Covariates that a sample tells; the tip touches, so its gap is none.
+# Covariates known from the pose. The tip is in contact, so the gap is zero.
 POSE_COVARIATES = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")
 
 
@@ -61,19 +61,19 @@ def push_particles(
         if check_cancelled is not None:
             check_cancelled()
         if window:
-            contact = drive.meet(sliders, contact, window * windows.duration, windows.duration)
+            contact = drive.contact_at(sliders, contact, window * windows.duration, windows.duration)
         moved, known = _displacements(predictor, sliders, contact, windows, deviations.next())
         sliders, in_domain = displaced(sliders, contact.touch.heading, moved), in_domain & known
     return PushedSamples(sliders, contact.in_contact, in_domain)
 
 
 def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
-    """The model itself."""
+    """Return the model of a predictor."""
     return predictor.model if isinstance(predictor, TabulatedModel) else predictor
 
 
 def check_covariates(model: PushModel) -> None:
-    """Raise RequestError if the model needs what neither a push nor the pose of a slider tells."""
+    """Raise RequestError if the model needs a covariate that the pose of the slider does not give."""
     if foreign := [name for name in model.needs if name not in POSE_COVARIATES]:
         accepted = (
             f"a model that needs no covariates but {', '.join(POSE_COVARIATES)}: this one needs {', '.join(foreign)}"
@@ -84,7 +84,7 @@ def check_covariates(model: PushModel) -> None:
 def _displacements(
     predictor: PushModel | TabulatedModel, sliders: Array, contact: TipContact, windows: PushWindows, deviation: Array
 ) -> tuple[Array, BoolArray]:
-    """Displacements (p, 3) in the push frame, deviation (p, 3) standard ones off the mean, and which are in domain."""
+    """Displacements (p, 3) in the push frame for standard deviates (p, 3), and which are in the domain."""
     moved, known = np.zeros((len(sliders), 3)), np.ones(len(sliders), dtype=np.bool_)
     in_contact = np.flatnonzero(contact.in_contact)
     if not len(in_contact):
@@ -106,15 +106,15 @@ def _covariates(sliders: Array, push_heading: Array) -> dict[str, Array]:
 
 
 class Deviations:
-    """Standard normal deviations (p, 3) window by window, as persistent as told; way (p,) m of the tips a window."""
+    """Standard normal deviates (p, 3) per window, correlated along the push; step (p,): m of the tip's path."""
 
-    def __init__(self, persistence: Persistence, way: Array, rng: np.random.Generator) -> None:
+    def __init__(self, persistence: Persistence, step: Array, rng: np.random.Generator) -> None:
         self._parts = persistence.persistent, persistence.decaying, 1.0 - persistence.persistent - persistence.decaying
-        self._keeps, self._rng = np.exp(-way[:, None] / persistence.decay_length), rng
-        self._persistent, self._decaying = rng.standard_normal((2, len(way), 3))
+        self._keeps, self._rng = np.exp(-step[:, None] / persistence.decay_length), rng
+        self._persistent, self._decaying = rng.standard_normal((2, len(step), 3))
 
     def next(self) -> Array:
-        """Those of the next window; the first call gives the first window's."""
+        """Draw the deviates of the next window; the first call draws those of the first window."""
         persistent, decaying, new = (np.sqrt(np.maximum(part, 0.0)) for part in self._parts)
         fresh, change = self._rng.standard_normal((2, *self._persistent.shape))
         deviation = persistent * self._persistent + decaying * self._decaying + new * fresh

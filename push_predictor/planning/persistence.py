@@ -27,8 +27,8 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 LAGS = 10  # windows
-FEW = 5  # pushes; a correlation found in n of them has a standard error of n^-1/2, and is some 0.45
-LENGTHS = np.geomspace(1e-3, 0.05, 18)  # m, tried
+FEW = 5  # pushes; a correlation from n pushes has a standard error of n^-1/2, and is typically 0.45
+LENGTHS = np.geomspace(1e-3, 0.05, 18)  # m, candidates for decay_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,30 +39,30 @@ class Persistence:
     decaying: Array
     decay_length: Array
 
-    def correlation(self, way: Array) -> Array:
-        """Correlation (n, 3) of standardised residuals that lie a way (n,) > 0 m of the tip apart."""
-        return np.asarray(self.persistent + self.decaying * np.exp(-way[:, None] / self.decay_length))
+    def correlation(self, distance: Array) -> Array:
+        """Correlation (n, 3) of standardised residuals at a distance (n,) > 0 m along the tip's path."""
+        return np.asarray(self.persistent + self.decaying * np.exp(-distance[:, None] / self.decay_length))
 
 
 INDEPENDENT = Persistence(np.zeros(3), np.zeros(3), np.ones(3))
 
 
-_KNOWN: WeakKeyDictionary[PushModel, Persistence] = WeakKeyDictionary()  # a model that is given up is not kept for it
+_KNOWN: WeakKeyDictionary[PushModel, Persistence] = WeakKeyDictionary()  # does not keep a model alive
 
 
 def persistence_of(model: PushModel) -> Persistence:
-    """What the model's training pushes show; some tenths of a second for 1000 windows, remembered afterwards."""
+    """The persistence of a model's training residuals; cached, some tenths of a second for 1000 windows."""
     if model not in _KNOWN:
         _KNOWN[model] = fit_persistence(whitened_residuals(model), model.training)
     return _KNOWN[model]
 
 
 def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
-    """Fit to residuals (n, 3) of a table's windows; only their order counts."""
+    """Fit the persistence to residuals (n, 3) of the table's windows; only their ranks matter."""
     first, second, pushes = _pairs(table)
     if pushes == 0:
         return INDEPENDENT
-    apart = _way_between(table, first, second)
+    apart = _distance_between(table, first, second)
     scores = normal_scores(residuals)
     products = scores[first] * scores[second] / np.maximum(np.mean(scores**2, axis=0), np.finfo(float).tiny)
     shares = [_fit(apart, column) for column in products.T]
@@ -72,7 +72,7 @@ def fit_persistence(residuals: Array, table: PushTable) -> Persistence:
 
 
 def whitened_residuals(model: PushModel) -> Array:
-    """Residuals (n, 3) of the training rows in units of the root of the covariance predicted without their pushes."""
+    """Leave-one-push-out residuals (n, 3) of the training rows, whitened by the predicted covariance."""
     rows = model.training
     mean, covariance, _ = model.held_out_moments()
     # A covariance without noise has no inverse.
@@ -80,26 +80,27 @@ def whitened_residuals(model: PushModel) -> Array:
 
 
 def root_of(covariance: Array) -> Array:
-    """Roots R (n, 3, 3) of covariances (n, 3, 3), R R' = covariance: standard deviations times the symmetric root of
-    the correlation, so that each standard deviation that R takes stays with its own output, whatever its unit.
+    """Roots R (n, 3, 3) of covariances (n, 3, 3) with R R' = covariance, independent of the outputs' units.
+
+    R is the standard deviations times the symmetric root of the correlation.
     """
     sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(covariance / (sd[:, :, None] * sd[:, None, :]))
-    roots = np.sqrt(np.maximum(values, 0.0))  # below zero by rounding
+    roots = np.sqrt(np.maximum(values, 0.0))  # rounding may give negative values
     return np.asarray(sd[:, :, None] * ((vectors * roots[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
 
 
-def _way_between(table: PushTable, first: IntArray, second: IntArray) -> Array:
-    """The tip's way (k,) in m from window to window of the same pushes; they lie end to end unless times are known."""
+def _distance_between(table: PushTable, first: IntArray, second: IntArray) -> Array:
+    """Distance (k,) in m along the tip's path between windows; they are contiguous unless their times are known."""
     if "elapsed_time" in table.covariates:
         later = table.covariates["elapsed_time"][second] - table.covariates["elapsed_time"][first]
-        return np.abs(later) * 0.5 * (table.inputs[first, 0] + table.inputs[second, 0])
+        return np.asarray(np.abs(later) * 0.5 * (table.inputs[first, 0] + table.inputs[second, 0]))
     driven = np.cumsum(table.inputs[:, 0] * table.duration)
     return np.asarray(driven[second] - driven[first])
 
 
 def _pairs(table: PushTable) -> tuple[IntArray, IntArray, int]:
-    """Rows of the earlier and the later window (k,) of all pairs within a push, and of how many pushes they are."""
+    """Rows of the earlier and the later window (k,) of all pairs within a push, and the number of these pushes."""
     number = np.unique(table.push_id, return_inverse=True)[1]
     order = np.lexsort((table.covariates.get("elapsed_time", np.arange(len(table))), number))
     number = number[order]
@@ -110,12 +111,12 @@ def _pairs(table: PushTable) -> tuple[IntArray, IntArray, int]:
 
 
 def _fit(apart: Array, products: Array) -> tuple[float, float, float]:
-    """The shares that last and pass, and the length over which the latter pass, that explain products (k,) best."""
+    """Persistent and decaying fraction and decay length with the least squared error to products (k,)."""
     fits = []
     for length in LENGTHS.tolist():
         decay = np.exp(-apart / length)
         persistent, decaying = nnls(np.column_stack([np.ones(len(apart)), decay]), products)[0]
-        if persistent + decaying > 1.0:  # then nothing is new in a window
+        if persistent + decaying > 1.0:  # then no part is independent from window to window
             persistent = float(np.clip((products - decay) @ (1.0 - decay) / np.sum((1.0 - decay) ** 2), 0.0, 1.0))
             decaying = 1.0 - persistent
         fits.append((float(np.sum((products - persistent - decaying * decay) ** 2)), persistent, decaying, length))

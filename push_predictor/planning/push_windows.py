@@ -1,4 +1,4 @@
-"""A push of any length in windows as long as those that a model was trained on."""
+"""Divide a push of any duration into windows of the duration that a model was trained on."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ MOST_WINDOWS = 10_000
 
 @dataclass(frozen=True)
 class PushWindows:
-    """Equal windows: count; duration (s) of each; asked (s), the duration for which the model is asked; scale, what its
-    displacements are multiplied by.
+    """Equal windows of a push.
+
+    duration (s): of each window; asked (s): the duration passed to the model; scale: factor on its displacements.
     """
 
     count: int
@@ -25,11 +26,11 @@ class PushWindows:
 
 
 def windows_of(model: PushModel, duration: float) -> PushWindows:
-    """Cut a push of that duration (s). Raises RequestError where no number of windows suits the model.
+    """Divide a push of that duration (s) into windows. Raises RequestError if no number of windows suits the model.
 
-    A learnt model answers for the windows that it has seen: its displacements are taken to grow in proportion within
-    the tolerance that it has. The analytical model answers for any window; it is asked for those of its rows, because
-    these have the scatter that it tells.
+    A learnt model predicts its training duration; displacements are scaled in proportion within its tolerance. The
+    analytical model predicts any duration; it gets windows of about its training duration, to which its covariance
+    applies.
     """
     if not (np.isfinite(duration) and duration > 0.0):
         raise RequestError("duration", duration, "a finite number above 0, in s")
@@ -42,6 +43,6 @@ def windows_of(model: PushModel, duration: float) -> PushWindows:
     low, high = model.duration_range
     fewest, most = int(np.ceil(duration / high * (1.0 - 1e-12))), int(duration / low * (1.0 + 1e-12))
     if fewest > most:
-        raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, or a number of windows as long as that")
+        raise RequestError("duration", duration, f"{low:.3g} to {high:.3g} s, or a multiple of such a duration")
     count = min(max(round(duration / usual), fewest), most)
     return PushWindows(count, duration / count, usual, duration / count / usual)

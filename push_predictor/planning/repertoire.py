@@ -1,4 +1,4 @@
-"""What pushes do, seen from the slider: worked out once, true wherever the slider lies."""
+"""Outcomes of many pushes in the slider's frame: computed once, valid at every pose of the slider."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from push_predictor.planning.unscented import (
 )
 from push_predictor.types import Array, BoolArray, IntArray
 
-DRAWS = 256  # of each outcome
+DRAWS = 256  # samples of each outcome
 
 
 @dataclass(frozen=True, eq=False)
 class StraightPushes:
-    """n straight pushes: inputs (n, 3: velocity m/s, contact, angle rad) at the touch, windows (n,) they last."""
+    """n straight pushes: inputs (n, 3: velocity m/s, contact, angle rad) at the start, number of windows (n,)."""
 
     inputs: Array
     windows: IntArray
@@ -40,14 +40,14 @@ class StraightPushes:
 
 
 def push_grid(velocities: Sequence[float], contacts: Array, angles: Array) -> Array:
-    """Inputs (n, 3): every velocity (m/s) with every contact and every angle (rad)."""
+    """Inputs (n, 3) of the grid of all velocities (m/s), contacts and angles (rad)."""
     grids = np.meshgrid(velocities, contacts, angles, indexing="ij")
     return np.column_stack([grid.ravel() for grid in grids])
 
 
 @dataclass(frozen=True, eq=False)
 class Repertoire:
-    """Pushes with what they do: displacement of the slider in its own body frame before the push.
+    """Pushes with their outcomes: displacement of the slider in its body frame before the push.
 
     mean (n, 3: m, m, rad), covariance (n, 3, 3).
     """
@@ -61,7 +61,7 @@ class Repertoire:
 
     @cached_property
     def outcomes(self) -> Array:
-        """Draws (n, DRAWS, 3) that fill each distribution evenly, as do the first 16, 32, 64 of them."""
+        """Sobol samples (n, DRAWS, 3) of each outcome; the first 16, 32 or 64 also cover it evenly."""
         factor = np.linalg.cholesky(self.covariance + FLOOR * np.eye(3))
         points = norm.ppf(qmc.Sobol(3, seed=0).random(DRAWS))
         return np.asarray(self.mean[:, None] + points @ np.swapaxes(factor, 1, 2))

@@ -1,8 +1,8 @@
-"""A sequence of pushes with what is uncertain carried along: samples of the slider's pose, each pushed in its own way.
+"""Roll out a sequence of pushes on samples of the slider's pose.
 
-Every push is relative to the slider as it stands at the push's start: the robot looks before each, and puts the pusher
-at the commanded contact of where the slider is. Within a push it looks no more, the tip drives straight on. So a sample
-that has turned further is met elsewhere, and steps that each have one mode may lead to an outcome that has several.
+Every push is relative to the slider's pose at its start: the robot observes the slider before each push and places the
+pusher at the commanded contact. Within a push there is no feedback, and the tip moves in a straight line. A sample that
+has rotated further is touched elsewhere, so steps with one mode each may lead to an outcome with several.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from push_predictor.types import Array
 
 PARTICLES = 1000
 MOST_PARTICLES = 100_000
-MOST_WORK = 1_000_000  # particles times windows, some seconds
-MOST_EXACT_WORK = 100_000  # where no table answers
-FARTHEST = 1e6  # m, also of a standard deviation: beyond it nothing is left of millimetres
+MOST_WORK = 1_000_000  # particles times windows; takes some seconds
+MOST_EXACT_WORK = 100_000  # without a tabulated model
+FARTHEST = 1e6  # m, also for standard deviations; beyond it double precision loses millimetres
 A_COVARIANCE = "a symmetric (3, 3) matrix of finite numbers without negative eigenvalues"
-ROUNDING = 1e-6  # of a correlation: messages are often filled from single precision
+ROUNDING = 1e-6  # of a correlation; messages are often filled from single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +87,14 @@ def rollout(
 
 
 def sample_poses(mean: Array, covariance: Array, count: int, rng: np.random.Generator) -> Array:
-    """Poses (count, 3) of a Gaussian; covariance (3, 3) may be singular."""
+    """Draw poses (count, 3) from a Gaussian; covariance (3, 3) may be singular."""
     matrix = np.asarray(covariance, dtype=np.float64)
     root = root_of(0.5 * (matrix + matrix.T)[None])[0]
     return np.asarray(mean + rng.standard_normal((count, 3)) @ root.T)
 
 
 def pose_moments(poses: Array) -> tuple[Array, Array]:
-    """Mean (3,) and covariance (3, 3) of poses (p, 3): heading on the circle, deviations by the shorter way."""
+    """Mean (3,) and covariance (3, 3) of poses (p, 3), with the circular mean of the heading."""
     heading = np.arctan2(np.mean(np.sin(poses[:, 2])), np.mean(np.cos(poses[:, 2])))
     mean = np.array([*poses[:, :2].mean(axis=0), heading])
     off = _wrapped(poses - mean)
@@ -119,7 +119,7 @@ def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array
     tabulated = isinstance(predictor, TabulatedModel) and predictor.tabulated
     if windows * particles > (work := MOST_WORK if tabulated else MOST_EXACT_WORK):
         most = work // particles
-        accepted = f"no more than {most} windows in all to {particles} particles"
+        accepted = f"at most {most} windows in total with {particles} particles"
         raise RequestError("steps", f"{windows} windows", accepted)
 
 
@@ -135,9 +135,7 @@ def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
 
 
 def is_covariance(matrix: Array) -> bool:
-    """Whether a matrix is (3, 3), finite, symmetric and without negative eigenvalues, in units of its own deviations
-    and to rounding.
-    """
+    """Whether a matrix is (3, 3), finite, symmetric and positive semidefinite, up to rounding."""
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
         return False
     variances = np.diagonal(matrix)

@@ -1,4 +1,4 @@
-"""Where a slider will be: from poses in the world to the push that a model knows, and its outcome back to the world."""
+"""Predict the slider's pose in the world after a push, from the poses of slider and pusher."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import WindowOptions
 from push_predictor.types import Array
 
-# m, as in the windows a model learns from: no force tells here, so the gap must be as small as where none was recorded;
-# a tip that reaches in does touch, and may do so by what tracker and outline may be off.
+# m, as for training windows. Without a force the gap must be as small as in recordings without one. A tip inside the
+# outline is in contact; the depth may be as large as the error of tracker and outline.
 MAX_GAP = WindowOptions().touch_gap_alone
 MAX_DEPTH = WindowOptions().touch_gap
-AGREEMENT = 1e-3  # m or rad by which a covariate may differ from what the poses say
+AGREEMENT = 1e-3  # m or rad by which a given covariate may differ from the poses
 
 
 @dataclass(frozen=True, eq=False)
 class WorldPush:
-    """A tip that drives at a slider, in the world.
+    """A push in world coordinates.
 
-    slider (3,): x, y m, heading rad; pusher (2,): the tip's centre, m; velocity (2,) m/s; duration s. covariates: by
-    name, what an extended model needs and poses do not tell.
+    slider (3,): x, y m, heading rad; pusher (2,): centre of the tip, m; velocity (2,) m/s; duration s. covariates: by
+    name, those that an extended model needs and the poses do not give.
     """
 
     slider: Array
@@ -43,8 +43,9 @@ class WorldPush:
 
 @dataclass(frozen=True, eq=False)
 class SliderAfter:
-    """A slider after a push, in the world: pose (3,) m, m, rad (unwrapped), its covariance (3, 3), and whether the push
-    was in the model's domain.
+    """The predicted slider after a push, in the world.
+
+    pose (3,): m, m, rad (unwrapped), with covariance (3, 3); in_domain: whether the push is in the model's domain.
     """
 
     pose: Array
@@ -53,10 +54,10 @@ class SliderAfter:
 
 
 def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> SliderAfter:
-    """The outcome of one push.
+    """Predict the slider's pose after one push.
 
-    Raises RequestError where a value is not finite, the tip rests, does not touch, touches from inside, moves away from
-    or along the outline, where a covariate contradicts the poses, and where `check_request` does.
+    Raises RequestError if a value is not finite; if the tip does not move, does not touch, is inside the slider, or
+    moves away from or along the outline; if a covariate contradicts the poses; and as `check_request` does.
     """
     model = predictor.model if isinstance(predictor, TabulatedModel) else predictor
     touch = touch_of(model.rig, push)
@@ -73,7 +74,7 @@ def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> Slid
 
 
 def touch_of(rig: Rig, push: WorldPush) -> Touch:
-    """The one touch (n = 1) of a push. Raises RequestError, see `slider_after`."""
+    """The contact (n = 1) of a push. Raises RequestError, see `slider_after`."""
     _check_finite(push)
     touch = touches(rig.outline, push.slider[None], push.pusher[None], push.velocity[None])
     _check_contact(push, float(touch.distance[0]), rig.pusher_radius)
@@ -82,25 +83,25 @@ def touch_of(rig: Rig, push: WorldPush) -> Touch:
 
 
 def completed_covariates(push: WorldPush, touch: Touch, rig: Rig) -> dict[str, float]:
-    """The push's covariates and those that the poses tell, which need not be brought.
+    """The push's covariates and those known from the poses, which the caller may omit.
 
-    Raises RequestError where one was brought and contradicts the poses.
+    Raises RequestError if a given covariate contradicts the poses.
     """
-    told = {
+    known = {
         "slider_x": float(push.slider[0]),
         "slider_y": float(push.slider[1]),
         "slider_heading": float(wrap_angle(push.slider[2])),
         "push_heading": float(touch.heading[0]),
         "contact_gap": float(touch.distance[0]) - rig.pusher_radius,
     }
-    for name, value in told.items():
-        brought = push.covariates.get(name, value)
-        apart = brought - value
+    for name, value in known.items():
+        given = push.covariates.get(name, value)
+        apart = given - value
         if name in HEADINGS and isfinite(apart):
             apart = remainder(apart, tau)
         if not abs(apart) <= AGREEMENT:
-            raise RequestError(f"covariate {name}", brought, f"{value:.6g}, as the poses say, or leave it out")
-    return {**push.covariates, **told}
+            raise RequestError(f"covariate {name}", given, f"{value:.6g}, which follows from the poses, or omit it")
+    return {**push.covariates, **known}
 
 
 def _check_finite(push: WorldPush) -> None:
@@ -115,19 +116,21 @@ def _check_finite(push: WorldPush) -> None:
 def _check_contact(push: WorldPush, distance: float, radius: float) -> None:
     gap = distance - radius
     if distance < 0.0:
-        wrong = f"outside the slider: its centre is {-distance:.3g} m inside the outline"
+        wrong = f"tip outside the slider: its centre is {-distance:.3g} m inside the outline"
     elif gap < -MAX_DEPTH:
-        wrong = f"that touches from outside: it reaches {-gap:.3g} m into the outline, up to {MAX_DEPTH:g} m is contact"
-    elif not gap <= MAX_GAP:  # nor is one that overflowed
-        wrong = f"that touches: the gap to the outline is {gap:.3g} m, up to {MAX_GAP:g} m is contact"
+        wrong = (
+            f"tip that touches from outside: it is {-gap:.3g} m inside the outline, at most {MAX_DEPTH:g} m is contact"
+        )
+    elif not gap <= MAX_GAP:  # rejects an overflow too
+        wrong = f"tip in contact: the gap to the outline is {gap:.3g} m, at most {MAX_GAP:g} m is contact"
     else:
         return
-    raise RequestError("pusher", _shown(push.pusher), f"a tip {wrong}")
+    raise RequestError("pusher", _shown(push.pusher), f"a {wrong}")
 
 
 def _check_direction(push: WorldPush, angle: float) -> None:
     if abs(angle) >= np.pi / 2.0:
-        accepted = f"one less than 90 degrees off the inward normal; it is {np.degrees(angle):.1f} degrees off"
+        accepted = f"a direction within 90 degrees of the inward normal: it is {np.degrees(angle):.1f} degrees from it"
         raise RequestError("pusher_velocity", _shown(push.velocity), accepted)
 
 

@@ -1,8 +1,8 @@
-"""A tip that drives straight on in the world: where it is put for a push, and where it meets a slider later on.
+"""A tip that moves in a straight line in the world: its start for a push, and its later contacts with the slider.
 
-A sampled displacement need not leave the outline at the tip. Where it stands off, the tip has to come up first and
-pushes over the rest of the window only; where the tip reaches in, the slider lags behind and is pushed further. A
-slider that the tip passes by is not pushed.
+A sampled displacement need not leave the outline at the tip. If there is a gap, the tip closes it first and pushes for
+the rest of the window only. If the tip is inside the outline, it pushes for longer than the window. A slider that the
+tip passes is not pushed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.touch import Touch, touches
 from push_predictor.types import Array, BoolArray
 
-FARTHEST = 2.0  # windows that a tip which reaches in may push in one
-AMISS = 0.1  # of the tip's radius: how far off it may be where it is taken to touch
+MAX_SHARE = 2.0  # a tip inside the outline pushes for at most this many windows in one
+TOLERANCE = 0.1  # of the tip's radius: error of the distance that counts as contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,29 +35,29 @@ class TipContact:
 
 @dataclass(frozen=True, eq=False)
 class StraightDrive:
-    """Tips that start at (p, 2) m in the world and drive at velocities (p, 2) m/s."""
+    """Tips that start at (p, 2) m in the world and move at velocities (p, 2) m/s."""
 
     outline: Outline
     radius: float
     start: Array
     velocities: Array
 
-    def meet(self, sliders: Array, before: TipContact, time: float, window: float) -> TipContact:
-        """How the tips push sliders (p, 3) in a window (s) that begins `time` s after the start.
+    def contact_at(self, sliders: Array, before: TipContact, time: float, window: float) -> TipContact:
+        """Contacts of the tips with sliders (p, 3) in a window (s) that begins `time` s after the start.
 
         before: the contact in the previous window; at a vertex a contact belongs to the edge that it slid along.
         """
-        tips, way = self.start + time * self.velocities, window * np.hypot(*self.velocities.T)
+        tips, path = self.start + time * self.velocities, window * np.hypot(*self.velocities.T)
         nearest = self.outline.project(to_body(tips, sliders))
         ahead = self.velocities / np.hypot(*self.velocities.T)[:, None]
-        # How fast the tip comes nearer; at a vertex the normal is the one of the tip, not of an edge.
+        # Approach speed of the tip; at a vertex the normal points to the tip, not along that of an edge.
         closing = -np.sum(rotate(nearest.normal, sliders[:, 2]) * ahead, axis=1)
         until = (nearest.distance - self.radius) / np.maximum(closing, np.finfo(float).tiny)
-        until = np.clip(until, (1.0 - FARTHEST) * way, way)
+        until = np.clip(until, (1.0 - MAX_SHARE) * path, path)
         touch = self._touch(sliders, tips + until[:, None] * ahead, before.touch)
-        in_contact = (closing > 0.0) & (until < way) & (np.abs(touch.inputs[:, 2]) < np.pi / 2.0)
-        in_contact &= touch.distance - self.radius <= AMISS * self.radius
-        return TipContact(touch, np.where(in_contact, 1.0 - until / way, 0.0), in_contact)
+        in_contact = (closing > 0.0) & (until < path) & (np.abs(touch.inputs[:, 2]) < np.pi / 2.0)
+        in_contact &= touch.distance - self.radius <= TOLERANCE * self.radius
+        return TipContact(touch, np.where(in_contact, 1.0 - until / path, 0.0), in_contact)
 
     def _touch(self, sliders: Array, tips: Array, before: Touch) -> Touch:
         touch = touches(self.outline, sliders, tips, self.velocities)
@@ -76,8 +76,9 @@ class StraightDrive:
 
 
 def start_drive(outline: Outline, radius: float, sliders: Array, inputs: Array) -> tuple[StraightDrive, TipContact]:
-    """Put tips of that radius (m) at sliders (p, 3), each at contact and angle of its inputs (p, 3: velocity m/s,
-    contact, angle rad); with the contact in the first window.
+    """Start tips of that radius (m) at sliders (p, 3); return them with their contacts in the first window.
+
+    inputs (p, 3): velocity m/s, contact, angle rad.
     """
     velocity, contact, angle = inputs.T
     inward = outline.inward_normal(contact)

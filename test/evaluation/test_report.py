@@ -448,7 +448,7 @@ def test_rejects_models_comparisons_and_windows_that_do_not_match(
 
 @pytest.mark.parametrize(
     ("sd_factor", "verdict"),
-    [(1.0, "no miscalibration beyond chance"), (0.5, "too narrow for Δx, Δy, Δθ"), (2.0, "too wide for Δx")],
+    [(1.0, "no miscalibration beyond chance"), (0.5, "too narrow for Δx, Δy and Δθ"), (2.0, "too wide for Δx")],
 )
 def test_calibration_sentence_states_whether_intervals_are_too_narrow_or_too_wide(
     sd_factor: float, verdict: str

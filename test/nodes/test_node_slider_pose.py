@@ -99,7 +99,7 @@ def test_the_answer_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
     [
         ({"pusher": {"x": 0.23025, "y": 0.11}}, ("pusher: (0.23025, 0.11)", "the gap to the outline is 0.02 m")),
         ({"pusher": {"x": 0.27, "y": 0.11}}, ("pusher", "0.015 m inside the outline")),
-        ({"pusher_velocity": {"x": -0.02}}, ("pusher_velocity: (-0.02, 0.0)", "180.0 degrees off")),
+        ({"pusher_velocity": {"x": -0.02}}, ("pusher_velocity: (-0.02, 0.0)", "180.0 degrees from it")),
         ({"pusher_velocity": {}}, ("pusher_velocity: (0.0, 0.0)", "above 0")),
         ({"pusher_velocity": {"x": float("nan")}}, ("pusher_velocity.x: nan", "a finite number")),
         ({"slider": {"position": {"x": 0.3, "y": 0.1}, "orientation": {"w": 0.0}}}, ("slider.orientation norm: 0.0",)),

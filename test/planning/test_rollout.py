@@ -152,7 +152,7 @@ def test_at_a_corner_the_contact_belongs_to_the_edge_it_slid_along(edge: int, en
     contact = outline.contact_on_edge(edge, end + 0.002 * (0.5 - end))
     inputs, slider = np.array([[0.02, float(contact), 1.2 * towards]]), np.zeros((1, 3))
     drive, contact = start_drive(outline, RADIUS, slider, inputs)
-    later = drive.meet(slider, contact, 0.2, 0.2)
+    later = drive.contact_at(slider, contact, 0.2, 0.2)
     assert later.touch.inputs[0, 1] == pytest.approx(float(outline.contact_on_edge(edge, end)))
     assert later.touch.inputs[0, 2] == pytest.approx(1.2 * towards)
 
@@ -282,11 +282,14 @@ def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
         ({"steps": [PUSH, PUSH, [0.02, 0.1, 1.6, 1.0]]}, r"steps\[2\]\.angle: 1\.6 is not accepted, give an angle"),
         ({"steps": [PUSH, [np.nan, 0.1, 0.0, 1.0]]}, r"steps\[1\]\.velocity: nan"),
         ({"steps": [[0.02, 1.0, 0.0, 1.0]]}, r"steps\[0\]\.contact: 1\.0 .*\[0, 1\)"),
-        ({"steps": [[0.02, 0.1, 0.0, 0.5]]}, r"steps\[0\]\.duration: 0\.5 .*0\.18 to 0\.22 s, or a number of windows"),
+        (
+            {"steps": [[0.02, 0.1, 0.0, 0.5]]},
+            r"steps\[0\]\.duration: 0\.5 .*0\.18 to 0\.22 s, or a multiple of such a duration",
+        ),
         ({"steps": [[0.02, 0.1, 0.0, np.inf]]}, r"steps\[0\]\.duration: inf"),
         ({"steps": [[0.02, 0.1, 0.0, -1.0]]}, r"steps\[0\]\.duration: -1\.0"),
         ({"steps": [[0.02, 0.1, 0.0, 1e300]]}, r"steps\[0\]\.duration: 1e\+300 .*at most 2000 s, 10000 windows"),
-        ({"steps": [[0.02, 0.1, 0.0, 400.0]], "particles": 100}, r"steps: '2000 windows'.*no more than 1000 windows"),
+        ({"steps": [[0.02, 0.1, 0.0, 400.0]], "particles": 100}, r"steps: '2000 windows'.*at most 1000 windows"),
         ({"particles": 0}, r"particles: 0 .*1 to 100000"),
         ({"particles": MOST_PARTICLES + 1}, r"particles: 100001"),
         ({"slider_mean": [0.0, np.nan, 0.0]}, r"slider_mean: \[0\.0, nan, 0\.0\]"),

@@ -220,7 +220,7 @@ def test_at_a_corner_the_other_edge_is_pushed_where_the_nearer_is_not(towards: f
 
 @pytest.mark.parametrize("driving", [0.0, np.pi / 4.0, np.pi / 2.0])
 def test_at_a_corner_moving_off_is_refused(driving: float) -> None:
-    assert "degrees off" in refusal(at_corner(np.pi / 4.0, driving))
+    assert "degrees from it" in refusal(at_corner(np.pi / 4.0, driving))
 
 
 # --- replayed windows -------------------------------------------------------------------------------------------
@@ -283,7 +283,7 @@ def test_a_covariate_that_contradicts_the_poses_is_refused(name: str, off: float
     push = push_at("rect1", 0.1, 0.0, pose=(0.0, 0.0, 0.0))
     message = refusal(replace(push, covariates={name: off}))
     assert message.startswith(f"covariate {name}: {off!r} is not accepted, give ")
-    assert "as the poses say, or leave it out" in message
+    assert "which follows from the poses, or omit it" in message
 
 
 def test_what_the_poses_do_not_tell_must_be_brought() -> None:
@@ -322,7 +322,7 @@ def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
     model = model_of(shape)
     assert slider_after(model, push_at(shape, 0.1, 0.2, gap=0.99 * MAX_GAP)) is not None
     message = refusal(push_at(shape, 0.1, 0.2, gap=0.0123), model)
-    assert "the gap to the outline is 0.0123 m, up to 0.001 m is contact" in message
+    assert "the gap to the outline is 0.0123 m, at most 0.001 m is contact" in message
     refusal(push_at(shape, 0.1, 0.2, gap=1.01 * MAX_GAP), model)
 
 
@@ -330,7 +330,7 @@ def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
 def test_contact_from_inside_is_refused(shape: str) -> None:
     model = model_of(shape)
     assert slider_after(model, push_at(shape, 0.1, 0.2, gap=-0.99 * MAX_DEPTH)) is not None
-    assert "reaches 0.004 m into the outline" in refusal(push_at(shape, 0.1, 0.2, gap=-0.004), model)
+    assert "it is 0.004 m inside the outline" in refusal(push_at(shape, 0.1, 0.2, gap=-0.004), model)
     for angle in (0.2, np.pi - 0.2):
         message = refusal(push_at(shape, 0.1, angle, gap=-RADIUS - 0.002), model)
         assert "outside the slider: its centre is 0.002 m inside the outline" in message
@@ -340,7 +340,7 @@ def test_contact_from_inside_is_refused(shape: str) -> None:
 def test_a_tip_that_moves_away_or_along_is_refused_with_its_angle(degrees: float, shown: str) -> None:
     message = refusal(push_at("rect1", 0.1, np.radians(degrees) * (1.0 + 1e-12), pose=(0.0, 0.0, 0.0)))
     assert message.startswith("pusher_velocity: (")
-    assert f"it is {shown} degrees off" in message or (degrees == 180.0 and "-180.0 degrees off" in message)
+    assert f"it is {shown} degrees from it" in message or (degrees == 180.0 and "-180.0 degrees from it" in message)
 
 
 def test_an_outline_with_a_notch_is_touched_where_the_tip_is() -> None:

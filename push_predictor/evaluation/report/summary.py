@@ -72,12 +72,16 @@ def _rounded(value: float) -> str:
     return number(value, 3, zeros=True)
 
 
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([*([", ".join(names[:-1])] if len(names) > 1 else []), names[-1]])
+
+
 def _verdicts(ends: Array) -> str:
     """For each output that is miscalibrated beyond chance: too narrow or too wide; ends (2, 3)."""
     low, high = ends
     narrow = [name for name, end in zip(SYMBOLS, high, strict=True) if end < LEVEL]
     wide = [name for name, end in zip(SYMBOLS, low, strict=True) if end > LEVEL]
     found = (("too narrow", narrow), ("too wide", wide))
-    if parts := [f"{verdict} for {', '.join(names)}" for verdict, names in found if names]:
+    if parts := [f"{verdict} for {_listed(names)}" for verdict, names in found if names]:
         return f": they are {' and '.join(parts)}"
     return ": no miscalibration beyond chance" if np.isfinite(ends).all() else ""

@@ -74,6 +74,9 @@ def _paint_example(part: SubFigure, rig: Rig, table: PushTable, comparison: Comp
     """Paint one block and return the axes with the ellipse."""
     row = example.row
     enlarged = magnification(rig.outline, np.stack([comparison.mean[row], comparison.observed[row]]))
+    left: Axes
+    middle: Axes
+    right: Axes
     left, middle, right = part.subplots(1, 3, width_ratios=(1.0, 1.25, 0.42))
     velocity, _, angle = table.inputs[row]
     title = f"{velocity * 1e3:.0f} mm/s, push angle {np.degrees(angle):.0f}°, {table.duration[row]:.2g} s"
