@@ -63,7 +63,10 @@ class Kind:
 
 @dataclass(frozen=True)
 class Driver:
-    """What a kind is driven by. covariates: its names in the contract; form: see models.effects.driver_basis."""
+    """What an effect depends on.
+
+    covariates: names as in docs/reference/trace.md. form: see models.effects.driver_basis.
+    """
 
     name: str
     covariates: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""NMSE, NLPD and coverage, the same offline and online (contract, section 4).
+"""NMSE, NLPD and coverage, the same offline and online (docs/reference/json.md).
 
 NLPD is the negative log predictive density in SI units (m, m, rad); totals are sums over the three outputs.
 """

@@ -59,7 +59,7 @@ def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: A
 
 
 def metrics_json(comparison: Comparison) -> dict[str, object]:
-    """The JSON of contract section 4, with 95 % intervals of the totals from resampling whole pushes.
+    """The metrics of docs/reference/json.md, with 95 % intervals of the totals from resampling whole pushes.
 
     A number that these windows do not determine (none was seen) is null.
     """

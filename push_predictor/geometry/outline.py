@@ -1,6 +1,6 @@
 """The outline of a slider: contact fractions and points, normals, nearest points.
 
-The body frame has its origin at the outline's area centroid (contract, section 1). A contact is a fraction of the
+The body frame has its origin at the outline's area centroid (docs/reference/push.md). A contact is a fraction of the
 perimeter, counter-clockwise from the first vertex. Circles and ellipses are stored as polygons, but their points and
 normals are those of the smooth curve.
 """
@@ -72,7 +72,7 @@ class Outline:
 
     @cached_property
     def centroid(self) -> Array:
-        """Area centroid (2,), m: zero if the body frame follows the contract."""
+        """Area centroid (2,), m: zero in the body frame of docs/reference/push.md."""
         x, y = self.vertices.T
         xn, yn = np.roll(x, -1), np.roll(y, -1)
         cross = x * yn - xn * y

@@ -1,4 +1,4 @@
-"""Outlines of the MIT push data set by name (dimensions: contract, section 1)."""
+"""Outlines of the MIT push data set by name (dimensions: docs/reference/push.md)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """From (velocity, contact, angle) to what a kernel can compare.
 
-The outline's rotational symmetry is folded (contract, section 1): a square's four sides are one. Mirror symmetry is not
-assumed. On a smooth outline the contact is a point on a closed curve, so it enters by its cosine and sine.
+The outline's rotational symmetry is folded (docs/reference/push.md): a square's four sides are one. Mirror symmetry
+is not assumed. On a smooth outline the contact is a point on a closed curve, so it enters by its cosine and sine.
 """
 
 from __future__ import annotations

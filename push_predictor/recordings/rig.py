@@ -1,4 +1,4 @@
-"""The rig of a recording: slider, pusher, surface; the push_rig record (contract, section 2)."""
+"""The rig of a recording: slider, pusher, surface; the push_rig record (docs/reference/rig_file.md)."""
 
 from __future__ import annotations
 

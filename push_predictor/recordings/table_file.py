@@ -1,4 +1,4 @@
-"""Push tables as CSV, also .csv.gz (contract, section 4, DATA)."""
+"""Push tables as CSV, also .csv.gz (docs/reference/recordings.md)."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TopicNames:
-    """Topics of a recording (contract, section 2); a leading slash makes no difference."""
+    """Topics of a recording (docs/reference/recordings.md); a leading slash makes no difference."""
 
     slider: str = "slider/pose"
     pusher: str = "pusher/pose"

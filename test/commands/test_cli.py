@@ -225,8 +225,8 @@ def test_predict_in_words_has_a_line_for_each_output(place: Place, run):
 # --- evaluate, validate ----------------------------------------------------------------------------------------------
 
 
-def assert_contract(metrics: dict[str, Any]) -> None:
-    """The keys of the contract, and numbers in them."""
+def assert_metrics_format(metrics: dict[str, Any]) -> None:
+    """The keys of docs/reference/json.md, and numbers in them."""
     assert set(METRICS) <= metrics.keys()
     for key in ("nmse", "nlpd"):
         assert list(metrics[key]) == [*OUTPUTS, "total"]
@@ -252,7 +252,7 @@ def test_evaluate_and_validate_give_the_metrics_of_the_library(kind: str, place:
     assert online.pop("alarm")["fired"] is False
     assert online == json.loads(json.dumps(metrics_json(comparison)))
     for metrics in (evaluated.json, online):
-        assert_contract(metrics)
+        assert_metrics_format(metrics)
         assert (metrics["n_pushes"], metrics["n_train"]) == (4, len(loaded.training))
     assert (validated.json["exact_nlpd"] is None) is (kind != "vhgp")
 
@@ -276,7 +276,7 @@ def test_evaluate_warns_about_pushes_that_were_trained_on(place: Place, run):
 
 def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
     outcome = run("validate", place.path("analytical.pushmodel"), place.path("round"), "--json", "-")
-    assert_contract(outcome.json)
+    assert_metrics_format(outcome.json)
     warned = without_progress(outcome.err)[0]
     assert warned.startswith("warning: ") and "'rect1'" in warned and "'ellip1'" in warned
 
@@ -350,7 +350,7 @@ def test_report_writes_a_page_with_pictures_and_the_metrics(place: Place, run, t
     assert [metrics["model"] for metrics in found["models"]] == ["hetero", "analytical"]
     assert json.loads((tmp_path / "validation.json").read_text()) == found["models"]
     for metrics in found["models"]:
-        assert_contract(metrics)
+        assert_metrics_format(metrics)
 
 
 @pytest.mark.parametrize("missing", ["push_predictor_paper", "push_predictor_paper.report"])

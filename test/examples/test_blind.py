@@ -192,7 +192,7 @@ def test_the_same_seed_draws_the_same_truth() -> None:
     assert drawn_for(spec, "library", np.random.default_rng(5)) == drawn_for(spec, "library", np.random.default_rng(5))
 
 
-def test_drivers_have_the_names_of_the_contract() -> None:
+def test_drivers_have_the_documented_names() -> None:
     known = {"slid_distance", "elapsed_time", "push_index", "dwell_time", "velocity", "edge", "slider_x", "slider_y"}
     known |= {"push_heading", "slider_heading"}
     for driver in DRIVERS.values():

@@ -232,7 +232,7 @@ def test_npz_and_csv_of_the_square_give_one_table(measured_data: Path, tmp_path:
     assert set(outline.edge(one.inputs[:, 1])[0].tolist()) == {0}
 
 
-def test_in_the_contracts_frame_the_contact_stays_on_the_side(measured_data: Path, tmp_path: Path) -> None:
+def test_in_the_documented_frame_the_contact_stays_on_the_side(measured_data: Path, tmp_path: Path) -> None:
     """After 4 mm of travel the pusher still touches the turned side; with dy the other way it does not."""
     import_source("mit-square", [measured_data / "mit_square" / "pushes_3500.npz"], tmp_path)
     table = read_table(tmp_path / "pushes_3500.csv")

@@ -1,4 +1,4 @@
-"""Measured pushes of a square: textbook parameters explain them in the contract's frame and in no flipped one."""
+"""Measured pushes of a square: textbook parameters explain them in the documented frame and in no flipped one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AS_CONTRACT, MIRRORED = (1, 1, 1, 1), (-1, -1, -1, -1)
 
 @pytest.fixture(scope="module")
 def square_pushes(measured_data):
-    """Inputs, durations and outcomes of all 3500 windows in the contract's frame: contact on edge 0, dy to the left."""
+    """Inputs, durations and outcomes of all 3500 windows in the documented frame: contact on edge 0, dy to the left."""
     with np.load(measured_data / "mit_square" / "pushes_3500.npz") as table:
         inputs = np.column_stack([np.full(len(table["c"]), 0.02), table["c"] / 4.0, table["beta"]])
         outcomes = np.column_stack([table["dx"], -table["dy"], table["dtheta"]])

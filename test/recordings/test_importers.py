@@ -1,4 +1,4 @@
-"""Importers write complete recordings in the contract's frames, report every repair and reject invalid files."""
+"""Importers write complete recordings in the documented frames, report every repair and reject invalid files."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def saved_table(folder: Path, name: str, table: PushTable) -> Path:
     return folder / f"{name}.csv"
 
 
-def test_a_recording_gives_every_covariate_of_the_contract_and_its_scalar_topics(tmp_path: Path) -> None:
+def test_a_recording_gives_every_documented_covariate_and_its_scalar_topics(tmp_path: Path) -> None:
     start = int(translating_push().slider.stamp[0])
     loaded = load_evidence([saved(tmp_path, "one", scalars=warming(start))])
     assert set(loaded.table.covariates) == OF_A_RECORDING | {"topic:/surface/temperature"}

@@ -48,8 +48,8 @@ class AnalyticalPush:
     def displacement(self, inputs: Array, duration: Array) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad) of the body's origin in the push direction's frame.
 
-        inputs (n, 3): velocity in m/s, contact as a fraction of the perimeter, angle in rad (contract,
-        section 1); duration (n,) in s. The pusher's centre runs straight at constant velocity. Where the
+        inputs (n, 3): velocity in m/s, contact as a fraction of the perimeter, angle in rad
+        (docs/reference/push.md); duration (n,) in s. The pusher's centre runs straight at constant velocity. Where the
         pusher slides off, the slider stays. Raises RequestError for a value that is not finite or goes back.
         """
         velocity, contact, angle = np.asarray(inputs, dtype=np.float64).T

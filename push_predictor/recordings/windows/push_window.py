@@ -1,4 +1,4 @@
-"""The push window: its options and its fields (contract, section 2)."""
+"""The push window: its options and its fields (docs/reference/recordings.md)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class WindowOptions:
 class PushWindow:
     """One window: the command of the pusher and the displacement of the slider.
 
-    start, end: header time, ns. velocity m/s, contact, angle rad and duration s as in contract section 1.
+    start, end: header time, ns. velocity m/s, contact, angle rad and duration s as in docs/reference/push.md.
     displacement (3,): dx, dy m, dtheta rad in the push frame. slider_start, slider_end (3,): x, y m, heading rad in
     the world. push_heading: heading of the push frame's x axis in the world, rad. covariates: values by name.
     """
