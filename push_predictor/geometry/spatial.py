@@ -52,7 +52,7 @@ class SpatialPose:
         return np.asarray(self.rotation @ point + self.position)
 
     def vector(self, vector: Array) -> Array:
-        """A vector (3,) of the inner frame, in the outer one, for frames that do not move relative to each other."""
+        """A vector (3,) of the inner frame, in the outer one; the frames are at rest to each other."""
         return np.asarray(self.rotation @ vector)
 
     def covariance(self, covariance: Array) -> Array:

@@ -25,9 +25,10 @@ class Touch:
 
 
 def touches(outline: Outline, sliders: Array, tips: Array, velocities: Array) -> Touch:
-    """The pushes of tips (n, 2) m with velocities (n, 2) m/s at sliders (n, 3: x, y m, heading rad), in one frame.
+    """The pushes of tips at sliders, in one frame.
 
-    A tip at a corner touches the edge that faces it more directly, as in a window, unless it pushes only the other one.
+    sliders (n, 3: x, y m, heading rad); tips (n, 2) m; velocities (n, 2) m/s of the tips. A tip at a corner touches the
+    edge that faces it more directly, as in a window, unless it pushes only the other one.
     """
     nearest = outline.project(to_body(tips, sliders))
     ahead = rotate(velocities, -sliders[:, 2])

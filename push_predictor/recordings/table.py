@@ -63,7 +63,10 @@ class PushTable:
 
 
 def concatenate(tables: Sequence[PushTable]) -> PushTable:
-    """The rows of all tables; a covariate is kept if all tables have it. Raises TableError without a table."""
+    """The rows of all tables; a covariate is kept if all tables have it.
+
+    Raises TableError without a table.
+    """
     if not tables:
         raise TableError("no push table was given, give at least one recording or table")
     names = [name for name in tables[0].covariates if all(name in table.covariates for table in tables)]

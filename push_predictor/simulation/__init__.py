@@ -1,4 +1,4 @@
-"""A simulated rig: a dynamic pusher-slider on distributed support points, its sensors and its recordings.
+"""A simulated rig: a dynamic pusher-slider on support points, its sensors and its recordings.
 
 Import `rig_simulator` for recordings, `interactive_rig` for single pushes; the other modules are their parts.
 """

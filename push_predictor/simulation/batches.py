@@ -1,4 +1,7 @@
-"""Run the pushes of a spec in lockstep: each starts from a slider at rest, so the pushes are independent."""
+"""Run the pushes of a spec in lockstep.
+
+Each push starts from a slider at rest, so the pushes are independent.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,10 @@ SETTLE = 0.03  # s at rest after each push
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """n pushes simulated together: rows (n,) of the plan, motion, paths of the tips, end (n,) of each in s."""
+    """n pushes simulated together.
+
+    rows (n,) of the plan, motion, path of the tips, end (n,) of each push in s.
+    """
 
     rows: IntArray
     motion: Motion
@@ -48,7 +54,10 @@ def end_times(path: PusherPath, friction: float) -> Array:
 
 
 def conditions_of(spec: SimulationSpec, start: Array, path: PusherPath, end: Array) -> Conditions:
-    """The conditions at the start of each push, from the start poses (n, 3), the paths and the end times (n,) s."""
+    """The conditions at the start of each push.
+
+    start (n, 3): poses of the sliders; path of the tips; end (n,) s: end times.
+    """
     plan, n = spec.pushes, len(spec.pushes)
     pause = np.zeros(n) if spec.pauses is None else spec.pauses
     between = pause + RESET_TIME + 2.0 * LOWER_TIME

@@ -71,7 +71,10 @@ PLAIN = Changes()
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A recorded scalar: value (m,) at time (m,) s, linear in between; noise: standard deviation per sample."""
+    """A recorded scalar: value (m,) at time (m,) s, linear in between.
+
+    noise: standard deviation per sample.
+    """
 
     time: Array
     value: Array

@@ -97,7 +97,7 @@ def run(
     velocity: Array | None = None,
     time_step: Array | None = None,
 ) -> Motion:
-    """Simulate sliders from poses start (n, 3), with the tips on their paths, for at least duration (n,) s.
+    """Simulate sliders from start (n, 3), with the tips on their paths, for at least duration (n,) s.
 
     velocity (n, 3): of the sliders at the start, zero by default. time_step (n,) s: steps_of(path) by default; the
     pushes have different time steps and the same number of them.

@@ -16,11 +16,11 @@ LONGEST_TRAVEL = 0.08  # m of a tip; noise is drawn for this length, so that a s
 
 
 def push_once(spec: SimulationSpec, sliders: Array) -> Array:
-    """Poses (n, 3: x, y m, heading rad) of sliders (n, 3) at rest after the n pushes of a spec, one on each.
+    """Poses (n, 3: x, y m, heading rad) of sliders (n, 3) after one push of a spec on each.
 
-    surface_seed of the spec draws the table. Its seed and the row draw the noise of a push: with the same seed, push k
-    gets the same noise whatever its commands. The noise stays constant beyond LONGEST_TRAVEL. Raises RigError for an
-    unknown shape or surface.
+    The sliders are at rest before and after. surface_seed of the spec draws the table. Its seed and the row draw the
+    noise of a push: with the same seed, push k gets the same noise for any commands. The noise stays constant beyond
+    LONGEST_TRAVEL. Raises RigError for an unknown shape or surface.
     """
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, sliders, spec.acceleration)
     end = end_times(path, spec.table.friction)

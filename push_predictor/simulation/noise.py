@@ -14,13 +14,19 @@ PERSISTENT_SHARE = 0.2  # of the variance: stays the same for a whole push
 
 @dataclass(frozen=True, eq=False)
 class PushNoise:
-    """Deviations of n pushes: persistent (n, k) over each push; knots (n, m, k), one every KNOT_SPACING metres."""
+    """Deviations of n pushes.
+
+    persistent (n, k): constant over each push; knots (n, m, k): one every KNOT_SPACING metres.
+    """
 
     persistent: Array
     knots: Array
 
     def at(self, travelled: Array) -> Array:
-        """Deviations (n, k) after the tips travelled (n,) m; their variance is the same between knots as at knots."""
+        """Deviations (n, k) after the tips travelled (n,) m.
+
+        Their variance is the same between knots as at knots.
+        """
         position = np.clip(travelled / KNOT_SPACING, 0.0, self.knots.shape[1] - 1.001)
         index = position.astype(np.intp)
         phase = (np.pi / 2.0) * (position - index)[:, None]
@@ -39,5 +45,8 @@ def knot_count(length: float) -> int:
 
 
 def noise_from_draws(draws: Array) -> PushNoise:
-    """Noise with the variance of independent draws (n, m + 1, k): the first is persistent, one for each knot."""
+    """Noise with the variance of independent draws (n, m + 1, k).
+
+    The first draw is persistent, the others are the knots.
+    """
     return PushNoise(np.sqrt(PERSISTENT_SHARE) * draws[:, 0], np.sqrt(1.0 - PERSISTENT_SHARE) * draws[:, 1:])

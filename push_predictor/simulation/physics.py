@@ -1,4 +1,4 @@
-"""The forces on pushed sliders: weight, friction of the table at each support point, friction at the rod.
+"""The forces on pushed sliders: weight, friction at each support point, friction at the rod.
 
 All are explicit per push. They change with the position on the table and with the distance travelled by the tip.
 """
@@ -66,7 +66,10 @@ class Physics:
     def acting(
         self, pose: Array, velocity: Array, contact: Array, travelled: Array, points: tuple[Array, Array]
     ) -> Acting:
-        """Friction and forces at an instant; arguments as in Moment, points: world x, y (n, k) of the support, m."""
+        """Friction and forces at an instant.
+
+        Arguments as in Moment, points: world x, y (n, k) of the support, m.
+        """
         if self.changes == PLAIN:
             return Acting(self.grip(*points, travelled), self.friction_at_rod(travelled))
         changes, moment = self.changes, Moment(self.conditions, pose, velocity, contact, travelled)

@@ -55,7 +55,10 @@ def random_pushes(
     rng: np.random.Generator | None = None,
     angle_limit: float = 1.2,
 ) -> PushPlan:
-    """Plan n pushes: contact uniform over the perimeter, angle uniform within the limit, speed one of `speeds`."""
+    """Plan n random pushes.
+
+    The contact is uniform over the perimeter, the angle uniform within the limit, the speed one of `speeds`.
+    """
     rng = rng or np.random.default_rng(0)
     contact, angle = rng.random(n), rng.uniform(-angle_limit, angle_limit, n)
     return PushPlan(contact, angle, rng.choice(np.asarray(speeds, dtype=np.float64), n), np.full(n, travel))
@@ -132,7 +135,10 @@ def ramp_time(length: Array, speed: Array, acceleration: float) -> Array:
 
 
 def ramp_distance(time: Array, length: Array, speed: Array, acceleration: float) -> Array:
-    """Distance travelled after `time` of a trapezoidal motion, m; zero before its start, `length` after its end."""
+    """Distance travelled after `time` of a trapezoidal motion, m.
+
+    Zero before its start, `length` after its end.
+    """
     peak = np.minimum(speed, np.sqrt(acceleration * length))
     ramp = peak / acceleration
     cruise = length / peak - ramp

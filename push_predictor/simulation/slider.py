@@ -64,7 +64,7 @@ def built_shares(points: Array, seed: int) -> Array:
 
 
 def pressure_patterns(points: Array, n: int, rng: np.random.Generator) -> Array:
-    """Deviations (n, k) of the logarithm of the load on points (k, 2), of unit variance over points and draws.
+    """Random deviations (n, k) of the log load on points (k, 2), with unit variance.
 
     Half of the variance is a tilt of the pressure, a quarter is curvature (rim against middle, saddle) and a quarter
     is independent between points.

@@ -1,4 +1,4 @@
-"""The specification of a simulated recording (slider, table, pushes, seeds) and the physics of its pushes."""
+"""The specification of a simulated recording, and the physics of its pushes."""
 
 from __future__ import annotations
 
@@ -90,7 +90,10 @@ def simulated_rig(spec: SimulationSpec) -> Rig:
 
 
 def physics_of(spec: SimulationSpec, length: float) -> Physics:
-    """The physics of each push of a spec, for paths up to length (m): one table, contact noise drawn per push."""
+    """The physics of each push of a spec, for paths up to length (m).
+
+    The table is drawn once; the contact noise is drawn for each push.
+    """
     slider, n = spec.slider, len(spec.pushes)
     points = support_points(slider.outline)
     return Physics(

@@ -1,4 +1,4 @@
-"""The recordings in bags/: their specifications and the command that writes them (scripts/make_bags.sh)."""
+"""The recordings in bags/: specifications, and the command that writes them (make_bags.sh)."""
 
 from __future__ import annotations
 

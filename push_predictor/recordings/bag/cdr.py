@@ -22,7 +22,10 @@ _Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Layout:
-    """A message type: header: starts with a std_msgs/Header; then `count` numbers of `size` bytes (8 or 4)."""
+    """The layout of a message type: an optional std_msgs/Header, then numbers of one size.
+
+    header: whether there is one; count: of the numbers; size: of a number, 8 or 4 bytes.
+    """
 
     header: bool
     count: int
@@ -52,7 +55,10 @@ class Columns:
 
 
 def decode(messages: Sequence[bytes], layout: Layout) -> Columns:
-    """Decode messages of one type. A message that is too short or not XCDR1 is not valid and has a row of zeros."""
+    """Decode messages of one type.
+
+    A message that is too short or not XCDR1 is not valid and has a row of zeros.
+    """
     n = len(messages)
     stamp, values, valid = np.zeros(n, np.int64), np.zeros((n, layout.count)), np.zeros(n, bool)
     frames: set[str] = set()
@@ -71,9 +77,10 @@ def decode(messages: Sequence[bytes], layout: Layout) -> Columns:
 
 
 def encode(stamp: IntArray, values: Array, layout: Layout, frame_id: str = "world") -> list[bytes]:
-    """Encode one little-endian message per row of values (n, count); stamp (n,) in ns is unused without a header.
+    """Encode one little-endian message per row of values (n, count).
 
-    Raises ValueError for a stamp outside the range of builtin_interfaces/Time.
+    stamp (n,) in ns is unused without a header. Raises ValueError for a stamp outside the range of
+    builtin_interfaces/Time.
     """
     text = frame_id.encode() + b"\0"
     start = layout.start(len(text))

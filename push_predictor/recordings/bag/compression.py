@@ -1,4 +1,4 @@
-"""Decompression of what rosbag2 compresses in addition to MCAP: whole files or single messages, with zstd."""
+"""Decompression of the files or messages that rosbag2 compresses with zstd in addition to MCAP."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _PIECE, _COMPRESSED_PIECE = 1 << 15, 1 << 10  # bytes; small, because data befor
 
 
 def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
-    """NAME.mcap in the folder, decompressed from NAME.mcap.zstd; a file with another suffix is returned unchanged.
+    """NAME.mcap in the folder, decompressed from NAME.mcap.zstd.
 
-    A damaged file is decompressed up to the damage, with a note. The result uses at most half of the free disk space.
-    Raises RecordingError if nothing can be decompressed.
+    A file with another suffix is returned unchanged. A damaged file is decompressed up to the damage, with a note. The
+    result uses at most half of the free disk space. Raises RecordingError if nothing can be decompressed.
     """
     if file.suffix != ENDING:
         return file
@@ -34,7 +34,10 @@ def unpack_file(file: Path, folder: Path, notes: list[str]) -> Path:
 
 
 def unpack_message(data: bytes) -> bytes:
-    """The message in a zstd frame. Raises zstandard.ZstdError for another frame or a message that is too large."""
+    """The message in a zstd frame.
+
+    Raises zstandard.ZstdError for another frame or a message that is too large.
+    """
     size = zstandard.frame_content_size(data)
     if not 0 <= size <= LARGEST_MESSAGE:
         raise zstandard.ZstdError(f"a message without a size, or larger than {LARGEST_MESSAGE} bytes")

@@ -13,10 +13,11 @@ Wanted = dict[int, tuple[str, str]]  # channel id: topic and type
 
 
 class Descriptions:
-    """Collects the descriptions of a file; of two different ones for a channel the first is used, with a note.
+    """Collects the descriptions of a file.
 
-    topics: {topic: type}; schemas: {type: definition text}; qos: {topic: offered QoS as YAML text, '' if unknown};
-    metadata: {record name: {key: value}}; channels: by id. note takes an offset and a description of the damage there.
+    Of two different ones for a channel the first is used, with a note. topics: {topic: type}; schemas: {type:
+    definition text}; qos: {topic: offered QoS as YAML text, '' if unknown}; metadata: {record name: {key: value}};
+    channels: by id. note takes an offset and a description of the damage there.
     """
 
     def __init__(self, note: Callable[[int, str], None]) -> None:

@@ -1,4 +1,7 @@
-"""Locate the records in an MCAP file's data section; their heads are validated, their contents are not read."""
+"""Locate the records in an MCAP file's data section.
+
+Their heads are validated, their contents are not read.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,10 @@ Note = Callable[[int, str], None]
 
 
 class Place(NamedTuple):
-    """A record: offset of its head, length after the head; whole: False for a chunk cut by the end of the file."""
+    """A record: offset of its head, length after the head.
+
+    whole: False for a chunk cut by the end of the file.
+    """
 
     opcode: int
     offset: int
@@ -38,11 +44,11 @@ class Place(NamedTuple):
 
 
 def places(stream: BinaryIO, size: int, chunks: Sequence[int], closed: bool, note: Note) -> Iterator[Place]:
-    """Records to read, in file order, up to and including the end of the data; damage is noted at its offset.
+    """Records to read, in file order, up to and including the end of the data.
 
-    chunks: known offsets of chunks, in order. After a record with an invalid length, reading continues at the next of
-    them, and ends without one. closed: whether the file has a valid end. Then a chunk that extends beyond the end is
-    not cut off; bytes within it are missing, and the data after them would be misread.
+    Damage is noted at its offset. chunks: known offsets of chunks, in order. After a record with an invalid length,
+    reading continues at the next of them, and ends without one. closed: whether the file has a valid end. Then a chunk
+    that extends beyond the end is not cut off; bytes within it are missing, and the data after them would be misread.
     """
     offset = len(MAGIC)
     while offset < size:

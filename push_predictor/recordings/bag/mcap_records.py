@@ -47,7 +47,10 @@ class _Record(BytesIO):
 
 
 class ChunkHead(NamedTuple):
-    """The fields before a chunk's records; begin: offset of the compressed records; packed: their number of bytes."""
+    """The fields before a chunk's records.
+
+    begin: offset of the compressed records; packed: their number of bytes.
+    """
 
     size: int
     crc: int
@@ -82,7 +85,10 @@ def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
 
 
 def is_head(head: bytes) -> bool:
-    """Whether these bytes can begin a record: random bytes hardly ever do, a head cut by the end of the file does."""
+    """Whether these bytes can begin a record.
+
+    Random bytes hardly ever do; a head cut by the end of the file does.
+    """
     if len(head) < HEAD.size:
         return True
     opcode, length = HEAD.unpack(head)
@@ -109,10 +115,10 @@ def chunk_head(start: bytes, length: int) -> ChunkHead:
 
 
 def unpack_chunk(head: ChunkHead, stream: BinaryIO) -> Bytes:
-    """Decompress the records of a chunk, which come next in the stream; of a chunk that is cut off, the first ones.
+    """Decompress the records of a chunk, which come next in the stream.
 
-    Memory is limited to the compressed bytes and the size that the head states. Raises one of UNREADABLE for an unknown
-    compression, a wrong size or a wrong checksum.
+    Of a chunk that is cut off, the first ones. Memory is limited to the compressed bytes and the size that the head
+    states. Raises one of UNREADABLE for an unknown compression, a wrong size or a wrong checksum.
     """
     packed = _Packed(stream, head.packed)
     found = _unpacked(head, packed)

@@ -1,4 +1,7 @@
-"""The summary at the end of an MCAP file: its contents and their offsets. Used only if valid and complete."""
+"""The summary at the end of an MCAP file: its contents and their offsets.
+
+Used only if valid and complete.
+"""
 
 from __future__ import annotations
 

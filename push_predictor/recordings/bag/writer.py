@@ -22,11 +22,12 @@ LARGEST_STAMP = 2**63 - 1
 
 
 class BagWriter:
-    """A context manager. path: a folder (metadata.yaml and NAME_0.mcap, for `ros2 bag play`) or a bare NAME.mcap.
+    """A context manager that writes a bag.
 
-    An earlier bag of that name is replaced; after an exception inside the context it is unchanged. The same calls
-    write the same bytes. Raises RecordingError if path is not a bag or cannot be written, and for an unknown
-    compression (zstd, lz4 and none are accepted).
+    path: a folder (metadata.yaml and NAME_0.mcap, for `ros2 bag play`) or a bare NAME.mcap. An earlier bag of that name
+    is replaced; after an exception inside the context it is unchanged. The same calls write the same bytes. Raises
+    RecordingError if path is not a bag or cannot be written, and for an unknown compression (zstd, lz4 and none are
+    accepted).
     """
 
     def __init__(self, path: Path, *, compression: str = "zstd") -> None:
@@ -98,7 +99,7 @@ class BagWriter:
     def write(self, topic: str, stamp: int, data: bytes) -> None:
         """Write a CDR message with stamp (ns) as log and publish time.
 
-        Raises RecordingError for a stamp that MCAP cannot hold and for a full disk, KeyError for a topic that was not
+        Raises RecordingError for a stamp out of range and for a full disk, KeyError for a topic that was not
         added.
         """
         name = absolute(topic)

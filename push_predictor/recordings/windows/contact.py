@@ -22,12 +22,13 @@ SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
 
 @dataclass(frozen=True)
 class ContactSample:
-    """One slider sample. stamp ns, time s, gap m between pusher and outline, height m of the tip above the slider.
+    """One slider sample.
 
-    closing_speed: rate at which the gap shrinks after the sample, m/s. force: measured (fx, fy) N, None if unknown.
-    speed: of the pusher, m/s, the smaller of the means around and after the sample. at_speed: the pusher is not
-    accelerating. in_break: a stream has a break here; after_break: one had a break since the previous sample;
-    repositioned: the slider was placed elsewhere since the previous sample.
+    stamp ns, time s, gap m between pusher and outline, height m of the tip above the slider. closing_speed: rate at
+    which the gap shrinks after the sample, m/s. force: measured (fx, fy) N, None if unknown. speed: of the pusher, m/s,
+    the smaller of the means around and after the sample. at_speed: the pusher is not accelerating. in_break: a stream
+    has a break here; after_break: one had a break since the previous sample; repositioned: the slider was placed
+    elsewhere since the previous sample.
     """
 
     stamp: int

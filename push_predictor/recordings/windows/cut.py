@@ -69,7 +69,10 @@ class PushContext:
 
 @dataclass(frozen=True, eq=False)
 class _Command:
-    """How a window pushes: edge, contact, gap m, inward normal (2,) in the world, heading rad, angle rad, speed m/s."""
+    """The command of a window.
+
+    edge, contact, gap m, inward normal (2,) in the world, heading rad, angle rad, speed m/s.
+    """
 
     edge: int
     contact: float

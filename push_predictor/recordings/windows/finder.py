@@ -87,10 +87,10 @@ class WindowFinder:
         self._add_finite("wrench", stream.stamp, np.column_stack([stream.fx, stream.fy]))
 
     def add_scalar(self, name: str, stream: ScalarStream) -> None:
-        """Add samples of a scalar topic, which becomes the covariate topic:NAME; an empty stream announces a topic.
+        """Add samples of a scalar topic, which becomes the covariate topic:NAME.
 
-        A window waits until every topic has passed its start, for at most LONGEST_GAP in the time of the other
-        streams. A topic without a value by then gives the window no covariate.
+        An empty stream announces a topic. A window waits until every topic has passed its start, for at most
+        LONGEST_GAP in the time of the other streams. A topic without a value by then gives the window no covariate.
         """
         self._scalars.add(name, stream)
 
@@ -104,7 +104,10 @@ class WindowFinder:
         return self._taken()
 
     def finish(self) -> list[PushWindow]:
-        """The remaining windows, when no more samples will come; afterwards the finder starts from the beginning."""
+        """The remaining windows, when no more samples will come.
+
+        Afterwards the finder starts from the beginning.
+        """
         self._end_session()
         while self._postponed:
             self._add_postponed()

@@ -1,4 +1,4 @@
-"""Segment the samples into pushes: which are in contact and moving, and which intervals become windows."""
+"""Segment the samples into pushes: contact, motion, and the intervals that become windows."""
 
 from __future__ import annotations
 

@@ -12,7 +12,10 @@ SET_BACK = 1_000_000_000  # ns; a stamp earlier than this before the last one re
 
 
 class ScalarTrack:
-    """The samples of one topic, with increasing stamps; discarded counts those whose stamp does not increase."""
+    """The samples of one topic, with increasing stamps.
+
+    discarded: number of samples whose stamp did not increase.
+    """
 
     def __init__(self) -> None:
         self._stamp: IntArray = np.empty(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Filter one stream while samples arrive: discard repeated, late and future stamps and single-sample jumps.
+"""Filter one stream while samples arrive: discard repeated, late and future stamps and brief jumps.
 
 A stamp is checked against the samples that arrive after it, not against a clock, because a replayed recording keeps its
 stamps. Of the next LOOKAHEAD samples the longest increasing sequence of stamps is accepted and the rest is discarded.
@@ -29,9 +29,10 @@ IsJump = Callable[[Array, Array, Array], BoolArray]
 
 @dataclass(frozen=True, eq=False)
 class OrderedSamples:
-    """Samples with increasing stamps: stamp (n,) ns, values (n, k); interrupted (n,): data before it are missing.
+    """Samples with increasing stamps: stamp (n,) ns, values (n, k).
 
-    clock_set: the samples still waiting have the time of a clock that was set.
+    interrupted (n,): data before it are missing. clock_set: the samples still waiting have the time of a clock that was
+    set.
     """
 
     stamp: IntArray

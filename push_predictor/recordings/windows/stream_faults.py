@@ -53,7 +53,10 @@ def describe_recording_faults(recording: Recording, counts: Mapping[str, int]) -
 
 
 def clock_offset(stream: PoseStream | WrenchStream, slider: PoseStream) -> float:
-    """Time (s) by which a stream both begins and ends after (or before) the slider's; 0 unless it does both."""
+    """Time (s) by which a stream both begins and ends after (or before) the slider's.
+
+    It is 0 unless the stream does both.
+    """
     if not (len(stream) and len(slider)):
         return 0.0
     first, last = int(stream.stamp[0] - slider.stamp[0]), int(stream.stamp[-1] - slider.stamp[-1])

@@ -19,11 +19,12 @@ JUMP_ANGLE, JUMP_TURN_RATE = 0.1, 8.0  # rad, rad/s: the same for the heading
 
 
 class Track:
-    """Samples of one stream: header stamps (n,) in ns, times (n,) in s after an origin (ns), values (n, width).
+    """The samples of one stream.
 
-    position: the first two columns are a position, m, in which jumps are detected. angle: index of a column with an
-    angle, which is unwrapped. counts: discarded samples by kind, see StampOrder; jumps also counts those after which
-    the stream continues at the new position. interrupted (n,): data between the previous sample and this are missing.
+    stamp (n,) ns: header stamps; time (n,) s after an origin (ns); values (n, width). position: the first two columns
+    are a position, m, in which jumps are detected. angle: index of a column with an angle, which is unwrapped. counts:
+    discarded samples by kind, see StampOrder; jumps also counts those after which the stream continues at the new
+    position. interrupted (n,): data between the previous sample and this are missing.
     """
 
     def __init__(self, width: int, position: bool = False, angle: int | None = None) -> None:
@@ -75,7 +76,10 @@ class Track:
         return np.column_stack([np.interp(time, self.time, column) for column in self.values.T])
 
     def period_known(self, final: bool) -> bool:
-        """Whether the period is known, so that dropouts can be detected; with `final` any number of samples will do."""
+        """Whether the period is known, so that dropouts can be detected.
+
+        With `final` any number of samples will do.
+        """
         if self._period is None and (final or len(self) > PERIOD_SAMPLES):
             self._period = float(np.median(np.diff(self.time[: PERIOD_SAMPLES + 1]))) if len(self) > 1 else 0.0
         return self._period is not None
@@ -86,7 +90,7 @@ class Track:
         return self._period or 0.0
 
     def breaks_in(self, start: Array, end: Array) -> tuple[BoolArray, BoolArray]:
-        """For intervals (start, end] (m,): whether a break overlaps each, and whether a break extends beyond its end.
+        """For intervals (start, end] (m,): does a break overlap each, and does one extend beyond its end?
 
         A break is a dropout or a jump.
         """

@@ -23,7 +23,10 @@ ROUND_TRIP = "the object is the aluminium triangle of 150 mm legs and 1.518 kg, 
 
 
 def triangle() -> Outline:
-    """The triangle about its centroid; edge 0 goes from the right angle along +x, edge 1 is the hypotenuse."""
+    """The triangle about its centroid.
+
+    Edge 0 goes from the right angle along +x, edge 1 is the hypotenuse.
+    """
     return Outline(np.array([[0.0, 0.0], [LEG, 0.0], [0.0, LEG]]) - CENTROID)
 
 
