@@ -1,4 +1,4 @@
-"""From (velocity, contact, angle) to what a kernel can compare.
+"""Features of a push that a kernel can compare, from velocity, contact and angle.
 
 The outline's rotational symmetry is folded (docs/reference/push.md): a square's four sides are one. Mirror symmetry
 is not assumed. On a smooth outline the contact is a point on a closed curve, so it enters by its cosine and sine.
@@ -11,7 +11,7 @@ import numpy as np
 from push_predictor.geometry.outline import Outline
 from push_predictor.types import Array
 
-EDGE_SPACING = 3.0  # edges that no symmetry maps onto each other lie this many edge lengths apart
+EDGE_SPACING = 3.0  # distance, in edge lengths, between edges that no symmetry maps onto each other
 
 
 def push_features(outline: Outline, inputs: Array) -> Array:

@@ -22,7 +22,7 @@ from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
 KINDS = ("vhgp", "gp", "analytical")
-DURATION_TOLERANCE = 0.1  # a learnt model answers for durations this close (relative) to those it was trained on
+DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
 
 
@@ -38,7 +38,7 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PushModel:
-    """A named model with everything that is needed to use it and to judge it.
+    """A named model with everything that is needed to use and evaluate it.
 
     training: the rows it was trained on, covariates included. kind: that of the base, where effects extend it.
     """
@@ -107,13 +107,13 @@ class PushModel:
         return self.predictor.held_out_moments(Push(rows.inputs, rows.duration, rows.covariates), block)
 
     def exact_log_density(self, table: PushTable) -> Array | None:
-        """Log density (n, 3) of a table's outcomes under the exact predictive, None where that is the Gaussian."""
+        """Log density (n, 3) of a table's outcomes under the exact predictive, None if that is a Gaussian."""
         return self.predictor.exact_log_density(Push(table.inputs, table.duration, table.covariates), table.outcomes)
 
     def in_domain(self, inputs: Array) -> BoolArray:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
 
-        Covariates are another matter, see `covariates_seen`.
+        For covariates see `covariates_seen`.
         """
         low, high = self._feature_range
         features = push_features(self.rig.outline, inputs)
@@ -121,7 +121,7 @@ class PushModel:
         return np.asarray(np.all((features >= low - margin) & (features <= high + margin), axis=1))
 
     def covariates_seen(self, push: Push) -> BoolArray:
-        """Whether the covariates of each of n pushes lie where the model's effects have seen them, (n,).
+        """Whether the covariates of each of n pushes lie in the range on which the effects were fitted, (n,).
 
         Raises KeyError where one is missing.
         """
@@ -129,14 +129,14 @@ class PushModel:
         if self.covariate_ranges:
             covariates = self.predictor.completed(push).covariates
             for name, known in self.covariate_ranges.items():
-                seen &= known.holds(covariates[name])
+                seen &= known.contains(covariates[name])
         return seen
 
     @cached_property
     def covariate_ranges(self) -> dict[str, CovariateRange]:
-        """For each covariate that effects take, its range in the training rows, on which they were fitted.
+        """The range in the training rows of each covariate that the effects depend on.
 
-        The model's own inputs have `in_domain`.
+        For the model's own inputs see `in_domain`.
         """
         if not self.predictor.covariates:
             return {}
@@ -151,7 +151,7 @@ class PushModel:
 
     @cached_property
     def duration_range(self) -> tuple[float, float]:
-        """Durations (s) that this model answers for."""
+        """Durations (s) that this model can predict."""
         if not self.predictor.learnt:
             return 0.0, float("inf")
         durations = self.training.duration

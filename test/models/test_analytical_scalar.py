@@ -15,7 +15,7 @@ from push_predictor.geometry.nearest import nearest_on
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.analytical_scalar import FEW, single_push
+from push_predictor.models.mechanics.analytical_scalar import FEW, scalar_analytical
 from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.mechanics.quasi_static import LONGEST_STEP
 from push_predictor.models.mechanisms import LIBRARY, Push
@@ -66,7 +66,7 @@ def test_one_push_goes_as_it_goes_among_others(shape: str, radius: float) -> Non
     physics = AnalyticalPush(OUTLINES[shape], radius, 0.3, SUPPORT)
     inputs, duration = spread_pushes(60)
     assert np.max(inputs[:, 0] * duration) > 10.0 * LONGEST_STEP
-    alone = single_push(physics)
+    alone = scalar_analytical(physics)
     rows = [alone.displacement(inputs[k : k + 1], duration[k : k + 1]) for k in range(len(inputs))]
     np.testing.assert_allclose(np.concatenate(rows), physics.displacement(inputs, duration), rtol=1e-9, atol=1e-12)
 
@@ -75,7 +75,7 @@ def test_one_push_goes_as_it_goes_among_others(shape: str, radius: float) -> Non
 def test_few_and_many_are_alike(count: int) -> None:
     physics = AnalyticalPush(OUTLINES["hexagon"], 0.005, 0.4)
     inputs, duration = spread_pushes(count)
-    ours = single_push(physics).displacement(inputs, duration)
+    ours = scalar_analytical(physics).displacement(inputs, duration)
     assert ours.shape == (count, 3)
     np.testing.assert_allclose(ours, physics.displacement(inputs, duration), rtol=1e-9, atol=1e-12)
 
@@ -84,7 +84,7 @@ def test_what_is_prepared_stays_where_the_physics_change() -> None:
     physics = AnalyticalPush(OUTLINES["square"], 0.005)
     inputs, duration = spread_pushes(1, seed=3)
     for change in ({"contact_friction": 0.1}, {"pusher_radius": 0.01}, {"support": SUPPORT}):
-        ours, theirs = replace(single_push(physics), **change), replace(physics, **change)
+        ours, theirs = replace(scalar_analytical(physics), **change), replace(physics, **change)
         np.testing.assert_allclose(
             ours.displacement(inputs, duration), theirs.displacement(inputs, duration), rtol=1e-9, atol=1e-12
         )
@@ -95,11 +95,11 @@ def test_every_response_is_the_same(mechanism) -> None:
     physics = AnalyticalPush(OUTLINES["square"], 0.00475)
     inputs, duration = spread_pushes(5, seed=1)
     push = Push(inputs, duration, {"slider_heading": np.linspace(-3.0, 3.0, 5)})
-    ours, theirs = mechanism.response(single_push(physics), push), mechanism.response(physics, push)
+    ours, theirs = mechanism.response(scalar_analytical(physics), push), mechanism.response(physics, push)
     np.testing.assert_allclose(ours, theirs, rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("push", [(np.nan, 0.1, 0.1), (-0.1, 0.1, 0.1), (0.02, np.inf, 0.1), (0.02, 0.1, np.nan)])
 def test_what_is_no_push_is_refused_by_name(push: tuple[float, float, float]) -> None:
     with pytest.raises(RequestError, match="is not accepted, give a finite number"):
-        single_push(AnalyticalPush(OUTLINES["square"], 0.005)).displacement(np.array([push]), np.array([0.2]))
+        scalar_analytical(AnalyticalPush(OUTLINES["square"], 0.005)).displacement(np.array([push]), np.array([0.2]))

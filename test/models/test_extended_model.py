@@ -219,8 +219,8 @@ def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_pat
 )
 def test_headings_come_around(seen: list[float], inside: list[float], outside: list[float]) -> None:
     known = range_of("slider_heading", np.array(seen))
-    assert known.holds(np.array(inside)).all()
-    assert not known.holds(np.array(outside)).any()
+    assert known.contains(np.array(inside)).all()
+    assert not known.contains(np.array(outside)).any()
 
 
 def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]) -> None:
@@ -312,7 +312,7 @@ def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushMo
     ("pair", "shared", "message"),
     [
         ((0, 1), 2.0, "covariance of all effects is not positive semidefinite"),
-        ((0, 1), np.nan, "covariance of all effects: a number is not finite"),
+        ((0, 1), np.nan, "covariance of all effects: a value is not finite"),
         ((0, 1), np.zeros((1, 2)), r"effects 0 and 1: covariance of shape \(1, 2\), \(1, 1\) is needed"),
         ((1, 1), 0.0, "effects 1 and 1 of 2 share a covariance"),
         ((0, 2), 0.0, "effects 0 and 2 of 2 share a covariance"),

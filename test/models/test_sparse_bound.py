@@ -109,7 +109,7 @@ def test_what_is_left_unknown_is_the_diagonal_of_the_dense_kernel_less_what_is_t
     induced = InducedKernel.of(kernel, inputs, inputs[:15])
     cross, between = kernel.cross(inputs, inputs[:15]), kernel.matrix(inputs[:15])
     told = cross @ np.linalg.solve(between + 1e-9 * kernel.variance * np.eye(15), cross.T)
-    np.testing.assert_allclose(induced.missing, kernel.variance - np.diagonal(told), atol=1e-7)
+    np.testing.assert_allclose(induced.unexplained, kernel.variance - np.diagonal(told), atol=1e-7)
     np.testing.assert_allclose(induced.times(inputs[:, 0]), told @ inputs[:, 0], atol=1e-6)
     weights = np.exp(inputs[:, 1])
     ridge, precision = induced.regularise(weights), np.linalg.inv(told + np.diag(1.0 / weights))
@@ -123,7 +123,7 @@ def test_inducing_inputs_tell_more_than_as_many_random_rows() -> None:
     chosen = inducing_rows(kernel, inputs, 30)
     assert len(np.unique(chosen)) == 30
     at_random = np.random.default_rng(0).permutation(2000)[:30]
-    unknown, then = (InducedKernel.of(kernel, inputs, inputs[z]).missing.max() for z in (chosen, at_random))
+    unknown, then = (InducedKernel.of(kernel, inputs, inputs[z]).unexplained.max() for z in (chosen, at_random))
     assert unknown < 0.3 * then
 
 

@@ -8,21 +8,21 @@ import numpy as np
 
 from push_predictor.types import Array, BoolArray
 
-HEADINGS = ("slider_heading", "push_heading")  # they come around
-WHOLE_TURN = np.radians(30.0)  # headings that leave no wider gap were seen all around
+HEADINGS = ("slider_heading", "push_heading")  # they wrap around
+WHOLE_TURN = np.radians(30.0)  # headings with no wider gap between them cover the whole turn
 MARGIN = 1e-6  # relative: a model file keeps seven digits
 TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
 class CovariateRange:
-    """From low to high; of a heading counter-clockwise from low, high may lie beyond pi."""
+    """A range from low to high. For a heading it runs counter-clockwise from low, and high may exceed pi."""
 
     low: float
     high: float
     heading: bool = False
 
-    def holds(self, values: Array) -> BoolArray:
+    def contains(self, values: Array) -> BoolArray:
         """Which of the values (n,) lie in the range."""
         margin = MARGIN * max(abs(self.low), abs(self.high))
         if self.heading:
@@ -34,7 +34,7 @@ class CovariateRange:
 
 
 def range_of(name: str, values: Array) -> CovariateRange:
-    """The range of the values (n,) of a covariate; for a heading the shortest arc with all of them on it."""
+    """The range of the values (n,) of a covariate; for a heading the shortest arc that contains them all."""
     if name not in HEADINGS:
         return CovariateRange(float(values.min()), float(values.max()))
     around = np.sort(values % TURN)

@@ -1,4 +1,4 @@
-"""How strongly a mechanism acts, as a function of what drives it: linear, logarithmic, step, periodic, a map."""
+"""How strongly a mechanism acts as a function of a covariate: linear, logarithmic, step, periodic, or a map of two."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _linear(basis: DriverBasis, columns: list[Array], n: int) -> Array:
 
 
 def _logarithmic(basis: DriverBasis, columns: list[Array], n: int) -> Array:
-    """Logarithm of the way from the start of the driver's range, in units of its scale."""
+    """Logarithm of the distance from the start of the covariate's range, in units of its scale."""
     return np.log1p(np.maximum((columns[0] - basis.place) / basis.scale[0], 0.0))[:, None]
 
 
@@ -60,12 +60,12 @@ def _step(basis: DriverBasis, columns: list[Array], n: int) -> Array:
 
 
 def _periodic(basis: DriverBasis, columns: list[Array], n: int) -> Array:
-    """Once around per turn of a heading."""
+    """One period per turn of a heading."""
     return np.column_stack([np.cos(columns[0]), np.sin(columns[0])])
 
 
 def _periodic_twice(basis: DriverBasis, columns: list[Array], n: int) -> Array:
-    """Twice around per turn of a heading: alike for opposite headings."""
+    """Two periods per turn of a heading: the same for opposite headings."""
     return np.column_stack([np.cos(2.0 * columns[0]), np.sin(2.0 * columns[0])])
 
 
@@ -74,7 +74,7 @@ def _category(basis: DriverBasis, columns: list[Array], n: int) -> Array:
 
 
 def _map(basis: DriverBasis, columns: list[Array], n: int) -> Array:
-    """A second-order map over two drivers."""
+    """A second-order polynomial of two covariates."""
     x, y = _scaled(basis, columns)
     return np.column_stack([x, y, x * y, x**2, y**2])
 

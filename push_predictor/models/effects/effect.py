@@ -1,4 +1,4 @@
-"""An effect beside a base model: a mechanism, what drives it, how strongly; additive on the mean."""
+"""An effect that a base model lacks: a mechanism, the covariate it depends on, and its strength; added to the mean."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Effect:
     """Shift of the mean: sum over parameters p and columns m of the basis, response_p x basis_m x coefficient_pm.
 
     mechanism: a name of LIBRARY, or None for the generic one. coefficients (p * m,), p first; covariance of them
-    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's way).
+    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path).
     """
 
     mechanism: str | None
@@ -32,12 +32,12 @@ class Effect:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Covariates that a request must bring."""
+        """Names of the covariates that it depends on."""
         own = () if self.mechanism is None else mechanism_named(self.mechanism).needs
         return tuple(dict.fromkeys([*self.basis.drivers, *own]))
 
     def design(self, physics: AnalyticalPush, push: Push) -> Array:
-        """What the coefficients multiply, (n, 3, p * m)."""
+        """The design matrices (n, 3, p * m): shift = design @ coefficients."""
         return design_of(self.mechanism, self.basis, physics, push, self.outcome_scale)
 
     def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
@@ -49,7 +49,7 @@ class Effect:
 def design_of(
     mechanism: str | None, basis: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
 ) -> Array:
-    """Columns (n, 3, p * m) of an effect: what its coefficients multiply."""
+    """The design matrices (n, 3, p * m) of an effect: products of responses and basis columns."""
     n = len(push.inputs)
     responses = (
         generic_responses(physics, push, outcome_scale)
@@ -61,13 +61,13 @@ def design_of(
 
 
 def generic_responses(physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
-    """A low-order polynomial of contact and angle for each output (n, 3, 3 * 6), per metre of the tip's way.
+    """A low-order polynomial of contact and angle for each output (n, 3, 3 * 6), per metre of the tip's path.
 
     outcome_scale (3,): the unit, m, m and rad per metre. The contact enters by the lever arm of its normal force about
-    the centre of friction, as a share of the limit surface's length: it is what folds an outline's symmetries.
+    the centre of friction, as a fraction of the limit surface's length, so that an outline's symmetries are folded.
     """
-    way = push.inputs[:, 0] * push.duration
-    basis = way[:, None] * _polynomial(physics, push.inputs)
+    path_length = push.inputs[:, 0] * push.duration
+    basis = path_length[:, None] * _polynomial(physics, push.inputs)
     n, m = basis.shape
     responses = np.zeros((n, 3, 3 * m))
     for k in range(3):
@@ -84,10 +84,10 @@ def _polynomial(physics: AnalyticalPush, inputs: Array) -> Array:
 
 
 def generic_width() -> int:
-    """How many responses the generic mechanism has."""
+    """Number of responses of the generic mechanism."""
     return 3 * GENERIC_TERMS
 
 
 def mechanism_named(name: str) -> Mechanism:
-    """The mechanism of that name. Raises KeyError for one that the library does not hold."""
+    """The mechanism of that name. Raises KeyError if the library has none."""
     return {mechanism.name: mechanism for mechanism in LIBRARY}[name]

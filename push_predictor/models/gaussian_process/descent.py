@@ -1,6 +1,6 @@
-"""Finding hyperparameters by L-BFGS, first on a third of the rows, then, with what that taught, on all.
+"""Search for hyperparameters by L-BFGS, first on a third of the rows, then from there on all rows.
 
-A third of the rows costs a 27th for each evaluation, and their minimum is near that of all rows.
+An evaluation on a third of the rows costs a 27th, and its minimum is close to that of all rows.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _PART = 3
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a cost is lowest, and for each variable how far from there the cost is 1/2 higher, roughly; (D,) each."""
+    """A minimum of a cost: point (D,), and the distance (D,) in each variable at which the cost is about 1/2 higher."""
 
     point: Array
     width: Array
@@ -29,20 +29,20 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Descent:
-    """How to go down: box (D, 2) of the variables; iterations at most; the relative decrease that ends it."""
+    """A bounded minimisation: box (D, 2) of the variables, most iterations, relative decrease at which it ends."""
 
     box: Array
     most_iterations: int
     stop: float
 
     def run(self, cost: Cost, first: Array) -> Minimum:
-        """The minimum next to a point of the box."""
+        """The local minimum reached from a point of the box."""
         options = {"maxiter": self.most_iterations, "ftol": self.stop}
         found = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options)
         return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())))
 
     def refine(self, cost: Cost, rough: Minimum) -> Minimum:
-        """The minimum next to that of a third of the rows, in units that suit its first steps."""
+        """The local minimum reached from that of a third of the rows, in units that suit the first steps."""
         unit = rough.width / np.sqrt(_PART)
 
         def scaled(point: Array) -> tuple[float, Array]:
@@ -54,5 +54,5 @@ class Descent:
 
 
 def part_of_rows(n: int) -> IntArray | None:
-    """Indices of the third to begin with; None where n rows are too few for that to pay."""
+    """Indices of a third of n rows to begin with; None if n is too small for that to save time."""
     return np.sort(np.random.default_rng(0).permutation(n)[: n // _PART]) if n >= _FEWEST_ROWS else None

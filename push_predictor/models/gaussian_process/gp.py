@@ -29,8 +29,8 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
 _STOP = 1e-8
-_SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; nats by which it must lead to more
-_FEWEST_FOR_SHORT = 100  # rows; fewer may be interpolated by short lengthscales
+_SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
+_FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class GaussianProcess:
         self._weights = self._posterior.weights(outputs)
 
     def predict(self, inputs: Array) -> LatentPrediction:
-        """The function and the noise at inputs (m, D)."""
+        """Predict f and the noise at inputs (m, D)."""
         kernel = self.parameters.kernel
         cross = kernel.cross(inputs, self.inputs)
         # The noise bounds the posterior variance from below by about noise / n; rounding may not.
@@ -97,23 +97,23 @@ def fit_gp(
 ) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. choice: of it, the family. Raises TrainingError when the rows do not
-    match or are not finite.
+    inputs (n, D) and outputs (n,) standardised. choice: only its family is used. Raises TrainingError when the rows do
+    not match or are not finite.
     """
     check_rows(inputs, outputs)
     d = inputs.shape[1]
     box = np.array([_LENGTHSCALE_BOUNDS] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
     descent = Descent(box, most_iterations, _STOP)
     first = _first(inputs, outputs, choice.family, descent)
-    # From the start with all rows: likelihoods have several maxima, and a part of the rows may lead to another one.
+    # On all rows from the start: likelihoods have several maxima, and a subset of rows may lead to another one.
     found = descent.run(_cost(inputs, outputs, choice.family), first)
     return GaussianProcess(inputs, outputs, _parameters(found.point, choice.family))
 
 
 def _first(inputs: Array, outputs: Array, family: KernelFamily, descent: Descent) -> Array:
-    """Where to begin: the inputs' unit lengthscales, or one of them short, if a part of the rows is surely for it.
+    """Where to begin: at unit lengthscales, or with one of them short if a subset of rows clearly favours it.
 
-    Along a polygon's contact the outcome jumps from side to side: from a long lengthscale the search may call it noise.
+    On a polygon the outcome jumps from side to side. From a long lengthscale the search may take the jumps for noise.
     """
     d = inputs.shape[1]
     usual = np.append(np.zeros(d + 1), np.log(0.3))
@@ -146,13 +146,13 @@ def log_likelihood_and_gradient(inputs: Array, outputs: Array, parameters: GpPar
 
 
 def check_rows(inputs: Array, outputs: Array) -> Array:
-    """The inputs, when they are (n, D) finite numbers that match outputs (n,); else raises TrainingError."""
+    """The inputs, if they are (n, D) finite numbers that match outputs (n,). Raises TrainingError otherwise."""
     if inputs.ndim != 2 or outputs.shape != inputs.shape[:1] or len(outputs) < 2:
         raise TrainingError(
             f"inputs have shape {inputs.shape} and outputs {outputs.shape}, give (n, D) and (n,) with n >= 2"
         )
     if not (np.isfinite(inputs).all() and np.isfinite(outputs).all()):
-        raise TrainingError("inputs or outputs hold NaN or infinity, give finite numbers")
+        raise TrainingError("inputs or outputs contain NaN or infinity, give finite numbers")
     return inputs
 
 

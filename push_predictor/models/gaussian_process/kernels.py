@@ -4,8 +4,8 @@
     k(x, x') = s^2 exp(-r^2 / 2)                            squared exponential
     k(x, x') = s^2 (1 + t + t^2 / 3) exp(-t), t = 5^1/2 r   Matern-5/2 (Rasmussen and Williams 2006, eq. 4.17)
 
-Both hyperparameters are kept as logarithms. A derivative is never formed as a matrix: `gradient` contracts
-a weight matrix with all of them at once.
+Both hyperparameters are stored as logarithms. No derivative is formed as a matrix: `gradient` contracts a weight matrix
+with all of them at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ KernelFamily = Literal["squared_exponential", "matern52"]
 class KernelChoice:
     """The kernels of a regression: the family of both, and whether the noise process has a nugget.
 
-    A nugget is a variance of log noise variances that neighbouring rows do not share; a standard GP has none.
+    A nugget is variance of the log noise that is independent from row to row; a standard GP has none.
     """
 
     family: KernelFamily = "squared_exponential"

@@ -29,7 +29,7 @@ class KernelPosterior:
     def explained_variance(self, cross: Array) -> Array:
         """By how much the observations reduce the prior variance at m inputs, shape (m,).
 
-        cross (m, n) holds the kernel between the new inputs and the training inputs:
+        cross (m, n): kernel between the new inputs and the training inputs. The result is
         diag(cross (K + noise)^-1 cross').
         """
         if len(cross) == 1:

@@ -1,4 +1,4 @@
-"""What a regressor of this package says about one output at m inputs."""
+"""The prediction of one output at m inputs, before noise and function are combined."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class LatentPrediction:
 
     @property
     def process_variance(self) -> Array:
-        """E[exp(g)], the variance that the process itself has, shape (m,)."""
+        """E[exp(g)], the variance of the process itself, shape (m,)."""
         return np.asarray(np.exp(self.log_noise_mean + 0.5 * self.log_noise_variance))
 
     @property
     def outcome_variance(self) -> Array:
-        """Variance of an observed outcome: what the process scatters and what the model is unsure of, (m,)."""
+        """Variance of an observed outcome: of the process plus that of f, (m,)."""
         return self.variance + self.process_variance

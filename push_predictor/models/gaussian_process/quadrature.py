@@ -13,7 +13,7 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.types import Array
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(100)
-# A hundred nodes hold the density to 1e-6 up to a standard deviation of g of 1.5.
+# With a hundred nodes the density is accurate to 1e-6 up to a standard deviation of g of 1.5.
 _LOG_WEIGHTS = np.log(_NODE_WEIGHTS) - 0.5 * np.log(2.0 * np.pi)
 
 

@@ -1,4 +1,4 @@
-"""A kernel matrix K regularised by a positive diagonal D: what both Gaussian processes of a model need.
+"""A kernel matrix K regularised by a positive diagonal D, as both Gaussian processes of a VHGP need it.
 
 With w = 1/D, every quantity here belongs to the posterior of a function with prior covariance K that is seen
 through noise of variance D. Kernel matrices of smooth functions are of low numerical rank when there are many
@@ -34,7 +34,7 @@ class Ridge(Protocol):
         """Diagonal of K - K P K, shape (n,)."""
 
     def residual(self, values: Array) -> Array:
-        """P D values, shape (n,): what a smoother of these values leaves over."""
+        """P D values, shape (n,): the residual of a smoother of these values."""
 
     def precision(self) -> Array:
         """P itself, shape (n, n)."""
@@ -44,7 +44,7 @@ class Ridge(Protocol):
 class RegularisableKernel:
     """K = matrix + nugget times the identity, factorised once, to be regularised by many diagonals.
 
-    The nugget stays apart, for with it no matrix is of low rank.
+    The nugget is kept separate, because with it no matrix has low rank.
     """
 
     matrix: Array
@@ -72,7 +72,7 @@ class RegularisableKernel:
 def factorise(matrix: Array, nugget: float = 0.0, *, smooth: bool = True) -> RegularisableKernel:
     """A kernel matrix (n, n) with its root (r, n), matrix = root' root, where the rank r is low.
 
-    smooth: whether the kernel has derivatives of all orders; the rank of others is not low, nor looked for.
+    smooth: whether the kernel has derivatives of all orders. The rank of others is not low, so it is not searched for.
     """
     n = len(matrix)
     if n < _SMALLEST_FACTORISED or not smooth:
@@ -91,7 +91,7 @@ def cholesky_in_place(matrix: Array) -> Array:
     Raises LinAlgError where the matrix is not positive definite.
     """
     factor, info = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
-    # Whether LAPACK notices a NaN depends on where it stands.
+    # Whether LAPACK notices a NaN depends on its place in the matrix.
     if info != 0 or not np.isfinite(factor[-1, -1]):
         raise LinAlgError(f"matrix of {len(matrix)} rows is not positive definite")
     return np.asarray(factor)
@@ -187,7 +187,7 @@ class _NuggetRidge:
 
 
 def _mirrored(lower: Array) -> Array:
-    """The symmetric matrix of a lower triangle, in its memory and C-ordered; block by block, for the cache's sake."""
+    """The symmetric matrix of a lower triangle, in its memory, C-ordered; filled in blocks to stay in the cache."""
     for start in range(0, len(lower), _BLOCK):
         stop = start + _BLOCK
         diagonal = lower[start:stop, start:stop]

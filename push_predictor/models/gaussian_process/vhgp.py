@@ -32,7 +32,7 @@ class VHGP:
         problem = VhgpProblem.of(inputs, outputs, parameters)
         bound = Bound.tied(problem, site_precisions)
         self.bound, self._noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
-        del bound  # its matrices make room for the factors
+        del bound  # frees its matrices before the factors are computed
         self._signal = KernelPosterior(problem.signal_kernel.matrix, noise_level + parameters.jitter)
         self._noise = KernelPosterior(problem.noise_kernel.matrix, parameters.nugget + 1.0 / site_precisions)
         self._signal_weights = self._signal.weights(outputs)
@@ -41,7 +41,7 @@ class VHGP:
         """Predict f and g at inputs (m, D)."""
         signal, noise = self.parameters.signal, self.parameters.noise
         of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
-        # The jitter is independent of the data, so it is what the variance of f cannot fall below.
+        # The jitter is independent of the data, so the variance of f cannot fall below it.
         variance = signal.variance + self.parameters.jitter - self._signal.explained_variance(of_signal)
         prior = noise.variance + self.parameters.nugget
         log_noise_variance = prior - self._noise.explained_variance(of_noise)
@@ -80,8 +80,8 @@ def fit_vhgp(
 ) -> VHGP:
     """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
 
-    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows and family, else
-    one is made first. Raises TrainingError when the rows do not match or are not finite.
+    inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows and family; None
+    computes it first. Raises TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     near = start or fit_gp(inputs, outputs, choice).parameters

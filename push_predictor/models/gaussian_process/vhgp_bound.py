@@ -20,7 +20,7 @@ from push_predictor.models.gaussian_process.ridge import RegularisableKernel, Ri
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
 
-_SMALLEST_PRECISION = 1e-7  # below it S loses its digits
+_SMALLEST_PRECISION = 1e-7  # below it S loses its precision
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class Sites:
     potentials: Array
 
     def towards(self, other: Sites, step: float) -> Sites:
-        """These for step 0, the other for step 1."""
+        """These sites for step 0, the target's for step 1, interpolated between."""
         precisions = self.precisions + step * (other.precisions - self.precisions)
         return Sites(precisions, self.potentials + step * (other.potentials - self.potentials))
 
 
 @dataclass(frozen=True)
 class SignalFit:
-    """The signal given the noise: what F and its derivatives take from f."""
+    """The signal given the noise: the parts of F and its derivatives that depend on f."""
 
     level: Array  # R
     ridge: Ridge
@@ -69,7 +69,7 @@ class SignalFit:
 
     @classmethod
     def of(cls, problem: VhgpProblem, noise_mean: Array, noise_variances: Array) -> SignalFit:
-        """For the moments of q(g). Raises LinAlgError or FloatingPointError where there are no finite numbers."""
+        """The signal for these moments of q(g). Raises LinAlgError or FloatingPointError where it is not finite."""
         with np.errstate(over="raise", invalid="raise"):
             level = np.exp(noise_mean - 0.5 * noise_variances)
         weights = 1.0 / (level + problem.parameters.jitter)
@@ -87,7 +87,7 @@ class SignalFit:
 
 @dataclass(frozen=True)
 class Bound:
-    """F at one q(g), with what the derivatives share."""
+    """F at one q(g), with the quantities that its derivatives share."""
 
     problem: VhgpProblem
     sites: Sites
@@ -142,7 +142,7 @@ class Bound:
 
     @property
     def tied_precisions(self) -> Array:
-        """Site precisions to which these mean weights are tied: near a maximum those of `sites`, with the same m."""
+        """Site precisions tied to these mean weights, with the same m; near a maximum those of `sites`."""
         return np.maximum(self.mean_weights + 0.5, _SMALLEST_PRECISION)
 
     @property
@@ -156,9 +156,9 @@ class Bound:
         return sites_from(self.optimal_precisions, self.noise_mean)
 
     def hyperparameter_gradient(self, tied: bool = False) -> Array:
-        """dF/d(parameters.to_vector()) at fixed Lambda and b, or with b = Lambda - 1/2 held to it (`tied`).
+        """dF/d(parameters.to_vector()) at fixed Lambda and b, or with b following Lambda - 1/2 (`tied`).
 
-        Both agree at a maximum over (b, Lambda). The untied form leaves out a term that vanishes there and
+        Both agree at a maximum over (b, Lambda). The untied one omits a term that vanishes there and
         costs a product of two (n, n) matrices.
         """
         signal = self._signal_gradient()

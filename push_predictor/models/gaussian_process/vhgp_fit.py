@@ -1,8 +1,8 @@
 """Maximise the VHGP's bound over its hyperparameters, with q(g) solved for at every step.
 
 Variable projection: L-BFGS sees the 2 D + 3 hyperparameters (and the nugget) only. A joint search over them and Lambda
-ends in much worse optima, towards the homoscedastic solution. Many rows are searched coarse to fine, see descent.py;
-nothing of n x n is kept from one evaluation to the next.
+ends in much worse optima, towards the homoscedastic solution. With many rows the search is coarse to fine, see
+descent.py. No n x n matrix is kept from one evaluation to the next.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from push_predictor.models.gaussian_process.vhgp_inner import maximise_over_nois
 from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameters
 from push_predictor.types import Array
 
-# Logarithms, for inputs and outputs of unit spread; they keep line searches where the kernels are sane.
+# Logarithms, for inputs and outputs of unit spread; they keep line searches where the kernels are well conditioned.
 _LENGTHSCALES = (np.log(1e-2), np.log(1e3))
 _SIGNAL_SD = (np.log(1e-3), np.log(1e2))
 _NOISE_SD = (np.log(1e-3), np.log(3.0))
@@ -46,8 +46,8 @@ def maximise_bound(
 ) -> tuple[VhgpParameters, Array]:
     """Hyperparameters where the bound plus the log prior is highest, and the site precisions (n,), tied to them.
 
-    near: the homoscedastic fit of the same rows, where the search starts. Raises TrainingError when the bound
-    is not finite anywhere the search looked.
+    near: the homoscedastic fit of the same rows, where the search starts. Raises TrainingError if the bound is
+    not finite at any point of the search.
     """
     box = _box(inputs.shape[1], choice)
     descent = Descent(box, most_iterations, _STOP)
@@ -96,14 +96,14 @@ class _Prior:
     spread: Array
 
     def penalty(self, vector: Array) -> tuple[float, Array]:
-        """Minus the log density, but for a constant, and its gradient."""
+        """Minus the log density up to a constant, and its gradient."""
         deviation = (vector - self.centre) / self.spread
         return 0.5 * float(deviation @ deviation), deviation / self.spread
 
 
 @dataclass(frozen=True)
 class _Found:
-    """The best that a search has seen: enough to evaluate the bound there again, and nothing large."""
+    """The best point of a search: enough to evaluate the bound there again, without large matrices."""
 
     inputs: Array
     outputs: Array
@@ -112,7 +112,7 @@ class _Found:
     cost: float
 
     def sites_of(self, problem: VhgpProblem) -> Sites:
-        """Sites for other rows, from what these rows say of their noise at the same hyperparameters."""
+        """Sites for other rows, predicted from the noise of these rows at the same hyperparameters."""
         parameters = self.parameters
         bound = Bound.at(VhgpProblem.of(self.inputs, self.outputs, parameters), self.sites)
         cross = parameters.noise.cross(problem.inputs, self.inputs)
@@ -123,7 +123,7 @@ class _Found:
 
 
 class _Search:
-    """The function that L-BFGS sees. best: the lowest it has seen; rough: that of other rows. q(g) starts from them."""
+    """The cost for L-BFGS. best: its lowest point so far; rough: that of other rows. q(g) is solved from these."""
 
     def __init__(self, inputs: Array, outputs: Array, choice: KernelChoice, prior: _Prior) -> None:
         self.inputs, self.outputs, self.choice, self.prior = inputs, outputs, choice, prior

@@ -1,9 +1,9 @@
 """Maximise the bound over q(g) at fixed hyperparameters: natural-gradient (here: Newton) steps, untied.
 
-Each step sets the natural parameters of q(g) to where the gradient says they are stationary. With the mean and
-the precision moved separately this converges by a factor of 10 to 40 a step at first; the seemingly equivalent
-iteration on Lambda alone, with the mean tied to it, diverges. Where a few rows make the last steps slow, the secant
-through the last two (Anderson's acceleration of depth one) shortens them.
+Each step sets the natural parameters of q(g) to the point that the gradient makes stationary. With mean and precision
+updated separately, the first steps converge by a factor of 10 to 40 each. The seemingly equivalent iteration on Lambda
+alone, with the mean tied to it, diverges. Where a few rows make the last steps slow, the secant through the last two
+(Anderson's acceleration of depth one) shortens them.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ def maximise_over_noise(
 ) -> Bound:
     """The bound at its maximum over (mean weights, site precisions), found to `tolerance` nats.
 
-    start: the sites of neighbouring hyperparameters on the same rows, where the search begins. goal: a value that
-    this one is to be compared with; far from it the tolerance is a part of the difference.
+    start: the sites of neighbouring hyperparameters on the same rows, where the search begins. goal: the value that
+    the result will be compared with; far from it the tolerance is a fraction of the difference.
     Raises LinAlgError or FloatingPointError where the bound is not finite even at a fresh start.
     """
     bound = _first(problem, start)
     steps = _Steps()
     for _ in range(most_steps):
         value, sites, target = bound.value, bound.sites, bound.optimal_sites
-        del bound  # its matrices make room for those of the next
+        del bound  # frees its matrices before the next ones are computed
         bound, accepted = _improved(problem, value, sites, steps.next(sites, target), target, tolerance)
         enough = tolerance if goal is None else max(tolerance, _PART * abs(bound.value - goal))
         if not accepted or bound.value - value < enough:
@@ -44,15 +44,16 @@ def _first(problem: VhgpProblem, start: Sites | None) -> Bound:
         try:
             return Bound.at(problem, start)
         except (LinAlgError, FloatingPointError):
-            pass  # a wild line search: the old sites do not suit the new hyperparameters
+            pass  # a far line search: the old sites do not suit the new hyperparameters
     return Bound.tied(problem, np.full(len(problem.outputs), 0.5))
 
 
 def _improved(
     problem: VhgpProblem, value: float, sites: Sites, bold: Sites, target: Sites, tolerance: float
 ) -> tuple[Bound, bool]:
-    """The bound at `bold`, or else after the longest step of 1, 1/2, 1/4 ... to the target that does not lose, and
-    whether there is one; else where it was.
+    """The bound at `bold`, else after the longest step of 1, 1/2, 1/4 ... to the target that does not lower it.
+
+    Also whether there is such a step; if not, the bound is returned unchanged.
     """
     lowest, step = value - 1e-3 * tolerance, 1.0
     candidate = _bound_if_above(lowest, problem, bold)
@@ -71,21 +72,21 @@ def _bound_if_above(lowest: float, problem: VhgpProblem, sites: Sites) -> Bound 
 
 
 class _Steps:
-    """Where to go next, from where the last two steps began and were to end."""
+    """The next point, from the starts and targets of the last two steps."""
 
     def __init__(self) -> None:
         self._last: tuple[Array, Array] | None = None
 
     def next(self, sites: Sites, target: Sites) -> Sites:
-        """The target, or what the secant says of where target and sites meet, when that is a valid q(g)."""
+        """The target, or the secant's estimate of where target and sites meet, if that is a valid q(g)."""
         weights = 1.0 / np.tile(sites.precisions, 2)
         end = np.append(target.precisions, target.potentials)
-        missing = end - np.append(sites.precisions, sites.potentials)
-        last, self._last = self._last, (end, missing)
+        residual = end - np.append(sites.precisions, sites.potentials)
+        last, self._last = self._last, (end, residual)
         if last is None:
             return target
-        change = (missing - last[1]) * weights
+        change = (residual - last[1]) * weights
         norm = float(change @ change)
-        share = float(change @ (missing * weights)) / norm if norm > 0.0 else 0.0
+        share = float(change @ (residual * weights)) / norm if norm > 0.0 else 0.0
         precisions, potentials = np.split(end - share * (end - last[0]), 2)
         return Sites(precisions, potentials) if precisions.min() > 0.1 * target.precisions.min() else target

@@ -22,7 +22,7 @@ JITTER = 1e-6  # of the signal variance, on the diagonal of K_f
 class VhgpParameters:
     """Hyperparameters: ARD kernel of the signal f, ARD kernel of the log noise variance g, prior mean of g.
 
-    log_nugget_sd: log of the standard deviation that g has besides, independent from row to row; None for none.
+    log_nugget_sd: log of the standard deviation of g's nugget, which is independent from row to row; None if absent.
     """
 
     log_lengthscales: Array

@@ -17,11 +17,11 @@ from push_predictor.types import Array
 
 TEXTBOOK_FRICTION = 0.3
 FRICTION_BOUNDS = (0.0, 2.0)  # of the fit; above 2 the motion cone of a usual slider covers all pushes
-LENGTH_BOUNDS = (0.02, 1.0)  # of the fit, as shares of the farthest the support can reach
+LENGTH_BOUNDS = (0.02, 1.0)  # of the fit, as fractions of the farthest distance the support can reach
 WEIGHTING_ROUNDS = 3
-DIFFERENCE_STEP = 1e-3  # relative, above the noise that the integration's tolerance leaves
+DIFFERENCE_STEP = 1e-3  # relative, above the error of the integration
 PARAMETER_TOLERANCE = 1e-5  # relative
-INTEGRATION_NOISE = 1e-4  # relative; residuals below it say nothing
+INTEGRATION_NOISE = 1e-4  # relative; smaller residuals are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class AnalyticalPush:
     outline: Outline
     pusher_radius: float
     contact_friction: float = TEXTBOOK_FRICTION
-    support: Support = field(default=cast(Support, None))  # None only until __post_init__ is through
+    support: Support = field(default=cast(Support, None))  # None only until __post_init__ has run
 
     def __post_init__(self) -> None:
         for name in ("pusher_radius", "contact_friction"):
@@ -64,17 +64,17 @@ class AnalyticalPush:
 
 
 def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcomes: Array) -> AnalyticalPush:
-    """Model with the contact friction and the length c that explain outcomes (n, 3: dx, dy, dtheta) best.
+    """The model with the contact friction and length c that fit outcomes (n, 3: dx, dy, dtheta) best.
 
-    Least squares over the three outputs, each in units of the scale of its residuals, which is taken anew
+    Least squares over the three outputs, each in units of the scale of its residuals, which is estimated again
     from the fit WEIGHTING_ROUNDS times: the Gaussian likelihood's maximum for unknown, constant scales. The
-    centre of friction and the outline stay. Bounds: friction 0 to 2; c from 0.02 to 1 of the distance of the
+    centre of friction and the outline are kept. Bounds: friction 0 to 2; c from 0.02 to 1 of the distance of the
     outline's farthest point from the centre of friction, which no pressure can exceed. Deterministic. Raises
-    TrainingError for rows that do not fit together, fewer than two of them, or values that are not finite.
+    TrainingError for rows of different numbers, fewer than two of them, or values that are not finite.
     """
     _check_rows(inputs, duration, outcomes)
     low, high = _bounds(model)
-    inset = 1e-3 * (high - low)  # least_squares wants to start inside the bounds
+    inset = 1e-3 * (high - low)  # least_squares must start inside the bounds
     estimate = np.clip([model.contact_friction, model.support.length], low + inset, high - inset)
 
     def residuals(parameters: Array) -> Array:

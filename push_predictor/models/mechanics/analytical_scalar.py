@@ -1,7 +1,7 @@
-"""The analytical model for few pushes in plain numbers: for one it is thirty times as fast as an array of one row.
+"""The analytical model in plain numbers: for a single push it is thirty times as fast as arrays of one row.
 
 The same mathematics as in limit_surface and quasi_static, step by step, so that a push gets the same answer alone as
-among others, to rounding; many pushes go the usual way.
+among others, to rounding. Many pushes are computed as arrays.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from push_predictor.types import Array
 Start: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 Pose: TypeAlias = tuple[float, float, float]
 Rates: TypeAlias = tuple[float, float, float, float, bool]  # of x, y, heading per metre; the gap, m; is it closing?
-Rate: TypeAlias = Callable[[float, float, float, float], Rates]  # at a pose (x, y, heading) and a way done
+Rate: TypeAlias = Callable[[float, float, float, float], Rates]  # at a pose (x, y, heading) and a distance travelled
 
 
 FEW = 16  # as fast as an array of them
 
 
 @dataclass(frozen=True, eq=False)
-class SinglePush(AnalyticalPush):
-    """AnalyticalPush with a shortcut for few pushes. Made by `single_push`; dataclasses.replace keeps what is prepared.
+class ScalarAnalyticalPush(AnalyticalPush):
+    """AnalyticalPush that computes few pushes in plain numbers. Made by `scalar_analytical`; `replace` keeps caches.
 
     nearest: the outline's nearest point. start: a contact's point and inward normal.
     """
@@ -44,7 +44,7 @@ class SinglePush(AnalyticalPush):
             return super().displacement(inputs, duration)
         pushes = list(zip(*inputs.T.tolist(), duration.tolist(), strict=True))
         if not all(0.0 <= v < inf and isfinite(c) and isfinite(a) and 0.0 <= d < inf for v, c, a, d in pushes):
-            return super().displacement(inputs, duration)  # it says what is wrong
+            return super().displacement(inputs, duration)  # raises the error
         return np.array([self._displaced(*push) for push in pushes])
 
     def _displaced(self, velocity: float, contact: float, angle: float, duration: float) -> Pose:
@@ -57,17 +57,17 @@ class SinglePush(AnalyticalPush):
         return ahead_x * moved_x + ahead_y * moved_y, ahead_x * moved_y - ahead_y * moved_x, turned
 
 
-def single_push(physics: AnalyticalPush) -> SinglePush:
+def scalar_analytical(physics: AnalyticalPush) -> ScalarAnalyticalPush:
     """The same model, prepared for single pushes."""
     outline = physics.outline
 
-    @lru_cache(maxsize=FEW)  # a response asks several times about one push
+    @lru_cache(maxsize=FEW)  # a response evaluates one push several times
     def start(contact: float) -> tuple[float, float, float, float]:
         at = np.array([contact])
         (x, y), (nx, ny) = outline.point(at)[0].tolist(), outline.inward_normal(at)[0].tolist()
         return x, y, nx, ny
 
-    return SinglePush(
+    return ScalarAnalyticalPush(
         outline,
         physics.pusher_radius,
         physics.contact_friction,
@@ -78,7 +78,7 @@ def single_push(physics: AnalyticalPush) -> SinglePush:
 
 
 def _rate(physics: AnalyticalPush, nearest: Nearest, tip: tuple[float, float], ahead: tuple[float, float]) -> Rate:
-    """How the slider's pose changes per metre of the tip's way; see quasi_static._rate and limit_surface.body_twist."""
+    """Change of the slider's pose per metre of the tip's path; see quasi_static._rate and limit_surface.body_twist."""
     (tip_x, tip_y), (ahead_x, ahead_y), radius = tip, ahead, physics.pusher_radius
     (centre_x, centre_y), length = physics.support.centre, physics.support.length
     friction = physics.contact_friction

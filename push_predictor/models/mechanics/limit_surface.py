@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Support:
-    """How the surface bears a slider.
+    """The pressure distribution under a slider, as far as its quasi-static motion depends on it.
 
     centre: centre of friction (x, y) in the body frame, m. length: c = mmax / fmax, m.
     Raises RigError if a value is not finite or the length is not positive.
@@ -40,7 +40,7 @@ class Support:
 
 
 def uniform_support(outline: Outline) -> Support:
-    """The support of a slider that presses evenly on the surface: centre at the area centroid, c = mean |r|.
+    """The support of a slider with uniform pressure: centre at the area centroid, c = mean |r|.
 
     Exact: in closed form over the triangles that a polygon's edges make with the centroid, and through the
     complete elliptic integral for a circle or an ellipse, whose mean |r| is 2 / 3 of the mean of |r| over the
@@ -97,7 +97,7 @@ def contact_force(
 
     pp, pq, qq (n,): elements of the contact's mobility A in the basis of normal and left, 1 + p^2, p q, 1 + q^2 for the
     moment arms p, q; along, across (n,): the pusher's velocity in that basis. Where an edge's image has no component
-    along the normal, slipping that way would let the slider run from the pusher: the motion cone covers that side.
+    along the normal, slip in that direction would separate slider and pusher: the motion cone covers that side.
     """
     left_n, left_t = pp + friction * pq, pq + friction * qq
     right_n, right_t = pp - friction * pq, pq - friction * qq

@@ -53,9 +53,9 @@ class Sweep:
 def slide(contact: DiscContact, sweep: Sweep) -> Array:
     """Pose (n, 3: x, y in m, heading in rad) of the body after the sweep, from the pose (0, 0, 0).
 
-    Each step is compared with two of half its length, which stand where they agree; else that row's step is
-    halved. So halving all steps changes a displacement by less than 1e-3 of itself. Smooth contacts take the
-    longest step; a start or an end of slip, a corner and a loss of contact are closed in on.
+    Each step is compared with two of half its length, which are accepted where they agree; otherwise that row's
+    step is halved. So halving all steps changes a displacement by less than 1e-3 of itself. Smooth contacts take the
+    longest step; a start or an end of slip, a corner and a loss of contact are located by halving.
     """
     pose, done = np.zeros((len(sweep.travel), 3)), np.zeros(len(sweep.travel))
     length = np.minimum(sweep.travel, LONGEST_STEP)
@@ -93,7 +93,7 @@ def advance(contact: DiscContact, sweep: Sweep, pose: Array, done: Array, step: 
 
 
 def _free_travel(contact: DiscContact, sweep: Sweep, pose: Array, done: Array) -> Array:
-    """Travel (n,) in m within which a disc that comes nearer cannot touch; infinite for one in contact or leaving."""
+    """Travel (n,) in m within which an approaching disc cannot touch; infinite for one in contact or receding."""
     nearest = contact.outline.project(to_body(sweep.centre(done), pose))
     gap = nearest.distance - contact.pusher_radius
     nearing = np.einsum("nj,nj->n", rotate(sweep.direction, -pose[:, 2]), nearest.normal) < 0.0

@@ -1,7 +1,7 @@
-"""What textbook mechanics knows that can change the outcome of a push: one mechanism a module, in one library.
+"""Mechanisms from textbook mechanics that can change the outcome of a push: one per module, in one library.
 
-A mechanism tells how an outcome changes with its physical parameter, from the outline and the limit surface. To add
-one: write a module with a Mechanism in it and name it in LIBRARY (docs/how_to/new_mechanism.md).
+A mechanism computes how an outcome changes with its physical parameter, from the outline and the limit surface. To add
+one, write a module with a Mechanism in it and name it in LIBRARY (docs/how_to/new_mechanism.md).
 """
 
 from __future__ import annotations

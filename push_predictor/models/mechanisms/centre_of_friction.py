@@ -1,4 +1,4 @@
-"""The centre of friction away from where the base model has it: an uneven load, a part that has shifted."""
+"""The centre of friction away from where the base model assumes it: an uneven load, a part that has shifted."""
 
 from __future__ import annotations
 

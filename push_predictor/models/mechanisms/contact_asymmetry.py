@@ -1,4 +1,4 @@
-"""A pusher or a side that rubs more one way than the other: machining marks, a tip that leans or is turned."""
+"""A contact with more friction in one direction than in the other: machining marks, a tip that leans or is turned."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction between pusher and slider, other than the base model has it (Coulomb; Mason 1986)."""
+"""Friction between pusher and slider that differs from the base model's (Coulomb; Mason 1986)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
 
-STEP = 0.1  # wide enough to feel pushes that are about to slip
+STEP = 0.1  # large enough to include pushes that are about to slip
 
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
-    """Outcome per unit of the coefficient, (n, 3, 1): zero where the contact sticks anyway."""
+    """Outcome per unit of the coefficient, (n, 3, 1): zero where the contact sticks."""
     low = max(physics.contact_friction - STEP, 0.0)
     high = physics.contact_friction + STEP
     more, less = (replace(physics, contact_friction=mu).displacement(push.inputs, push.duration) for mu in (high, low))

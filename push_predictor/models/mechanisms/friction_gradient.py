@@ -1,8 +1,8 @@
-"""A table that rubs more on one side of the slider than on the other: the centre of friction goes to the rougher side.
+"""A table with more friction on one side of the slider than on the other: it shifts the centre of friction there.
 
-With friction that rises by the share s per metre along a direction, the centre of friction moves along it by s times
-the mean square of the pressure's distance from the centre in that direction. For an even disc that is 9 / 16 of c^2;
-a square has it within 1 percent.
+With friction that rises by the fraction s per metre along a direction, the centre of friction moves along it by s times
+the mean square of the pressure's distance from the centre in that direction. For a disc of uniform pressure that is
+9 / 16 of c^2; for a square it is the same within 1 %.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Mass: at speed the slider resists a change of its motion, which the quasi-static model leaves out.
+"""Mass: at speed the slider resists a change of its motion, which the quasi-static model neglects.
 
 D'Alembert: a mass that accelerates by a bears the load -m a, in units of the sliding friction -a / (mu g); it grows
-with the square of the speed. The mass is taken to lie as the pressure does. What happens in the first instants after
-the touch, when the slider starts from rest, is not in it.
+with the square of the speed. The mass is assumed to be distributed as the pressure is. The first instants after the
+touch, when the slider starts from rest, are not included.
 """
 
 from __future__ import annotations

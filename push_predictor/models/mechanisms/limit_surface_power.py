@@ -1,7 +1,7 @@
-"""A limit surface that is no ellipsoid: |f / fmax|^p + |m / mmax|^p = 1 with p other than 2.
+"""A limit surface that is not an ellipsoid: |f / fmax|^p + |m / mmax|^p = 1 with p other than 2.
 
 The ellipsoid is an approximation (Howe and Cutkosky 1996); the true surface depends on the pressure distribution. A
-power above 2 is fuller: under a mixed load the slider goes more the way of the larger part of the load.
+power above 2 is fuller: under a mixed load the slider moves more in the direction of the larger part of the load.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from push_predictor.models.mechanisms.perturbed import Change, State, no_change,
 from push_predictor.types import Array
 
 STEP = 0.1
-SMALLEST_LOAD = 1e-3  # of a part of the load; below it the part moves nothing anyway
+SMALLEST_LOAD = 1e-3  # of a part of the load; a smaller part causes no motion
 
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
     """Outcome per unit of the power, (n, 3, 1)."""
 
     def change(state: State, amount: float) -> Change:
-        """Along the normal w / v = (m / f)^(p - 1) / c: as an ellipsoid has it whose c is smaller or larger."""
+        """Along the normal w / v = (m / f)^(p - 1) / c, like an ellipsoid with a smaller or larger c."""
         force = np.maximum(np.hypot(state.load[:, 0], state.load[:, 1]), SMALLEST_LOAD)
         moment = np.maximum(np.abs(state.load[:, 2]), SMALLEST_LOAD)
         return replace(no_change(len(force)), spread=0.5 * amount * np.log(force / moment))

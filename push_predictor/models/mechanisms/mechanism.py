@@ -1,4 +1,4 @@
-"""What a mechanism is: physical parameters and the response of an outcome to each of them."""
+"""Definition of a mechanism: physical parameters and the response of an outcome to each of them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical quantity with its unit; the base model has it at zero.
+    """A physical quantity with its unit; it is zero in the base model.
 
-    largest: absolute value beyond which no rig would have it. A fit that needs more mimics something else.
+    largest: largest absolute value that a rig can have. A fit that needs more mimics something else.
     """
 
     name: str
@@ -34,11 +34,11 @@ class Push:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A mechanism that the base model lacks, or has at another value.
+    """A mechanism that the base model lacks, or has with another value.
 
     response(physics, push) -> (n, 3, p): derivative of the outcome (dx, dy in m, dtheta in rad, push frame) with
-    respect to each of the p parameters, at the physics given. needs: covariates that the response itself takes, beside
-    those that drive it.
+    respect to each of the p parameters, at the physics given. needs: covariates that the response itself depends on, in
+    addition to those of its basis.
     """
 
     name: str
@@ -47,5 +47,5 @@ class Mechanism:
     needs: tuple[str, ...] = ()
 
     def plausible(self, values: Array) -> bool:
-        """Whether values (n, p) of the parameters are such as a rig could have."""
+        """Whether a rig could have these values (n, p) of the parameters."""
         return bool(np.all(np.abs(values) <= [parameter.largest for parameter in self.parameters]))

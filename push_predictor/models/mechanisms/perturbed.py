@@ -1,9 +1,9 @@
-"""A push whose mechanics differ a little from the base model's, with the difference free to change along the way.
+"""A push whose mechanics differ a little from the base model's, where the difference may change along the path.
 
 The ellipsoidal limit surface (f / fmax)^2 + (m / mmax)^2 = 1 becomes f' W f / fmax^2 + ... with a symmetric W near the
 identity, and a pull g (in units of fmax and mmax) is added to the load: v = k (W (f + g)), w = k (m + g_m) / c^2.
-What the difference is may depend on how the slider lies and how it is loaded. All of it holds to first order, which is
-what a response needs.
+The difference may depend on the slider's pose and load. Everything is correct to first order, which is enough for a
+response.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ LONGEST_STEP = 0.005  # m of a whole push
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """How n sliders stand, by the base model.
+    """The state of n sliders, by the base model.
 
     turn (n,): rad since the start. load (n, 3): force along the body's x and y and moment, in units of fmax and mmax,
-    on the limit surface; zero where nothing pushes. slip (n,): 1 where the pusher slips to the left of the inward
+    on the limit surface; zero without contact. slip (n,): 1 where the pusher slips to the left of the inward
     normal, -1 to the right, 0 where it sticks. bend (n, 3): change of the slider's velocity (in the frame of the first
-    pose, per velocity of the tip) per metre of the tip's way.
+    pose, per velocity of the tip) per metre of the tip's path.
     """
 
     turn: Array
@@ -43,7 +43,7 @@ class State:
 class Change:
     """What differs from the base model at a state, for n sliders, in the body frame.
 
-    stretch (n, 2): W = [[1 + a, b], [b, 1 - a]]. pull (n, 3): a load beside the pusher's, in units of fmax and mmax.
+    stretch (n, 2): W = [[1 + a, b], [b, 1 - a]]. pull (n, 3): a further load, in units of fmax and mmax.
     spread (n,): logarithm of the factor on c. centre (n, 2): shift of the centre of friction, m. friction (n,): added
     to the contact friction.
     """
@@ -75,10 +75,10 @@ def displaced(physics: AnalyticalPush, push: Push, change: ChangeOf, amount: flo
     normal = physics.outline.inward_normal(contact)
     ahead = rotate(normal, angle)
     start = physics.outline.point(contact) - physics.pusher_radius * normal
-    way = velocity * push.duration
-    steps = max(FEWEST_STEPS, int(np.ceil(np.max(way, initial=0.0) / LONGEST_STEP)))
-    step = way / steps
-    pose = np.zeros((len(way), 3))
+    path_length = velocity * push.duration
+    steps = max(FEWEST_STEPS, int(np.ceil(np.max(path_length, initial=0.0) / LONGEST_STEP)))
+    step = path_length / steps
+    pose = np.zeros((len(path_length), 3))
     for k in range(steps):
         begin, middle = (start + ((k + share) * step)[:, None] * ahead for share in (0.0, 0.5))
         half = 0.5 * step[:, None]
@@ -108,9 +108,9 @@ def _rates(
     amount: float,
     before: tuple[Array, Array] | None = None,
 ) -> tuple[Array, Array]:
-    """Change of the pose (n, 3) per metre of the tip's way, by the base model and with the change.
+    """Change of the pose (n, 3) per metre of the tip's path, by the base model and with the change.
 
-    before: the base model's rate at an earlier place, and the way (n, 1) since: they tell the bend.
+    before: the base model's rate at an earlier place, and the path length (n, 1) since: they give the bend.
     """
     turn = pose[:, 2]
     nearest = physics.outline.project(to_body(tip, pose))

@@ -1,4 +1,4 @@
-"""How far from the centre the slider presses: the limit surface's length c = mmax / fmax (Goyal et al. 1991)."""
+"""How far from the centre the pressure acts: the limit surface's length c = mmax / fmax (Goyal et al. 1991)."""
 
 from __future__ import annotations
 

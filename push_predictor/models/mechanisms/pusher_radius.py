@@ -1,4 +1,4 @@
-"""A tip thicker or thinner than the rig says: worn, bent, with a sleeve. It rolls on the side by its radius."""
+"""A tip thicker or thinner than the rig file states: worn, bent, with a sleeve. It rolls on the side by its radius."""
 
 from __future__ import annotations
 

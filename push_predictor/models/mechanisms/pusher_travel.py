@@ -1,4 +1,4 @@
-"""A pusher that does not go as far as it set out to: it yields to the load, or slows down within the window."""
+"""A pusher that travels less than commanded: it yields to the load, or slows down within the window."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms.mechanism import Mechanism, Parameter, Push
 from push_predictor.types import Array
 
-STEP = 0.02  # of the way
+STEP = 0.02  # of the path length
 
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
-    """Outcome per unit of the relative change of the pusher's way, (n, 3, 1)."""
+    """Outcome per unit of the relative change of the pusher's path length, (n, 3, 1)."""
     more, less = (physics.displacement(push.inputs, share * push.duration) for share in (1.0 + STEP, 1.0 - STEP))
     return ((more - less) / (2.0 * STEP))[:, :, None]
 
 
-PUSHER_TRAVEL = Mechanism("pusher_travel", (Parameter("relative change of the pusher's way", "1", 0.5),), response)
+PUSHER_TRAVEL = Mechanism(
+    "pusher_travel", (Parameter("relative change of the pusher's path length", "1", 0.5),), response
+)

@@ -1,4 +1,4 @@
-"""A push above the table presses the slider's front down: the centre of friction runs ahead of the force.
+"""A push above the table presses the slider's front down: the centre of friction moves forward.
 
 Balance of moments about the table: a force f at height h shifts the normal load by h f / (m g), which is h times the
 surface friction where the force is the full sliding friction (Mason 1986, Lynch and Mason 1996 assume h = 0).

@@ -16,7 +16,7 @@ STEP = 0.02
 
 
 def response(physics: AnalyticalPush, push: Push) -> Array:
-    """Outcome per unit of the pull along the world's x and y, as shares of the sliding friction, (n, 3, 2)."""
+    """Outcome per unit of the pull along the world's x and y, as fractions of the sliding friction, (n, 3, 2)."""
     heading = push.covariates["slider_heading"]
     n = len(heading)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.analytical_scalar import single_push
+from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.without_effects import WithoutEffects
@@ -60,4 +60,4 @@ class AnalyticalPredictor(WithoutEffects):
 
     def with_scalar_mechanics(self) -> AnalyticalPredictor:
         """See Predictor."""
-        return replace(self, physics=single_push(self.physics))
+        return replace(self, physics=scalar_analytical(self.physics))

@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.analytical_scalar import single_push
+from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
 from push_predictor.recordings.table import INPUTS
@@ -106,4 +106,4 @@ class ExtendedPredictor:
 
     def with_scalar_mechanics(self) -> Predictor:
         """See Predictor."""
-        return replace(self, physics=single_push(self.physics), base=self.base.with_scalar_mechanics())
+        return replace(self, physics=scalar_analytical(self.physics), base=self.base.with_scalar_mechanics())

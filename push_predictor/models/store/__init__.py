@@ -1,4 +1,4 @@
-"""Model files: how models are saved, loaded and held by name.
+"""Model files: how models are saved, loaded and found by name.
 
 Import `model_file` and `model_registry`; the `*_record` modules define the parts of a file.
 """

@@ -14,7 +14,7 @@ _RESIDUALS, _ROWS = "correlation_residuals", "correlation_rows"
 
 
 def correlation_record(correlation: Correlation, arrays: dict[str, np.ndarray]) -> dict[str, float]:
-    """The record; residuals, and which rows they are of, are put among the arrays; features follow from the rows."""
+    """The record; the residuals and their row numbers are put among the arrays; features follow from the rows."""
     arrays[_RESIDUALS] = correlation.residuals.astype(np.float32)
     if correlation.rows is not None:
         arrays[_ROWS] = correlation.rows.astype(np.int32)

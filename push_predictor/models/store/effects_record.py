@@ -1,4 +1,4 @@
-"""Effects as a model file keeps them: JSON records, their covariances beside them as arrays; read with suspicion."""
+"""How effects are written into a model file: JSON records, with their covariances as arrays; every value is checked."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def effects_of(records: list[Any], arrays: Mapping[str, np.ndarray]) -> tuple[Ef
 
 
 def cross_record(cross: Cross, arrays: dict[str, np.ndarray]) -> list[list[int]]:
-    """Which effects share what; the covariances go into `arrays`."""
+    """Pairs of effects with a cross-covariance; the covariances go into `arrays`."""
     for (i, j), shared in cross.items():
         arrays[f"effect_covariance_{i}_{j}"] = shared
     return [list(pair) for pair in cross]
 
 
 def cross_of(pairs: list[Any], effects: tuple[Effect, ...], arrays: Mapping[str, np.ndarray]) -> Cross:
-    """What effects share. Raises ValueError for what is no covariance together with the effects' own."""
+    """The cross-covariances of effects. Raises ValueError if, with the effects' own, they do not form a covariance."""
     ends = np.cumsum([0, *(len(effect.coefficients) for effect in effects)]).tolist()
     parts = [slice(low, high) for low, high in pairwise(ends)]
     whole, cross = np.zeros((ends[-1], ends[-1])), {}
@@ -64,7 +64,7 @@ def cross_of(pairs: list[Any], effects: tuple[Effect, ...], arrays: Mapping[str,
 
 def _check_covariance(covariance: Array, name: str) -> None:
     if not np.all(np.isfinite(covariance)):
-        raise ValueError(f"{name}: a number is not finite")
+        raise ValueError(f"{name}: a value is not finite")
     sd = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
     if np.linalg.eigvalsh(covariance / np.outer(sd, sd))[0] < -1e-6:  # coefficients have units of their own
         raise ValueError(f"{name} is not positive semidefinite")

@@ -48,7 +48,7 @@ def save_model(model: PushModel, path: Path) -> None:
 
 
 def load_model(path: str | os.PathLike[str]) -> PushModel:
-    """Read a model file. Raises ModelFileError if it is absent, damaged, foreign or of a newer version."""
+    """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of a newer version."""
     path = Path(path)
     arrays = read_arrays(path)
     header = _read_header(path, arrays)
@@ -64,7 +64,7 @@ def load_model(path: str | os.PathLike[str]) -> PushModel:
 
 
 def is_model_file(path: Path) -> bool:
-    """Whether a file looks like one of ours, whatever its version or state."""
+    """Whether a file looks like a model file, whatever its version or state."""
     try:
         with path.open("rb") as stream:
             start = stream.read(40)

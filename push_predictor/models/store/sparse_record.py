@@ -1,4 +1,4 @@
-"""How a sparse VHGP is written into a model file: a site precision a row, and which rows are inducing inputs.
+"""How a sparse VHGP is written into a model file: one site precision per row, and the rows that are inducing inputs.
 
 The posterior follows from them, the training rows and the hyperparameters; that takes a second for 100 000 rows.
 """
@@ -35,7 +35,7 @@ def sparse_regression(
     output: int,
     arrays: Mapping[str, np.ndarray],
 ) -> SparseVHGP:
-    """The regression again. Raises ValueError or KeyError where the inducing inputs are no rows."""
+    """The regression. Raises ValueError or KeyError if the inducing inputs are not rows."""
     signal, noise = (_rows(arrays[f"{name}_{output}"], len(outputs), name) for name in _CHOSEN)
     return SparseVHGP(inputs, outputs, parameters, site_precisions, signal, noise)
 
@@ -43,5 +43,5 @@ def sparse_regression(
 def _rows(found: np.ndarray, n: int, name: str) -> IntArray:
     rows = np.asarray(found, dtype=np.int64)
     if rows.ndim != 1 or not 0 < len(np.unique(rows)) == len(rows) <= n or rows.min() < 0 or rows.max() >= n:
-        raise ValueError(f"{name} does not hold different rows out of {n}")
+        raise ValueError(f"{name} does not contain distinct rows out of {n}")
     return rows

@@ -1,4 +1,4 @@
-"""The posteriors of a regression at all points of a grid, for a fraction of what single points cost.
+"""The posteriors of a regression at all points of a grid, at a fraction of the cost of single points.
 
 A squared exponential kernel is a product over the axes of a grid, so no exponential is taken per point. A kernel
 matrix has a low numerical rank r: K = G G' from a pivoted Cholesky factorisation with pivots Z and triangle T = G_Z.
@@ -23,7 +23,7 @@ from push_predictor.models.gaussian_process.vhgp import VHGP
 from push_predictor.models.gaussian_process.vhgp_bound import Bound, VhgpProblem
 from push_predictor.types import Array, IntArray
 
-_DROPPED = 1e-4  # of the smallest noise variance: a prior variance that the noise hides
+_DROPPED = 1e-4  # of the smallest noise variance: a prior variance that is negligible next to the noise
 _ROUNDING = 1e-13
 _EPSILON = float(np.finfo(np.float64).eps)
 
@@ -86,7 +86,7 @@ class GridRegression:
 
 
 def grid_regression(regression: GaussianProcess | VHGP) -> GridRegression:
-    """A regression as its posteriors, to be read on grids."""
+    """The posteriors of a regression, to be evaluated on grids."""
     return _of_vhgp(regression) if isinstance(regression, VHGP) else _of_gp(regression)
 
 

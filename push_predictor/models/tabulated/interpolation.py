@@ -1,8 +1,8 @@
-"""Smooth functions on a box: read at few points, kept as cubic splines that answer fast.
+"""Smooth functions on a box: evaluated at few points, stored as cubic splines that are fast to evaluate.
 
-An analytic function needs fewest readings at Chebyshev nodes, where interpolation converges exponentially. A cubic
-spline answers from 4 coefficients an axis, however many there are, but wants them dense: at a spacing h it errs by
-h^4 / 384 of the fourth derivative. So readings at nodes become values at knots, and those the coefficients of a
+An analytic function needs the fewest evaluations at Chebyshev nodes, where interpolation converges exponentially. A
+cubic spline needs only 4 coefficients per axis for a value, but its knots must be dense: at a spacing h its error is
+h^4 / 384 of the fourth derivative. So values at nodes are converted to values at knots, and those to coefficients of a
 spline, axis by axis, by one matrix each.
 """
 
@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 
 from push_predictor.types import Array, IntArray
 
-_NOT_A_KNOT = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # no jump of the third derivative at the knot beside an end
+_NOT_A_KNOT = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # no jump of the third derivative at the knot next to an end
 _ROWS_AT_ONCE = 1024  # of 4^D coefficients each: they stay in the cache
 _Numbers = TypeVar("_Numbers", float, Array)
 
@@ -107,7 +107,7 @@ def along(axis: int, matrix: Array, values: Array) -> Array:
 
 
 def _knots_to_coefficients(cells: int) -> Array:
-    """Matrix (cells + 3, cells + 1): the spline takes the values, and has no knot beside an end."""
+    """Matrix (cells + 3, cells + 1): the spline takes the values, and has no knot next to an end."""
     equations = np.zeros((cells + 3, cells + 3))
     rows = np.arange(cells + 1)
     for k, weight in enumerate(_weights(0.0)[:3]):

@@ -1,8 +1,8 @@
-"""Correlation matrices of three outputs as three numbers without bounds, which a table may hold.
+"""Correlation matrices of three outputs as three unbounded numbers, which a table can interpolate.
 
-They are atanh of r12, of r13 and of the partial correlation r23.1. Whatever these are, the matrix that they stand for
-is positive definite, and an error e in one of them changes the variance of no combination of outputs by more than about
-2 e, however close to +-1 the correlation is.
+They are atanh of r12, of r13 and of the partial correlation r23.1. Any three numbers give a positive definite matrix.
+An error e in one of them changes the variance of any combination of outputs by at most about 2 e (relative), however
+close to +-1 the correlation is.
 """
 
 from __future__ import annotations

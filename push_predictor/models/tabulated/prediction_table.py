@@ -1,9 +1,9 @@
-"""Predictions of a learnt model tabulated over a box: an answer costs the same however many rows it learnt from.
+"""Predictions of a learnt model tabulated over a box: their cost does not depend on the number of training rows.
 
 Per output: the mean and the variance of f, and the log process variance, which is what is smooth: the variance of f has
-narrow dips at the training pushes, of quadratic shape. Each posterior is read at Chebyshev nodes as dense as its own
-lengthscales ask for. The correlation of the outputs, where they have one, is read at the knots themselves, as the three
-numbers of partial_correlation. All share the knots of one spline.
+narrow dips at the training pushes, of quadratic shape. Each posterior is evaluated at Chebyshev nodes as dense as its
+lengthscales need. A correlation of the outputs is evaluated at the knots themselves, as the three numbers of
+partial_correlation. All share the knots of one spline.
 """
 
 from __future__ import annotations
@@ -36,15 +36,17 @@ FEWEST_CELLS = 16
 
 @dataclass(frozen=True)
 class Density:
-    """Nodes and cells a lengthscale."""
+    """Nodes and cells per lengthscale."""
 
     nodes: float
     cells: float
 
 
-SIGNAL = Density(nodes=4.0, cells=12.0)  # the signal is wanted to a small part of the noise, the noise to one of itself
+SIGNAL = Density(
+    nodes=4.0, cells=12.0
+)  # f must be accurate to a small fraction of the noise, the noise to one of itself
 NOISE = Density(nodes=2.5, cells=6.0)
-COUPLING_CELLS = 3.0  # a bandwidth of the correlation
+COUPLING_CELLS = 3.0  # per bandwidth of the correlation
 
 
 class TooFineError(PushPredictorError):
@@ -53,8 +55,10 @@ class TooFineError(PushPredictorError):
 
 @dataclass(frozen=True, eq=False)
 class PredictionTable:
-    """columns: which of velocity, place and angle the splines run over; least: of the variances of f; knots: how
-    many in all.
+    """A table of predictions.
+
+    columns: which of velocity, place and angle the splines depend on; least: lower bounds of the variances of f; knots:
+    their total number.
     """
 
     spline: TensorSpline
@@ -90,8 +94,8 @@ def tabulate(
 ) -> PredictionTable:
     """The table over the box of velocity, place and angle from low (3,) to high (3,).
 
-    refinement: how many times as many nodes and knots along each axis as usual. Raises TooFineError, also for kernels
-    that are no products over the axes.
+    refinement: factor on the usual number of nodes and knots along each axis. Raises TooFineError, also for kernels
+    that are not products over the axes.
     """
     regressions = [
         sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
@@ -104,9 +108,11 @@ def tabulate(
     axes = [Axis(side.low, side.high, _cells(side, resolved, refinement)) for side in sides]
     knots = chart.boxes * int(np.prod([axis.cells + 1.0 for axis in axes]))
     if knots > MOST_KNOTS:
-        raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are taken")
+        raise TooFineError(f"{knots} knots would be needed, at most {MOST_KNOTS} are allowed")
     values = _values(_Grid(sides, axes, refinement), predictor, regressions)
-    values = np.repeat(values, chart.boxes // len(values), axis=0)  # where the place does not vary, all edges are one
+    values = np.repeat(
+        values, chart.boxes // len(values), axis=0
+    )  # where the place does not vary, all edges share one box
     least = predictor.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
     columns = _as_slice([side.column for side in sides])
     return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
@@ -132,7 +138,7 @@ def _as_slice(columns: Sequence[int]) -> slice:
 
 
 def _resolved(regressions: Sequence[GridRegression], correlation: Correlation | None) -> list[tuple[ArdKernel, float]]:
-    """What the knots must resolve: kernels, and how many cells a lengthscale of each asks for."""
+    """The kernels that the knots must resolve, each with the number of cells per lengthscale."""
     wanted = [(r.signal.kernel, SIGNAL.cells) for r in regressions]
     wanted += [(r.noise.kernel, NOISE.cells) for r in regressions if r.noise]
     return wanted + ([(correlation.kernel, COUPLING_CELLS)] if correlation else [])
@@ -154,7 +160,7 @@ class _Grid:
     def outputs(self, regression: GridRegression) -> list[Array]:
         """Mean and variance of f, and log process variance, at the knots, (boxes, cells_1 + 1, ...) each.
 
-        Where the place is none of the sides, there is one box.
+        If the place is not one of the sides, there is one box.
         """
         mean, variance = self._moments(regression.signal, SIGNAL)
         if regression.noise is None:
@@ -166,7 +172,7 @@ class _Grid:
         wanted = [density.nodes * side.lengthscales(posterior.kernel) for side in self.sides]
         counts = [int(self.refinement * (FEWEST_NODES + count)) for count in wanted]
         if (total := float(np.prod(counts, dtype=np.float64))) > MOST_NODES:
-            raise TooFineError(f"{total:.0f} nodes would be needed, at most {MOST_NODES} are taken")
+            raise TooFineError(f"{total:.0f} nodes would be needed, at most {MOST_NODES} are allowed")
         nodes = [axis.nodes(count) for axis, count in zip(self.axes, counts, strict=True)]
         mean, variance = posterior.moments(self._factors(posterior.kernel, posterior.inputs, nodes))
         return self._at_knots(mean, counts), self._at_knots(variance, counts)

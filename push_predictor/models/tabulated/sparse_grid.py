@@ -16,7 +16,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True, eq=False)
 class InducedGridPosterior(GridPosterior):
-    """Its inputs are the inducing inputs; root (m, r) as of InducedPosterior, so nothing is left to factorise."""
+    """A GridPosterior of inducing inputs; root (m, r) as in InducedPosterior, so that no factorisation is needed."""
 
     root: Array
 

@@ -19,7 +19,7 @@ from push_predictor.types import Array, BoolArray
 
 @dataclass(frozen=True, eq=False)
 class TabulatedDomain:
-    """The box of features, from low (F,) to high (F,), that PushModel.in_domain means, margin included."""
+    """The box of features, from low (F,) to high (F,), of PushModel.in_domain, margin included."""
 
     chart: Chart
     low: Array
@@ -55,7 +55,7 @@ class TabulatedDomain:
 
 
 def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refinement: float = 1.0) -> TabulatedDomain:
-    """The domain of a model with this body; refinement: of the table. Raises TooFineError."""
+    """The domain of a model with this predictor; refinement: of the table. Raises TooFineError."""
     inputs, chart = model.training.inputs, push_chart(model.rig.outline)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
     low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])

@@ -1,11 +1,11 @@
-"""A push model as it is served: inside the domain of its training data it answers from a table, in microseconds.
+"""A push model that predicts from a table, in microseconds, inside the domain of its training data.
 
-A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but is a smooth function of at most three. It
-is tabulated once, the table is compared with the model, and it is used only if it is true to it. Every other push and
-every other model is answered by the model itself.
+A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but it is a smooth function of at most three
+inputs. So it is tabulated once. The table is compared with the model and used only if it is accurate. Every other push
+and every other model is predicted by the model itself.
 
-The analytical model and the effects that follow from it have no table: where contacts begin to slip they bend, and a
-table would have to be very fine there. One push alone is computed in plain numbers instead.
+The analytical model and the effects that follow from it have no table: they have kinks where contacts begin to
+slip, and a table would have to be very fine there. A single push is computed in plain numbers instead.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
 
 @dataclass(frozen=True)
 class TableAccuracy:
-    """The largest differences found between table and model: of a mean, in predicted standard deviations, and of the
-    variance that outcome or process covariance give any combination of outputs, relative: the largest eigenvalue of
-    L^-1 T L^-T - I, of either sign, where T is the table's and L L' the model's.
+    """The largest differences found between table and model.
+
+    mean: in predicted standard deviations. covariance: relative error of the variance of any combination of outputs,
+    which is the largest absolute eigenvalue of L^-1 T L^-T - I, where T is the table's covariance and L L' the model's.
     """
 
     mean: float
@@ -43,7 +44,7 @@ class TableAccuracy:
 
     @property
     def accepted(self) -> bool:
-        """Whether a table with these errors may answer: at half the tolerances, for not every push was compared."""
+        """Whether a table with these errors may be used: at half the tolerances, since not every push was compared."""
         return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.covariance <= COVARIANCE_TOLERANCE
 
     def __str__(self) -> str:
@@ -52,9 +53,9 @@ class TableAccuracy:
 
 @dataclass(frozen=True, eq=False)
 class TabulatedModel:
-    """A model and, in words, how it is answered for. domain and error are None where there is no table.
+    """A model with its table, and in words how it predicts. domain and error are None if there is no table.
 
-    A push gets the same answer alone as among others, to rounding. Made by `serve`.
+    A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
     """
 
     model: PushModel
@@ -64,7 +65,7 @@ class TabulatedModel:
 
     @property
     def tabulated(self) -> bool:
-        """Whether pushes in the domain are answered from a table."""
+        """Whether pushes in the domain are predicted from a table."""
         return self.domain is not None
 
     def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
@@ -73,8 +74,8 @@ class TabulatedModel:
         Of an extended model the base is tabulated; the effects are computed and added.
         """
         if self.domain is None:
-            return self._quick.predict_rows(inputs, duration, covariates)
-        prediction, predictor = self._of_base(self.domain, inputs, duration), self._quick.predictor
+            return self._exact.predict_rows(inputs, duration, covariates)
+        prediction, predictor = self._of_base(self.domain, inputs, duration), self._exact.predictor
         if not predictor.effects:
             return prediction
         push = Push(inputs, duration, covariates or {})
@@ -90,12 +91,12 @@ class TabulatedModel:
         return prediction or self.predict_rows(*push.arrays)
 
     def exact_count(self, inputs: Array) -> int:
-        """How many of the pushes (n, 3) are answered by the model itself, not from a table."""
+        """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
         return len(inputs) if self.domain is None else int(np.sum(~self.model.base.in_domain(inputs)))
 
     @cached_property
-    def _quick(self) -> PushModel:
-        """The same model; one push alone takes its analytical mechanics and effects in plain numbers."""
+    def _exact(self) -> PushModel:
+        """The same model, which computes the mechanics and effects of single pushes in plain numbers."""
         return replace(self.model, predictor=self.model.predictor.with_scalar_mechanics())
 
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
@@ -112,7 +113,7 @@ class TabulatedModel:
 
 
 def tabulate(model: PushModel) -> TabulatedModel:
-    """A model with a table, where there can be one; takes about a second for a VHGP of 1000 rows."""
+    """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
     base = model.base
     if not isinstance(base.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, "exact: only learnt models have a table")
@@ -142,7 +143,7 @@ def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:
 
 
 def relative_error(found: Array, exact: Array) -> Array:
-    """By how much covariances (n, 3, 3) err at most in the variance of any combination of outputs, relative, (n,)."""
+    """Largest relative error (n,) of covariances (n, 3, 3) in the variance of any combination of outputs."""
     whitener = np.linalg.inv(np.linalg.cholesky(exact))
     eigenvalues = np.linalg.eigvalsh(whitener @ found @ whitener.transpose(0, 2, 1))
     return np.asarray(np.abs(eigenvalues - 1.0).max(axis=1))

@@ -5,9 +5,9 @@ With u = f(Z), v = g(Z') - mu0, q(f, g) = p(f | u) q(u) p(g | v) q(v) and q(u) t
     F = log N(y | 0, Q_f + D) - 1/2 sum_i c_f,i / D_i - 1/4 sum_i s_i - KL(q(v) || p(v)),   D = R + jitter
     R_i = exp(m_i - s_i / 2),   m, s: mean and variance of g at the rows,   c_f = diag(K_f - Q_f)
 
-F sees q(v) through m and s alone, so at a maximum v too is the prior times one Gaussian site a row, with the sites of
-vhgp_bound.py: S^-1 = Q_g^-1 + Lambda, m = mu0 + Q_g b, b = Lambda - 1/2. With every row an inducing input it is the
-bound there.
+F depends on q(v) through m and s alone, so at a maximum q(v) is also the prior times one Gaussian site per row, as in
+vhgp_bound.py: S^-1 = Q_g^-1 + Lambda, m = mu0 + Q_g b, b = Lambda - 1/2. If every row is an inducing
+input, this is the bound there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SMALLEST_PRECISION = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SparseProblem:
-    """Training rows (n, D) and (n,), hyperparameters, and both kernels as the inducing inputs know them."""
+    """Training rows (n, D) and (n,), hyperparameters, and both kernels projected on the inducing inputs."""
 
     outputs: Array
     parameters: VhgpParameters
@@ -38,7 +38,7 @@ class SparseProblem:
     def of(
         cls, inputs: Array, outputs: Array, parameters: VhgpParameters, of_signal: Array, of_noise: Array
     ) -> SparseProblem:
-        """For inducing inputs (m, D) of f and of g. Raises LinAlgError where they cannot be told apart."""
+        """The problem for inducing inputs (m, D) of f and of g. Raises LinAlgError if they are too close together."""
         signal = InducedKernel.of(parameters.signal, inputs, of_signal)
         noise = InducedKernel.of(parameters.noise, inputs, of_noise)
         return cls(outputs, parameters, signal, noise)
@@ -55,7 +55,7 @@ class SparseSignal:
 
     @classmethod
     def of(cls, problem: SparseProblem, noise_mean: Array, noise_variances: Array) -> SparseSignal:
-        """For the moments of q(g) at the rows. Raises LinAlgError or FloatingPointError without finite numbers."""
+        """The signal for moments of q(g) at the rows. Raises LinAlgError or FloatingPointError if it is not finite."""
         with np.errstate(over="raise", invalid="raise"):
             level = np.exp(noise_mean - 0.5 * noise_variances)
             jittered = level + problem.parameters.jitter
@@ -64,14 +64,14 @@ class SparseSignal:
         ridge = problem.signal.regularise(weights)
         alpha = ridge.residual(weights * problem.outputs)
         fit = problem.outputs @ alpha + ridge.log_determinant + constant
-        return cls(level, ridge, alpha, -0.5 * float(fit + weights @ problem.signal.missing))
+        return cls(level, ridge, alpha, -0.5 * float(fit + weights @ problem.signal.unexplained))
 
     @cached_property
     def slopes(self) -> Array:
         """Derivative of the value by D, shape (n,)."""
         weights, ridge = self.ridge.weights, self.ridge
-        unsure = ridge.posterior_diagonal + ridge.induced.missing
-        return np.asarray(0.5 * (self.alpha**2 - weights + unsure * weights**2))
+        uncertainty = ridge.posterior_diagonal + ridge.induced.unexplained
+        return np.asarray(0.5 * (self.alpha**2 - weights + uncertainty * weights**2))
 
     @property
     def optimal_precisions(self) -> Array:
@@ -81,7 +81,7 @@ class SparseSignal:
 
 @dataclass(frozen=True, eq=False)
 class SparseBound:
-    """F at one q(g), with what the derivatives share."""
+    """F at one q(g), with the quantities that its derivatives share."""
 
     problem: SparseProblem
     sites: Sites
@@ -96,12 +96,12 @@ class SparseBound:
         """Evaluate F. Raises LinAlgError or FloatingPointError where it is not a finite number."""
         prior_mean = problem.parameters.noise_mean
         ridge = problem.noise.regularise(sites.precisions)
-        told = ridge.posterior_diagonal
+        explained = ridge.posterior_diagonal
         mean_weights = ridge.residual(sites.potentials - sites.precisions * prior_mean)
         deviation = problem.noise.times(mean_weights)
-        variances = told + problem.noise.missing
+        variances = explained + problem.noise.unexplained
         signal = SparseSignal.of(problem, prior_mean + deviation, variances)
-        divergence = deviation @ mean_weights - sites.precisions @ told + ridge.log_determinant
+        divergence = deviation @ mean_weights - sites.precisions @ explained + ridge.log_determinant
         value = signal.value - 0.25 * float(variances.sum()) - 0.5 * float(divergence)
         if not np.isfinite(value):
             raise FloatingPointError("the variational bound is not finite")
@@ -116,12 +116,12 @@ class SparseBound:
 
     @property
     def optimal_sites(self) -> Sites:
-        """Where a step of natural gradient of length 1 ends."""
+        """The sites at which a natural-gradient step of length 1 ends."""
         return sites_from(self.signal.optimal_precisions, self.noise_mean)
 
     @property
     def tied_precisions(self) -> Array:
-        """Site precisions to which these mean weights are tied, with the same m; see vhgp_bound.py."""
+        """Site precisions tied to these mean weights, with the same m; see vhgp_bound.py."""
         return np.maximum(self.mean_weights + 0.5, _SMALLEST_PRECISION)
 
     def hyperparameter_gradient(self) -> Array:

@@ -1,7 +1,7 @@
-"""Hyperparameters of a sparse VHGP, coarse to fine: a dense VHGP of few rows, then the sparse bound of more, of all.
+"""Fit of a sparse VHGP, coarse to fine: a dense VHGP of few rows, then the sparse bound of more rows, then of all.
 
-At each stage the inducing inputs are chosen for the hyperparameters that the stage before found, and stay; L-BFGS sees
-the hyperparameters, and q(g) is solved for at every step, as in vhgp_fit.py.
+Each stage chooses the inducing inputs by the hyperparameters of the stage before and keeps them. L-BFGS searches the
+hyperparameters, and q(g) is solved for at every step, as in vhgp_fit.py.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _SHORTEST_STEP = 1.0 / 64.0
 _REFUSED = 1e10
 _REACH = np.log(30.0)  # by this factor a hyperparameter may change in a stage
 # Gaussian priors of the logarithms of g's lengthscales and standard deviation: those of vhgp_fit.py, as strong for any
-# number of rows as they are for a hundred. Windows of one push are no independent draws: the bound of many takes
-# what differs from push to push for a noise that varies over short lengths, and is too sure between the pushes.
+# number of rows as they are for a hundred. Windows of one push are not independent: with many of them the bound
+# takes differences between pushes for noise that varies over short lengths, and is overconfident between the pushes.
 _LENGTHSCALE, _LENGTHSCALE_SPREAD = -0.7, 0.5
 _SD, _SD_SPREAD = -0.4, 0.3
 _PRIOR_WEIGHT = 0.01  # a row
@@ -59,8 +59,8 @@ def fit_sparse_vhgp(inputs: Array, outputs: Array, most_inducing: int = DEFAULT_
 def maximise_over_noise(problem: SparseProblem, starts: Sequence[Sites], tolerance: float) -> SparseBound:
     """The bound at its maximum over q(g), found to `tolerance` nats, by steps of natural gradient (vhgp_inner.py).
 
-    It begins at the best of the starts, afresh if there is none. Raises LinAlgError or FloatingPointError where the
-    bound is not finite even there.
+    It begins at the best of the starts, or at fresh sites if there is none. Raises LinAlgError or FloatingPointError if
+    the bound is not finite even there.
     """
     bounds = [bound for sites in starts if (bound := _bound_at(problem, sites))]
     bound = max(bounds, key=lambda found: found.value) if bounds else SparseBound.at(problem, fresh_sites(problem))
@@ -75,13 +75,13 @@ def maximise_over_noise(problem: SparseProblem, starts: Sequence[Sites], toleran
 
 
 def fresh_sites(problem: SparseProblem) -> Sites:
-    """Sites of which each tells half, and that leave g's mean where it is a priori."""
+    """Sites of precision 1/2 that leave the mean of g at its prior."""
     half = np.full(len(problem.outputs), 0.5)
     return Sites(half, half * problem.parameters.noise_mean)
 
 
 def _improved(problem: SparseProblem, bound: SparseBound, tolerance: float) -> SparseBound | None:
-    """After the longest step of 1, 1/2, 1/4 ... that does not lose."""
+    """The bound after the longest step of 1, 1/2, 1/4 ... that does not lower it."""
     step, target = 1.0, bound.optimal_sites
     while step >= _SHORTEST_STEP:
         candidate = _bound_at(problem, bound.sites.towards(target, step))
@@ -99,7 +99,7 @@ def _bound_at(problem: SparseProblem, sites: Sites) -> SparseBound | None:
 
 
 def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_inducing: int) -> SparseVHGP:
-    """The model of these rows, from a model of some of them."""
+    """The model of these rows, starting from a model of some of them."""
     parameters = rough.parameters
     chosen = tuple(inducing_rows(kernel, inputs, most_inducing) for kernel in (parameters.signal, parameters.noise))
     search = _Search(inputs, outputs, chosen, rough)
@@ -114,7 +114,7 @@ def _refined(rough: VHGP | SparseVHGP, inputs: Array, outputs: Array, most_induc
         bound = maximise_over_noise(search.problem(best.parameters), [best.sites], _FINAL_TOLERANCE * len(outputs))
         return SparseVHGP(inputs, outputs, best.parameters, bound.tied_precisions, *chosen)
     except (LinAlgError, FloatingPointError) as error:
-        raise TrainingError(f"no sparse VHGP of {len(outputs)} rows is found: {error}") from None
+        raise TrainingError(f"no sparse VHGP of {len(outputs)} rows was found: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ class _Found:
 
 
 class _Search:
-    """The function that L-BFGS sees: minus bound and log prior, in nats. best: the lowest that it has seen."""
+    """The cost for L-BFGS: minus bound and log prior, in nats. best: its lowest point so far."""
 
     def __init__(self, inputs: Array, outputs: Array, chosen: Sequence[IntArray], rough: VHGP | SparseVHGP) -> None:
         self.inputs, self.outputs, self.rough = inputs, outputs, rough
@@ -157,7 +157,7 @@ class _Search:
 
 
 def noise_penalty(vector: Array, n: int) -> tuple[float, Array]:
-    """Minus the log prior of the hyperparameters (2 D + 3,) of n rows, but for a constant, and its gradient."""
+    """Minus the log prior of the hyperparameters (2 D + 3,) of n rows up to a constant, and its gradient."""
     d = (len(vector) - 3) // 2
     centre, spread = np.full(d + 1, _LENGTHSCALE), np.full(d + 1, _LENGTHSCALE_SPREAD)
     centre[-1], spread[-1] = _SD, _SD_SPREAD

@@ -1,8 +1,8 @@
-"""Choosing inducing inputs among the rows: each time the one of which the rows chosen before tell least.
+"""Greedy selection of inducing inputs: repeatedly add the row with the largest conditional variance given those chosen.
 
-That is a pivoted Cholesky factorisation of the kernel matrix ("greedy conditional variance" of Burt, Rasmussen and van
-der Wilk 2020, "Convergence of sparse variational inference in Gaussian processes regression"); it depends on the
-kernel's hyperparameters and on no random number but the choice of candidates.
+This is a pivoted Cholesky factorisation of the kernel matrix ("greedy conditional variance" of Burt, Rasmussen and van
+der Wilk 2020, "Convergence of sparse variational inference in Gaussian processes regression"). It depends on the
+kernel's hyperparameters; the only random choice is that of the candidates.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from push_predictor.models.gaussian_process.kernels import ArdKernel
 from push_predictor.types import Array, IntArray
 
 _CANDIDATES = 10_000
-_TOLD = 1e-6  # of the prior variance: where the others tell so much, one more inducing input would tell nothing
+_TOLD = 1e-6  # of the prior variance; with a smaller conditional variance one more inducing input adds nothing
 
 
 def inducing_rows(kernel: ArdKernel, inputs: Array, most: int, weights: Array | None = None) -> IntArray:
-    """At most `most` rows of inputs (n, D), in their order; fewer where they tell of all others.
+    """At most `most` rows of inputs (n, D), in their order; fewer if these determine all others.
 
-    weights (n,): what an unknown of each row counts, 1 if not given.
+    weights (n,): of each row's conditional variance, 1 if not given.
     """
     candidates = np.sort(np.random.default_rng(0).permutation(len(inputs))[:_CANDIDATES])
     found = inputs[candidates]

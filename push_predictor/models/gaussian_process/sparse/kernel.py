@@ -1,9 +1,9 @@
-"""A kernel between n rows as m inducing inputs Z know it: Q = K_XZ (K_ZZ + jitter)^-1 K_ZX, never formed.
+"""A kernel between n rows projected on m inducing inputs Z: Q = K_XZ (K_ZZ + jitter)^-1 K_ZX, never formed.
 
-    Q = V V',  V = K_XZ L^-T (n, m),  L L' = K_ZZ + jitter;      what Z does not tell of a row: k(x, x) - Q_xx >= 0
+    Q = V V',  V = K_XZ L^-T (n, m),  L L' = K_ZZ + jitter;      unexplained by Z: k(x, x) - Q_xx >= 0
 
-Everything costs O(n m^2) and goes over the rows in blocks: besides V nothing larger than (n,) or (m, m) is kept.
-The jitter only makes Z tell a little less, so a bound that is computed with Q is one still.
+Everything costs O(n m^2) and goes over the rows in blocks: apart from V nothing larger than (n,) or (m, m) is kept.
+The jitter only makes Z explain a little less, so a bound computed with Q is still a bound.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ _JITTER = 1e-9  # of the kernel's variance
 
 @dataclass(frozen=True, eq=False)
 class InducedKernel:
-    """Inputs (n, D); inducing Z (m, D); factor L (m, m); features V (n, m); missing (n,), what Z does not tell."""
+    """Inputs (n, D); inducing Z (m, D); factor L (m, m); features V (n, m); unexplained (n,) by Z."""
 
     kernel: SquaredExponential
     inputs: Array
     inducing: Array
     factor: Array
     features: Array
-    missing: Array
+    unexplained: Array
 
     @classmethod
     def of(cls, kernel: ArdKernel, inputs: Array, inducing: Array) -> InducedKernel:
-        """Raises LinAlgError where the inducing inputs are not told apart, TrainingError for another kernel."""
+        """The kernel of these inputs. Raises LinAlgError if inducing inputs coincide, TrainingError for a Matern."""
         if not isinstance(kernel, SquaredExponential):
             raise TrainingError(f"{type(kernel).__name__}: a sparse VHGP has squared exponential kernels only")
         factor = _inducing_factor(kernel, inducing)
         features = np.empty((len(inputs), len(inducing)))
-        missing = np.empty(len(inputs))
+        unexplained = np.empty(len(inputs))
         for rows in _blocks(len(inputs)):
             features[rows] = _whitened(factor, kernel.cross(inputs[rows], inducing))
-            missing[rows] = kernel.variance - _squared_norms(features[rows])
-        return cls(kernel, inputs, inducing, factor, features, np.maximum(missing, 0.0))
+            unexplained[rows] = kernel.variance - _squared_norms(features[rows])
+        return cls(kernel, inputs, inducing, factor, features, np.maximum(unexplained, 0.0))
 
     def regularise(self, weights: Array) -> InducedRidge:
         """The ridge of Q for noise variances 1 / weights, weights (n,) > 0. Raises LinAlgError."""
@@ -85,11 +85,11 @@ class InducedRidge:
         return diagonal
 
     def mean(self, values: Array) -> Array:
-        """Posterior mean (m,) of the whitened inducing variables, which are N(0, I) a priori and seen as V' values."""
+        """Posterior mean (m,) of the whitened inducing variables, whose prior is N(0, I), given values (n,)."""
         return np.asarray(cho_solve((self.factor, True), self.induced.features.T @ values))
 
     def residual(self, values: Array) -> Array:
-        """P D values, shape (n,): what a smoother of these values leaves over."""
+        """P D values, shape (n,): the residual of a smoother of these values."""
         return np.asarray(values - self.weights * (self.induced.features @ self.mean(values)))
 
     @cached_property
@@ -106,23 +106,23 @@ class InducedRidge:
         induced, kernel = self.induced, self.induced.kernel
         vectors = np.column_stack([added] if removed is None else [added, removed])
         signed = vectors * [1.0, -1.0][: vectors.shape[1]]
-        told = blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
+        whitened = blas.dtrsm(1.0, induced.factor, induced.features.T @ vectors, lower=1, trans_a=1)
         of_features = blas.dtrsm(1.0, induced.factor, self.explained, side=1, lower=1)
         gradient = np.zeros(induced.inputs.shape[1] + 1)
         for rows in _blocks(len(self.weights)):
             cross = kernel.cross(induced.inputs[rows], induced.inducing)
-            cross *= (self.weights[rows, None] * induced.features[rows]) @ of_features + signed[rows] @ told.T
+            cross *= (self.weights[rows, None] * induced.features[rows]) @ of_features + signed[rows] @ whitened.T
             gradient += _contracted(kernel, induced.inputs[rows], induced.inducing, cross)
-        gradient -= self._of_inducing(told, told * [1.0, -1.0][: told.shape[1]])
+        gradient -= self._of_inducing(whitened, whitened * [1.0, -1.0][: whitened.shape[1]])
         gradient[-1] -= kernel.variance * float(self.weights.sum())
         return gradient
 
-    def _of_inducing(self, told: Array, signed: Array) -> Array:
-        """The part of the gradient that goes through K_ZZ, but for its sign."""
+    def _of_inducing(self, whitened: Array, signed: Array) -> Array:
+        """The part of the gradient that goes through K_ZZ, with opposite sign."""
         induced, kernel = self.induced, self.induced.kernel
         known = self.inner - np.eye(len(self.inner)) - self.explained
         weights = blas.dtrsm(1.0, induced.factor, known, side=1, lower=1)
-        weights = blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ told.T
+        weights = blas.dtrsm(1.0, induced.factor, weights, lower=1, trans_a=1) + signed @ whitened.T
         weights = 0.25 * (weights + weights.T)
         gradient = kernel.gradient(induced.inducing, kernel.matrix(induced.inducing), weights)
         gradient[-1] += 2.0 * _JITTER * kernel.variance * float(np.trace(weights))

@@ -1,7 +1,7 @@
-"""A VHGP of many rows: what they say of f and g is kept as what f and g are at some inducing inputs.
+"""A VHGP of many rows, represented by the posterior of f and g at inducing inputs.
 
-Predictions cost what the inducing inputs do, however many rows there are. Its bound: sparse_bound.py; hyperparameters
-and inducing inputs: sparse_fit.py.
+The cost of a prediction depends on the number of inducing inputs, not of rows. bound.py has its bound, fit.py the
+search for hyperparameters and inducing inputs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 @dataclass(frozen=True, eq=False)
 class InducedPosterior:
-    """A function's posterior by inducing inputs Z (m, D): mean k(x, Z) weights, explained variance |k(x, Z) root|^2.
+    """A function's posterior from inducing inputs Z (m, D): mean k(x, Z) weights, explained variance |k(x, Z) root|^2.
 
     weights (m,); root (m, r).
     """
@@ -38,13 +38,13 @@ class InducedPosterior:
 
     @classmethod
     def of(cls, ridge: InducedRidge, values: Array) -> InducedPosterior:
-        """For values (n,) over the noise variances of the ridge."""
+        """The posterior for values (n,) divided by the noise variances of the ridge."""
         induced = ridge.induced
         share, vectors = np.linalg.eigh(ridge.explained)
         kept = share > _NOTHING
-        told = np.column_stack([ridge.mean(values), vectors[:, kept] * np.sqrt(share[kept])])
-        told = blas.dtrsm(1.0, induced.factor, told, lower=1, trans_a=1)
-        return cls(induced.kernel, induced.inducing, told[:, 0].copy(), np.ascontiguousarray(told[:, 1:]))
+        columns = np.column_stack([ridge.mean(values), vectors[:, kept] * np.sqrt(share[kept])])
+        columns = blas.dtrsm(1.0, induced.factor, columns, lower=1, trans_a=1)
+        return cls(induced.kernel, induced.inducing, columns[:, 0].copy(), np.ascontiguousarray(columns[:, 1:]))
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Mean and explained variance at inputs (q, D), (q,) each."""
@@ -54,9 +54,9 @@ class InducedPosterior:
 
 
 class SparseVHGP:
-    """Conditioned on inputs (n, D) and outputs (n,), both standardised by the caller.
+    """A sparse VHGP conditioned on inputs (n, D) and outputs (n,), both standardised by the caller.
 
-    site_precisions (n,) is Lambda of sparse_bound; inducing_signal and inducing_noise: which of the rows are inducing
+    site_precisions (n,) is Lambda of bound.py; inducing_signal and inducing_noise: which of the rows are inducing
     inputs of f and of g.
     """
 
@@ -81,7 +81,7 @@ class SparseVHGP:
         self.noise = InducedPosterior.of(bound.noise_ridge, sites)
 
     def solved(self) -> SparseBound:
-        """The bound with all that it takes, (n, m) numbers, which is not kept."""
+        """The bound with its (n, m) matrices, computed again on every call."""
         of_signal, of_noise = self.inputs[self.inducing_signal], self.inputs[self.inducing_noise]
         problem = SparseProblem.of(self.inputs, self.outputs, self.parameters, of_signal, of_noise)
         return SparseBound.tied(problem, self.site_precisions)
@@ -91,10 +91,10 @@ class SparseVHGP:
         parameters = self.parameters
         of_signal, of_noise = parameters.signal.variance, parameters.noise.variance
         mean, explained = self.signal.predict(inputs)
-        log_noise, told = self.noise.predict(inputs)
-        # As of a VHGP, the jitter is independent of the data.
+        log_noise, noise_explained = self.noise.predict(inputs)
+        # As in a VHGP, the jitter is independent of the data.
         variance = np.maximum(of_signal + parameters.jitter - explained, parameters.jitter)
-        log_noise_variance = np.maximum(of_noise - told, _EPSILON * of_noise)
+        log_noise_variance = np.maximum(of_noise - noise_explained, _EPSILON * of_noise)
         return LatentPrediction(mean, variance, parameters.noise_mean + log_noise, log_noise_variance)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
@@ -106,8 +106,8 @@ class SparseVHGP:
         errors, variance = sparse_held_out_errors(bound.signal.ridge, bound.signal.alpha, block)
         of_noise, noise_variance = sparse_held_out_errors(bound.noise_ridge, bound.mean_weights, block)
         site_variance = 1.0 / bound.sites.precisions
-        variance += bound.problem.signal.missing - bound.signal.level
-        noise_variance += bound.problem.noise.missing - site_variance
+        variance += bound.problem.signal.unexplained - bound.signal.level
+        noise_variance += bound.problem.noise.unexplained - site_variance
         return LatentPrediction(
             self.outputs - errors,
             np.maximum(variance, parameters.jitter),
