@@ -81,6 +81,7 @@ class PushValidator(Node):
             return  # close() ends what works here, from another thread
         if self._closing.is_set():
             self._session.shut_down(monotonic())
+        self._finish.work()  # before the samples: those that came before a call belong to its run
         self._sensors.look()
         self._sensors.drain()
         self._models.work()
@@ -102,7 +103,7 @@ class PushValidator(Node):
             other_rig = self._rigs.differs_from(self._run.rig)
             if not other_rig:
                 self._feed(self._run)
-            if self._session.drain_if_due(monotonic(), self._finish.requested(), other_rig):
+            if self._session.drain_if_due(monotonic(), self._finish.requested, other_rig):
                 self._run.finish({} if other_rig else self._sensors.last_scalars())
         self._client.work()
         if self._session.state is State.DRAINING and self._run is not None:
@@ -114,7 +115,7 @@ class PushValidator(Node):
         if models is None or rig is None or not len(self._sensors):
             return
         # A recording gives the finder every stream from its beginning, so a run begins with all of them.
-        if complete or self._closing.is_set() or self._finish.requested():
+        if complete or self._closing.is_set() or self._finish.requested:
             output, scalars = self._writer.folder, self._sensors.scalar_names
             self._run = ValidationRun(rig, models, self._client, self._results.publish, self._alarm, output, scalars)
             self._session.open(monotonic())

@@ -24,16 +24,23 @@ class FinishService:
         self._callers: list[Any] = []
         self._session, self._models, self._rigs, self._writer = session, models, rigs, writer
 
+    @property
     def requested(self) -> bool:
         """Whether a caller waits for the answer."""
+        return bool(self._callers)
+
+    def work(self) -> None:
+        """Take the calls since the last time.
+
+        Once a turn: a call that arrived between the end of a run and `answer` would be answered without a result.
+        """
         with self._service.handle:
             while (taken := self._service.handle.service_take_request(Trigger.Request))[1] is not None:
                 self._callers.append(taken[1])
-        return bool(self._callers)
 
     def answer(self) -> None:
         """Answer all callers if nothing is left to be done."""
-        if self._session.state is State.DRAINING or self._writer.report.busy or not self.requested():
+        if self._session.state is State.DRAINING or self._writer.report.busy or not self.requested:
             return
         response = self._response()
         while self._callers:
@@ -53,5 +60,5 @@ class FinishService:
 
 
 def _not_called(request: Any, response: Any) -> Any:
-    """The callback that a service must have: `requested` takes the requests instead."""
+    """The callback that a service must have: `work` takes the requests instead."""
     return response
