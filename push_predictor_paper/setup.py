@@ -8,6 +8,7 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Reproduces the results of Bauza and Rodriguez (ICRA 2017) with push_predictor",
+    author="push_predictor founders",
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
