@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from time import monotonic
 
 from push_predictor.recordings.streams import PoseStream, ScalarStream, WrenchStream
-from push_predictor.recordings.windows.finder import LONGEST_LAG
+from push_predictor.recordings.windows.clock_session import LONGEST_LAG
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP
 from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, describe_clock_offset
 

@@ -257,7 +257,7 @@ def test_memory_stays_bounded_over_a_long_stream() -> None:
         finder.add_pusher(replace(recording.pusher, stamp=recording.pusher.stamp + k * span))
         finder.add_slider(replace(recording.slider, stamp=recording.slider.stamp + k * span))
         finder.take_ready()
-    assert max(len(track) for track in finder._tracks.values()) < 2 * len(recording.slider)
+    assert max(len(track) for track in finder._session.tracks.values()) < 2 * len(recording.slider)
 
 
 def test_stamps_keep_their_nanoseconds() -> None:

@@ -17,19 +17,11 @@ import numpy as np
 
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
-from push_predictor.recordings.windows.contact import REACH, contact_samples
-from push_predictor.recordings.windows.cut import Interval, SensorTracks, cut_window
-from push_predictor.recordings.windows.push_segmenter import PushSegmenter
+from push_predictor.recordings.windows.clock_session import LONGEST_LAG, ClockSession
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 from push_predictor.recordings.windows.scalar_track import LONGEST_GAP, ScalarTracks
-from push_predictor.recordings.windows.track import NANOSECOND, Track
 from push_predictor.types import Array, IntArray
 
-LONGEST_LAG = 30.0  # s; the other streams proceed without a stream that lags more
-HISTORY = 1.0  # s of samples kept before the last evaluated one
-# ns; times are counted from a multiple of this, not from the first sample, so that they do not round differently with
-# the order of arrival.
-ORIGIN_STEP = 1_000_000_000_000
 SENSORS = ("slider", "pusher", "wrench")
 STREAM_FAULTS = ("repeated", "late", "ahead", "not_finite", "jumps", "dropouts", "refused", "resets", "clock_set_back")
 WINDOW_FAULTS = ("not_a_push", "inside", "left_behind", "outran")
@@ -48,17 +40,17 @@ class WindowFinder:
 
     def __init__(self, rig: Rig, options: WindowOptions | None = None) -> None:
         self.rig, self.options = rig, options or WindowOptions()
-        self._counts: Counter[str] = Counter()  # without those of the present tracks and segmenter
+        self._counts: Counter[str] = Counter()  # without those of the present session
+        self._session = ClockSession(rig, self.options)
+        self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
+        self._scalars = ScalarTracks()
         self._waiting: list[PushWindow] = []  # windows that wait for their scalars
         self._ready: list[PushWindow] = []
-        self._scalars = ScalarTracks()
-        self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
-        self._begin_session()
 
     @property
     def counts(self) -> dict[str, int]:
         """Number of faults by kind so far."""
-        found = self._counts + self._session_counts()
+        found = self._counts + self._session.counts
         found["refused"] += self._scalars.discarded
         return {kind: found[kind] for kind in (*STREAM_FAULTS, *WINDOW_FAULTS)} | {
             k: n for k, n in sorted(found.items()) if " " in k
@@ -96,7 +88,7 @@ class WindowFinder:
 
     def take_ready(self) -> list[PushWindow]:
         """The windows that have become complete since the last call."""
-        while self._set and self._all_clocks_are_set():
+        while self._session.clocks_set and self._all_clocks_are_set():
             self._end_session()
             self._add_postponed()
         self._advance(final=False)
@@ -118,58 +110,6 @@ class WindowFinder:
 
     # --- arriving samples ---------------------------------------------------------------------------------------
 
-    def _begin_session(self) -> None:
-        """Start with empty tracks, at first and whenever the clock was set."""
-        self._tracks = {
-            "slider": Track(4, position=True, angle=3),
-            "pusher": Track(3, position=True),
-            "wrench": Track(2),
-        }
-        self._set: set[str] = set()  # streams whose clock was set
-        self._segmenter = PushSegmenter(self.options)
-        self._origin: int | None = None
-        self._first: int | None = None
-        self._slid = 0.0
-        self._counted_until = -np.inf  # s
-        self._evaluated = np.iinfo(np.int64).min  # stamp (ns) of the last evaluated slider sample
-
-    def _end_session(self) -> None:
-        """Finish the windows of the time before the clock was set, or of the whole stream."""
-        for name in SENSORS:
-            self._extend(name, np.empty(0, dtype=np.int64), self._tracks[name].values[:0], final=True)
-        self._advance(final=True)
-        self._release(final=True)
-        self._counts += self._session_counts()
-        self._begin_session()
-
-    def _all_clocks_are_set(self) -> bool:
-        """Whether the clock of every stream was set, or that of one longer than LONGEST_LAG ago."""
-        if all(track.empty or name in self._set for name, track in self._tracks.items()):
-            return True
-        spans = [np.concatenate([stamp for n, stamp, _ in self._postponed if n == name]) for name in self._set]
-        return any(int(span[-1]) - int(span[0]) > LONGEST_LAG * 1e9 for span in spans)
-
-    def _add_postponed(self) -> None:
-        """Add the samples that waited for the new time."""
-        postponed, self._postponed = self._postponed, []
-        for name, stamp, values in postponed:
-            self._add(name, stamp, values)
-
-    def _session_counts(self) -> Counter[str]:
-        """The counts of the present tracks and segmenter."""
-        found = Counter(self._segmenter.counts)
-        for name, track in self._tracks.items():
-            # A slider that continues elsewhere was repositioned: a reset, which the segmenter counts.
-            of_stream = track.counts if name != "slider" else track.order.counts
-            found.update({f"{name} {kind}": count for kind, count in of_stream.items()})
-            found.update(of_stream)
-            found["refused"] += track.order.counts.total()
-        return found
-
-    def _taken(self) -> list[PushWindow]:
-        ready, self._ready = self._ready, []
-        return ready
-
     def _add_finite(self, name: str, stamp: IntArray, values: Array) -> None:
         finite = np.isfinite(values).all(axis=1)
         if bad := int(np.sum(~finite)):
@@ -179,91 +119,49 @@ class WindowFinder:
     def _add(self, name: str, stamp: IntArray, values: Array) -> None:
         if not len(stamp):
             return
-        if name in self._set:
+        if name in self._session.clocks_set:
             self._postponed.append((name, stamp, values))
-            return
-        self._extend(name, stamp, values)
+        else:
+            self._extend(name, stamp, values)
 
     def _extend(self, name: str, stamp: IntArray, values: Array, final: bool = False) -> None:
-        if name in self._set:
-            return
-        track = self._tracks[name]
-        ordered = track.order.take(stamp, values, final)
-        if self._origin is None and len(ordered.stamp):
-            self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
-        track.extend(ordered, self._origin or 0)
-        if ordered.clock_set:
-            self._counts["clock_set_back"] += not self._set
-            self._set.add(name)
-            self._postponed.append((name, *track.order.waiting))
+        another_was_set = bool(self._session.clocks_set)
+        if self._session.extend(name, stamp, values, final):
+            self._counts["clock_set_back"] += not another_was_set
+            self._postponed.append((name, *self._session.tracks[name].order.waiting))
 
-    # --- evaluating what all streams have passed ------------------------------------------------------------------
+    def _all_clocks_are_set(self) -> bool:
+        """Whether the clock of every stream was set, or that of one longer than LONGEST_LAG ago."""
+        clocks_set = self._session.clocks_set
+        if all(track.empty or name in clocks_set for name, track in self._session.tracks.items()):
+            return True
+        spans = [np.concatenate([stamp for n, stamp, _ in self._postponed if n == name]) for name in clocks_set]
+        return any(int(span[-1]) - int(span[0]) > LONGEST_LAG * 1e9 for span in spans)
+
+    def _end_session(self) -> None:
+        """Finish the windows of the time before the clock was set, or of the whole stream."""
+        for name in SENSORS:
+            if name not in self._session.clocks_set:
+                nothing = np.empty(0, dtype=np.int64), self._session.tracks[name].values[:0]
+                self._extend(name, *nothing, final=True)
+        self._advance(final=True)
+        self._release(final=True)
+        self._counts += self._session.counts
+        self._session = ClockSession(self.rig, self.options)
+
+    def _add_postponed(self) -> None:
+        """Add the samples that waited for the new time."""
+        postponed, self._postponed = self._postponed, []
+        for name, stamp, values in postponed:
+            self._add(name, stamp, values)
+
+    # --- windows ------------------------------------------------------------------------------------------------
 
     def _advance(self, final: bool) -> None:
-        until = self._horizon(final)
-        slider = self._tracks["slider"]
-        if until is None:
-            return
-        if self._first is None:
-            self._first = next(int(track.stamp[0]) for track in reversed(self._tracks.values()) if len(track))
-        first = int(np.searchsorted(slider.stamp, self._evaluated, side="right"))
-        last = int(np.searchsorted(slider.time, until, side="right"))
-        if last <= first:
-            return
-        for sample in contact_samples(self.rig, slider, self._tracks["pusher"], self._wrench(), first, last):
-            for start, end in self._segmenter.step(sample):
-                self._cut(start, end)
-        self._note_dropouts(float(slider.time[last - 1]))
-        self._evaluated = slider.stamp[last - 1]
-        self._forget(float(slider.time[last - 1]))
-
-    def _note_dropouts(self, until: float) -> None:
-        for name, track in self._tracks.items():
-            count = track.dropouts(self._counted_until, until)
-            self._counts.update({f"{name} dropouts": count, "dropouts": count})
-        self._counted_until = until
-
-    def _horizon(self, final: bool) -> float | None:
-        """The time (s) up to which all streams are known, None until their periods are known."""
-        slider, pusher, _ = self._tracks.values()
-        present = [track for track in self._tracks.values() if not track.empty]
-        if slider not in present or pusher not in present or not all(track.period_known(final) for track in present):
-            return None
-        if final:
-            return float(min(slider.time[-1], pusher.time[-1]))
-        newest, reached = (which(track.time[-1] for track in present) for which in (max, min))
-        return float(max(reached, newest - LONGEST_LAG) - REACH)
-
-    def _wrench(self) -> Track | None:
-        return self._tracks["wrench"] if len(self._tracks["wrench"]) else None
-
-    def _cut(self, start: int, end: int) -> None:
-        push = self._segmenter.push
-        if push is None or self._origin is None or self._first is None:
-            return
-        tracks = SensorTracks(self._tracks["slider"], self._tracks["pusher"], self._wrench())
-        window = cut_window(self.rig, tracks, Interval(start, end, self._origin), push, self._slid)
-        if not isinstance(window, PushWindow):
-            self._counts[window] += 1
-            return
-        edge = int(window.covariates["edge"])
-        self._segmenter.push = replace(push, last_edge=edge, window_index=push.window_index + 1)
-        # Summed over windows: summed over samples, the tracker's noise would count as distance.
-        self._slid += float(np.hypot(*window.displacement[:2]))
-        elapsed = (start - self._first) * NANOSECOND
-        self._waiting.append(replace(window, covariates={"elapsed_time": elapsed, **window.covariates}))
-
-    def _forget(self, evaluated: float) -> None:
-        start = self._segmenter.start
-        needed = evaluated
-        if start is not None and self._origin is not None:
-            needed = min(evaluated, (start - self._origin) * 1e-9)
-        for track in self._tracks.values():
-            track.forget_before(needed - HISTORY)
-        first = self._waiting[0].start if self._waiting else start
-        self._scalars.forget_before(self._evaluated if first is None else min(first, self._evaluated))
-
-    # --- scalars ------------------------------------------------------------------------------------------------
+        """Find windows as far as all streams are known."""
+        self._waiting += self._session.find(final)
+        needed = self._session.needed
+        self._scalars.forget_before(min(needed, self._waiting[0].start) if self._waiting else needed)
 
     def _release(self, final: bool) -> None:
         """Complete the windows whose scalars are known, in order; with `final` all windows."""
@@ -273,9 +171,12 @@ class WindowFinder:
         self._waiting = waiting[count:]
 
     def _waits(self, window: PushWindow) -> bool:
-        newest = max(int(track.stamp[-1]) for track in self._tracks.values() if len(track))
-        late = newest - window.start > LONGEST_GAP
+        late = self._session.newest - window.start > LONGEST_GAP
         return not late and not self._scalars.known_at(window.start)
 
     def _with_scalars(self, window: PushWindow) -> PushWindow:
         return replace(window, covariates={**window.covariates, **self._scalars.covariates_at(window.start)})
+
+    def _taken(self) -> list[PushWindow]:
+        ready, self._ready = self._ready, []
+        return ready

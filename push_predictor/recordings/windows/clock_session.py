@@ -1,0 +1,144 @@
+"""A session of one clock: the sensor tracks between two settings of the clock, and the windows found in them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.windows.contact import REACH, contact_samples
+from push_predictor.recordings.windows.cut import Interval, SensorTracks, cut_window
+from push_predictor.recordings.windows.push_segmenter import PushSegmenter
+from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.recordings.windows.track import NANOSECOND, Track
+from push_predictor.types import Array, IntArray
+
+LONGEST_LAG = 30.0  # s; the other streams proceed without a stream that lags more
+HISTORY = 1.0  # s of samples kept before the last evaluated one
+# ns; times are counted from a multiple of this, not from the first sample, so that they do not round differently with
+# the order of arrival.
+ORIGIN_STEP = 1_000_000_000_000
+
+
+class ClockSession:
+    """Takes samples of the sensors and finds windows, until the clock of every stream was set.
+
+    tracks: by sensor. clocks_set: the sensors whose clock was set; they take no more samples. evaluated: stamp (ns) of
+    the last evaluated slider sample.
+    """
+
+    def __init__(self, rig: Rig, options: WindowOptions) -> None:
+        self.tracks = {
+            "slider": Track(4, position=True, angle=3),
+            "pusher": Track(3, position=True),
+            "wrench": Track(2),
+        }
+        self.clocks_set: set[str] = set()
+        self.evaluated = int(np.iinfo(np.int64).min)
+        self._rig = rig
+        self._segmenter = PushSegmenter(options)
+        self._counts: Counter[str] = Counter()
+        self._origin: int | None = None
+        self._first: int | None = None
+        self._slid = 0.0
+        self._counted_until = -np.inf  # s
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of faults by kind; faults of samples also by stream."""
+        found = self._counts + Counter(self._segmenter.counts)
+        for name, track in self.tracks.items():
+            # A slider that continues elsewhere was repositioned: a reset, which the segmenter counts.
+            of_stream = track.counts if name != "slider" else track.order.counts
+            found.update({f"{name} {kind}": count for kind, count in of_stream.items()})
+            found.update(of_stream)
+            found["refused"] += track.order.counts.total()
+        return found
+
+    @property
+    def newest(self) -> int:
+        """The latest stamp of all tracks, ns."""
+        return max(int(track.stamp[-1]) for track in self.tracks.values() if len(track))
+
+    @property
+    def needed(self) -> int:
+        """Stamp (ns) from which on data are needed for further windows."""
+        start = self._segmenter.start
+        return self.evaluated if start is None else min(start, self.evaluated)
+
+    def extend(self, name: str, stamp: IntArray, values: Array, final: bool = False) -> bool:
+        """Add samples of a sensor; with `final` all are decided. Returns whether its clock was set in them."""
+        track = self.tracks[name]
+        ordered = track.order.take(stamp, values, final)
+        if self._origin is None and len(ordered.stamp):
+            self._origin = int(ordered.stamp[0]) // ORIGIN_STEP * ORIGIN_STEP
+        track.extend(ordered, self._origin or 0)
+        if ordered.clock_set:
+            self.clocks_set.add(name)
+        return ordered.clock_set
+
+    def find(self, final: bool) -> list[PushWindow]:
+        """Evaluate the samples that all streams have passed; returns the windows completed by them."""
+        until, slider = self._horizon(final), self.tracks["slider"]
+        if until is None:
+            return []
+        if self._first is None:
+            self._first = next(int(track.stamp[0]) for track in reversed(self.tracks.values()) if len(track))
+        first = int(np.searchsorted(slider.stamp, self.evaluated, side="right"))
+        last = int(np.searchsorted(slider.time, until, side="right"))
+        if last <= first:
+            return []
+        found: list[PushWindow] = []
+        for sample in contact_samples(self._rig, slider, self.tracks["pusher"], self._wrench(), first, last):
+            for start, end in self._segmenter.step(sample):
+                found += self._cut(start, end)
+        self._count_dropouts(float(slider.time[last - 1]))
+        self.evaluated = int(slider.stamp[last - 1])
+        self._forget(float(slider.time[last - 1]))
+        return found
+
+    def _count_dropouts(self, until: float) -> None:
+        for name, track in self.tracks.items():
+            count = track.dropouts(self._counted_until, until)
+            self._counts.update({f"{name} dropouts": count, "dropouts": count})
+        self._counted_until = until
+
+    def _horizon(self, final: bool) -> float | None:
+        """The time (s) up to which all streams are known, None until their periods are known."""
+        slider, pusher, _ = self.tracks.values()
+        present = [track for track in self.tracks.values() if not track.empty]
+        if slider not in present or pusher not in present or not all(track.period_known(final) for track in present):
+            return None
+        if final:
+            return float(min(slider.time[-1], pusher.time[-1]))
+        newest, reached = (which(track.time[-1] for track in present) for which in (max, min))
+        return float(max(reached, newest - LONGEST_LAG) - REACH)
+
+    def _wrench(self) -> Track | None:
+        return self.tracks["wrench"] if len(self.tracks["wrench"]) else None
+
+    def _cut(self, start: int, end: int) -> list[PushWindow]:
+        """The window from start to end (ns), none if it is rejected."""
+        push = self._segmenter.push
+        if push is None or self._origin is None or self._first is None:
+            return []
+        tracks = SensorTracks(self.tracks["slider"], self.tracks["pusher"], self._wrench())
+        window = cut_window(self._rig, tracks, Interval(start, end, self._origin), push, self._slid)
+        if not isinstance(window, PushWindow):
+            self._counts[window] += 1
+            return []
+        edge = int(window.covariates["edge"])
+        self._segmenter.push = replace(push, last_edge=edge, window_index=push.window_index + 1)
+        # Summed over windows: summed over samples, the tracker's noise would count as distance.
+        self._slid += float(np.hypot(*window.displacement[:2]))
+        elapsed = (start - self._first) * NANOSECOND
+        return [replace(window, covariates={"elapsed_time": elapsed, **window.covariates})]
+
+    def _forget(self, evaluated: float) -> None:
+        start, needed = self._segmenter.start, evaluated
+        if start is not None and self._origin is not None:
+            needed = min(evaluated, (start - self._origin) * 1e-9)
+        for track in self.tracks.values():
+            track.forget_before(needed - HISTORY)
