@@ -91,6 +91,13 @@ def test_the_table_of_the_validators_parameters_is_that_of_the_code():
     assert written == {row.name: (row.default, row.description) for row in validator_parameters.PARAMETERS}
 
 
+@pytest.mark.parametrize("node", ["predict_server", "push_replay"])
+def test_the_reference_page_lists_every_parameter_with_its_default(node: str):
+    rows = table(REFERENCE / f"{node}.md", "Parameters")
+    written = {row[0].strip("`"): yaml.safe_load(row[1].strip("`")) for row in rows}
+    assert written == {row.name: row.default for row in NODES[node][1]}
+
+
 # --- topics and services ---------------------------------------------------------------------------------------------
 
 
