@@ -24,6 +24,7 @@ from synthetic import noisy_pushes, square_rig
 from trace_bench import drifting_folder, server_of
 
 from push_predictor.cli import main
+from push_predictor.commands import output
 from push_predictor.commands.output import write_text
 from push_predictor.errors import RecordingError
 from push_predictor.evaluation.report.page import write_validation_report
@@ -177,10 +178,15 @@ def test_writing_keeps_links_and_devices_and_accepts_long_names(tmp_path: Path) 
     ],
 )
 def test_a_command_on_a_full_disk_ends_with_one_line(
-    arguments: list[str], model: PushModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    model: PushModel,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from push_predictor.recordings.rig import save_rig
 
+    monkeypatch.setattr(output, "PATIENCE", 600.0)  # no progress messages on a busy machine
     inside, out = tmp_path / "in", tmp_path / "out"
     inside.mkdir()
     out.mkdir()

@@ -147,7 +147,7 @@ def test_answers_to_other_clients_do_not_crowd_out_the_validators(domain: int):
         with ros_context(domain) as busy:
             ours = PredictionClient(busy, timeout=60.0)
             # The server must have discovered both clients, `other` and ours, before it can answer them.
-            assert wait_until(lambda: ours.server_is_there and node.count_clients("predict_push") == 2)
+            assert wait_until(lambda: ours.server_available and node.count_clients("predict_push") == 2)
             busy.executor.shutdown()  # nobody takes answers
             answers: list[PredictPush.Response] = []
             ours.ask(PredictPush.Request(), answers.append)

@@ -64,7 +64,7 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
         context.init(args=[], domain_id=domain)
         busy = Node("busy", context=context)
         client = PredictionClient(busy, timeout=120.0)
-        assert wait_until(lambda: client.server_is_there and node.count_clients("predict_push") > 0)
+        assert wait_until(lambda: client.server_available and node.count_clients("predict_push") > 0)
         answers: list[PredictPush.Response] = []
         for _ in range(30):
             client.ask(PredictPush.Request(), answers.append)

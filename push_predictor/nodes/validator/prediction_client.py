@@ -16,16 +16,16 @@ from rclpy.task import Future
 
 from push_predictor_interfaces.srv import PredictPush
 
-IN_FLIGHT = 8  # a service queue of the default depth holds ten
+IN_FLIGHT = 8  # a service queue of the default depth has ten places
 DEPTH = 1000  # a client receives the answers to all clients, which would crowd its own out of a short queue
 PAUSE = 1.0  # s after which a request is repeated that the server could not answer for its model
-SELDOM = 10.0  # s between two lines in the log about a server too busy to answer in time
+LOG_PERIOD = 10.0  # s between two log lines about a server that does not answer in time
 NOT_NOW = ("model:", "default_model:", "the node is ")  # refusals because of the server's state, not of the push
 Answer: TypeAlias = Callable[[PredictPush.Response], None]
 
 
 @dataclass(eq=False)
-class _Asked:
+class _Pending:
     """A request and its on_answer; futures: one for each time that it was sent."""
 
     request: PredictPush.Request
@@ -55,9 +55,9 @@ class PredictionClient:
         self._wait_set = rclpy_implementation.WaitSet(0, 0, 0, 1, 0, 0, node.context.handle)
         self._taking = False
         self._timeout, self._log = timeout, node.get_logger()
-        self._waiting: dict[str, deque[_Asked]] = {}
+        self._waiting: dict[str, deque[_Pending]] = {}
         self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
-        self._sent: list[_Asked] = []
+        self._sent: list[_Pending] = []
         self._silence: _Silence | None = None
         self.timeouts = 0
 
@@ -67,7 +67,7 @@ class PredictionClient:
         return len(self._sent) + sum(map(len, self._waiting.values()))
 
     @property
-    def server_is_there(self) -> bool:
+    def server_available(self) -> bool:
         """Whether a node offers the service."""
         return bool(self._client.service_is_ready())
 
@@ -79,26 +79,26 @@ class PredictionClient:
 
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
         """Queue a request; on_answer gets the response, in the executor's thread."""
-        self._waiting.setdefault(request.model, deque()).append(_Asked(request, on_answer))
+        self._waiting.setdefault(request.model, deque()).append(_Pending(request, on_answer))
 
     def work(self) -> None:
         """Take answers, send waiting and overdue requests. Call it often, in the executor's thread."""
         self._take_answers()
-        if not self.open or not self.server_is_there:
+        if not self.open or not self.server_available:
             return
         now = monotonic()
-        for asked in self._sent:
-            if asked.deadline < now:
+        for pending in self._sent:
+            if pending.deadline < now:
                 self._note_silence(now)
-                self._send(asked, now)
+                self._send(pending, now)
         while len(self._sent) < IN_FLIGHT and (queue := self._next_queue(now)) is not None:
-            self._sent.append(asked := queue.popleft())
-            self._send(asked, now)
+            self._sent.append(pending := queue.popleft())
+            self._send(pending, now)
 
     def forget(self) -> None:
         """Give up all open requests."""
-        for asked in self._sent:
-            self._abandon(asked)
+        for pending in self._sent:
+            self._abandon(pending)
         self._sent.clear()
         self._waiting.clear()
         self._blocked.clear()
@@ -130,7 +130,7 @@ class PredictionClient:
         if self._silence is None:
             self._silence = _Silence(now - self._timeout)
             text = f"predict_push: no answer within {self._timeout:g} s, requests are sent again"
-            self._log.warning(text, throttle_duration_sec=SELDOM)
+            self._log.warning(text, throttle_duration_sec=LOG_PERIOD)
         self._silence.sent_again += 1
 
     def _note_answer(self) -> None:
@@ -139,35 +139,35 @@ class PredictionClient:
             self._log.warning(
                 f"predict_push answers again after {monotonic() - silence.since:.1f} s. Requests sent again: "
                 f"{silence.sent_again}; waiting: {self.open}; given up: 0.",
-                throttle_duration_sec=SELDOM,
+                throttle_duration_sec=LOG_PERIOD,
             )
 
-    def _next_queue(self, now: float) -> deque[_Asked] | None:
+    def _next_queue(self, now: float) -> deque[_Pending] | None:
         """The longest queue of the models whose requests may be sent now."""
         free = [q for model, q in self._waiting.items() if q and self._blocked.get(model, (0.0, ""))[0] <= now]
         return max(free, key=len, default=None)
 
-    def _send(self, asked: _Asked, now: float) -> None:
-        asked.deadline = now + self._timeout
-        future = self._client.call_async(asked.request)
-        asked.futures.append(future)
-        future.add_done_callback(lambda done: self._answered(asked, done))
+    def _send(self, pending: _Pending, now: float) -> None:
+        pending.deadline = now + self._timeout
+        future = self._client.call_async(pending.request)
+        pending.futures.append(future)
+        future.add_done_callback(lambda done: self._answered(pending, done))
 
-    def _answered(self, asked: _Asked, future: Any) -> None:
-        if asked not in self._sent:  # answered before, or given up
+    def _answered(self, pending: _Pending, future: Any) -> None:
+        if pending not in self._sent:  # answered before, or given up
             return
-        self._sent.remove(asked)
-        self._abandon(asked)
+        self._sent.remove(pending)
+        self._abandon(pending)
         self._note_answer()
-        response, model = future.result(), asked.request.model
+        response, model = future.result(), pending.request.model
         if not response.success and response.message.startswith(NOT_NOW):
             self._blocked[model] = (monotonic() + PAUSE, response.message)
-            self._waiting[model].appendleft(_Asked(asked.request, asked.on_answer))
+            self._waiting[model].appendleft(_Pending(pending.request, pending.on_answer))
         else:
             self._blocked.pop(model, None)
-            asked.on_answer(response)
+            pending.on_answer(response)
         self.work()
 
-    def _abandon(self, asked: _Asked) -> None:
-        for future in asked.futures:
+    def _abandon(self, pending: _Pending) -> None:
+        for future in pending.futures:
             self._client.remove_pending_request(future)

@@ -83,7 +83,7 @@ def validator_status(
     written, empty if it could.
     """
     warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
-    if not client.server_is_there:
+    if not client.server_available:
         warnings.append(NO_SERVER)
     level = Level.ERROR if failure else Level.WARN if warnings else Level.OK
     values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
