@@ -1,4 +1,4 @@
-"""The states of a validation: waiting for samples, open, draining (no new samples, answers are missing), written."""
+"""The states of a validation run: waiting for samples, open, draining (answers are awaited), written."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ QUIET = 0.3  # s without samples after which a finished replay has delivered eve
 SILENCE = 5.0  # s without samples after which a replay that is not paused has probably died
 CALLER_PATIENCE = 5.0  # s that a caller of ~/finish waits for missing answers; also the end by another rig
 SHUTDOWN_PATIENCE = 2.0  # s that the end of the process waits for them
-ALARM_PATIENCE = 15.0  # s more that a validation waits for the alarm to judge its answered pushes
+ALARM_PATIENCE = 15.0  # s more that a run waits for the alarm to judge its answered pushes
 
 
 class State(Enum):
@@ -22,16 +22,16 @@ class State(Enum):
 
 
 class Session:
-    """State, deadline and failure of the validations of one node, one after the other.
+    """State, deadline and failure of the runs of one node, one after the other.
 
-    last_answers: seconds that the end of a recording waits for missing answers. report: whether a validation that ends
+    last_answers: seconds that the end of a recording waits for missing answers. report: whether a run that ends
     by a finished replay or by a caller gets a report. Every `now` is a time of one monotonic clock, in seconds.
     """
 
     def __init__(self, last_answers: float, report: bool) -> None:
         self.state = State.WAITING
         self.failure = ""  # why the last result could not be written
-        self.with_report = False  # whether the validation that ends gets one
+        self.with_report = False  # whether the run that ends gets one
         self._last_answers, self._report = last_answers, report
         self._deadline, self._last_sample = inf, -inf
         self._finished = self._paused = self._shutting_down = False
@@ -47,7 +47,7 @@ class Session:
         return self._shutting_down and not self.active
 
     def open(self, now: float) -> None:
-        """Begin a validation, from WAITING or WRITTEN."""
+        """Begin a run, from WAITING or WRITTEN."""
         assert not self.active
         self.state, self.failure, self._last_sample = State.OPEN, "", now
 
@@ -85,11 +85,11 @@ class Session:
         return True
 
     def answers_settled(self, now: float, open_requests: int) -> bool:
-        """Whether a draining validation has all answers, or will not wait for more."""
+        """Whether a draining run has all answers, or will not wait for more."""
         return not open_requests or now >= self._deadline
 
     def alarm_settled(self, now: float, busy: bool) -> bool:
-        """Whether the alarm has judged the pushes of a draining validation, or will not be waited for."""
+        """Whether the alarm has judged the pushes of a draining run, or will not be waited for."""
         return not busy or now >= self._deadline + (0.0 if self._shutting_down else ALARM_PATIENCE)
 
     def written(self) -> None:
@@ -97,7 +97,7 @@ class Session:
         self._end(State.WRITTEN, "")
 
     def failed(self, reason: str) -> None:
-        """Go from DRAINING back to OPEN, where ~/finish may try again; at shutdown give the validation up."""
+        """Go from DRAINING back to OPEN, where ~/finish may try again; at shutdown give the run up."""
         self._end(State.WRITTEN if self._shutting_down else State.OPEN, reason)
 
     def _end(self, state: State, failure: str) -> None:
@@ -105,5 +105,5 @@ class Session:
         self.state, self.failure, self._deadline, self._finished = state, failure, inf, False
 
     def silent(self, now: float) -> bool:
-        """Whether an open validation gets no samples though the replay is not paused."""
+        """Whether an open run gets no samples though the replay is not paused."""
         return self.state is State.OPEN and not self._paused and now - self._last_sample >= SILENCE

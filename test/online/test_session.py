@@ -1,4 +1,4 @@
-"""What each event does in each state of a validation; the times are seconds of a made-up clock."""
+"""What each event does in each state of a run; the times are seconds of a made-up clock."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def patience(session: Session, begin: float = BEGIN) -> float:
 # --- states ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_validation_goes_from_waiting_through_open_and_draining_to_written() -> None:
+def test_a_run_goes_from_waiting_through_open_and_draining_to_written() -> None:
     session = waiting()
     assert (session.state, session.active) == (State.WAITING, False)
     session.open(BEGIN)
@@ -104,14 +104,14 @@ def test_only_a_draining_session_is_written_or_fails(make) -> None:
         make().failed("disk full")
 
 
-# --- what ends a validation ------------------------------------------------------------------------------------------
+# --- what ends a run -------------------------------------------------------------------------------------------------
 
 
 def test_an_open_session_stays_open_while_samples_arrive_and_nobody_asks() -> None:
     assert not due(opened(), BEGIN + 1e6)
 
 
-def test_a_finished_replay_ends_the_validation_once_no_sample_follows() -> None:
+def test_a_finished_replay_ends_the_run_once_no_sample_follows() -> None:
     session = opened()
     session.sample(BEGIN + 10.0)
     session.replay("finished", samples_waiting=False)
@@ -139,7 +139,7 @@ def test_a_replay_that_finished_before_the_first_sample_ends_nothing(make) -> No
 
 
 @pytest.mark.parametrize("make", INACTIVE)
-def test_a_replay_that_finished_while_its_samples_waited_ends_their_validation(make) -> None:
+def test_a_replay_that_finished_while_its_samples_waited_ends_their_run(make) -> None:
     session = make()
     session.replay("finished", samples_waiting=True)
     session.open(BEGIN)
@@ -160,7 +160,7 @@ def test_no_report_is_written_where_the_parameter_says_so() -> None:
     assert not session.with_report
 
 
-def test_another_rig_ends_the_validation_without_a_report() -> None:
+def test_another_rig_ends_the_run_without_a_report() -> None:
     session = opened()
     assert due(session, rig_changed=True)
     assert not session.with_report
@@ -194,10 +194,10 @@ def test_a_result_that_cannot_be_written_is_tried_again_on_the_next_call_of_fini
     assert (session.state, session.failure) == (State.WRITTEN, "")
 
 
-# --- the next validation ---------------------------------------------------------------------------------------------
+# --- the next run ----------------------------------------------------------------------------------------------------
 
 
-def test_a_second_replay_is_a_new_validation_with_a_deadline_of_its_own() -> None:
+def test_a_second_replay_is_a_new_run_with_a_deadline_of_its_own() -> None:
     session = opened()
     session.replay("finished", samples_waiting=False)
     assert due(session, BEGIN + 1.0)
@@ -210,7 +210,7 @@ def test_a_second_replay_is_a_new_validation_with_a_deadline_of_its_own() -> Non
     assert patience(session, BEGIN + 70.0) == pytest.approx(LAST_ANSWERS, abs=0.11)
 
 
-def test_a_new_validation_forgets_the_failure_of_the_last() -> None:
+def test_a_new_run_forgets_the_failure_of_the_last() -> None:
     session = draining()
     session.shut_down(BEGIN)
     session.failed("disk full")
