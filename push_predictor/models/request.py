@@ -1,4 +1,4 @@
-"""The rules of a request: which pushes a model answers. Services, command line and library share them."""
+"""The rules of a request: which pushes a model predicts. Services, command line and library share them."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ class PushRequest:
 
     @property
     def arrays(self) -> tuple[Array, Array, dict[str, Array]]:
-        """The arguments of PushModel.predict: inputs (1, 3), duration (1,), covariates (1,) by name."""
+        """The arguments of PushModel.predict_rows: inputs (1, 3), duration (1,), covariates (1,) by name."""
         columns = {name: np.array([value]) for name, value in self.covariates.items()}
         return np.array([[self.velocity, self.contact, self.angle]]), np.array([self.duration]), columns
 
 
 def check_request(model: PushModel, push: PushRequest) -> None:
-    """Raise RequestError unless the model answers this push; it names field, value and what is accepted."""
+    """Raise RequestError unless the model predicts this push; it names field, value and what is accepted."""
     _check(model, push.velocity, push.contact, push.angle, push.duration, push.covariates)
 
 
 def check_requests(model: PushModel, inputs: Array, duration: float | Array, covariates: Mapping[str, Array]) -> None:
-    """Raise RequestError unless the model answers n pushes: inputs (n, 3), duration one for all or (n,) s.
+    """Raise RequestError unless the model predicts n pushes: inputs (n, 3), duration one for all or (n,) s.
 
     The field in the error carries the index of the first push that breaks the rule.
     """
@@ -69,7 +69,7 @@ def check_requests(model: PushModel, inputs: Array, duration: float | Array, cov
 
 
 def check_pushes(model: PushModel, pushes: Pushes) -> None:
-    """Raise RequestError unless the model answers these pushes; covariates that it does not need are ignored."""
+    """Raise RequestError unless the model predicts these pushes; covariates that it does not need are ignored."""
     needed = {name: column for name, column in pushes.covariates.items() if name in model.needs}
     if len(pushes) > 1:
         check_requests(model, pushes.inputs, pushes.duration, needed)
@@ -80,7 +80,7 @@ def check_pushes(model: PushModel, pushes: Pushes) -> None:
 
 
 def check_table(model: PushModel, table: PushTable) -> None:
-    """Raise RequestError unless the model answers every row of a table; covariates that it does not need are ignored.
+    """Raise RequestError unless the model predicts every row of a table; covariates that it does not need are ignored.
 
     The index in the error is that of the row.
     """

@@ -108,17 +108,17 @@ class PlayerClock:
         with self._changed:
             if generation != self.generation:
                 return False
-            left = None if self._paused else self._deadline(recorded) - self._wall.now()
-            if left is None or left > COARSE:
-                self._wall.wait(self._changed, None if left is None else left - COARSE // 2)
+            remaining = None if self._paused else self._deadline(recorded) - self._wall.now()
+            if remaining is None or remaining > COARSE:
+                self._wall.wait(self._changed, None if remaining is None else remaining - COARSE // 2)
                 return False
             deadline = self._deadline(recorded)
         self._sleep_to(deadline)
         return generation == self.generation
 
     def _sleep_to(self, deadline: int) -> None:
-        if (left := deadline - self._wall.now() - self._spin) > 0:
-            self._wall.sleep(left)
+        if (remaining := deadline - self._wall.now() - self._spin) > 0:
+            self._wall.sleep(remaining)
         while self._spin and self._wall.now() < deadline:
             pass
 

@@ -200,8 +200,8 @@ class ReplayPlayer:
         """Sleep for the delay; False if the playback was stopped."""
         begin = self._wall.now() + self._delay
         with self._changed:
-            while not self._stopped and (left := begin - self._wall.now()) > 0:
-                self._wall.wait(self._changed, left)
+            while not self._stopped and (remaining := begin - self._wall.now()) > 0:
+                self._wall.wait(self._changed, remaining)
         return not self._stopped
 
     def _play_through(self, position: int) -> bool:

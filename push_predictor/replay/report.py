@@ -34,7 +34,7 @@ class ReplayReport:
         warnings += [f"damaged: {text}" for text in self.damage]
         warnings += [f"{self.behind:.3f} s behind"] if self.behind > 0.1 else []
         warnings += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
-        warnings += [f"not restamped: {topic} (its type has no header in front)" for topic in self.unstamped]
+        warnings += [f"not restamped: {topic} (its type does not begin with a header)" for topic in self.unstamped]
         return warnings + ([self.rig] if self.rig else [])
 
     @property

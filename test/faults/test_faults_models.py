@@ -36,7 +36,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_damaged_copy_is_refused_or_predicts_as_the_undamaged_file(
+def test_damaged_copy_is_refused_or_predicts_like_the_original(
     files: dict[str, Path], kind: str, tmp_path: Path
 ) -> None:
     undamaged, other = undamaged_bytes(files, kind)
@@ -54,8 +54,8 @@ def test_a_damaged_copy_is_refused_or_predicts_as_the_undamaged_file(
     assert refused > 0.6 * COPIES
 
 
-def test_an_array_that_claims_to_be_smaller_is_refused(tmp_path: Path) -> None:
-    """One flipped bit makes doubles singles, half of the bytes are read, and no checksum has been looked at."""
+def test_rejects_array_with_a_smaller_declared_size(tmp_path: Path) -> None:
+    """One flipped bit turns doubles into singles: half of the bytes are read, and no checksum is compared."""
     path = tmp_path / "m.model"
     model = train_model(pushes(300), square_rig(), "analytical", name="large")  # zipfile reads some kB ahead
     save_model(model, path)
@@ -85,7 +85,7 @@ def test_half_written_files_in_a_folder_are_named(files: dict[str, Path], tmp_pa
 
 
 class _Payload:
-    """Unpickled, it makes a file."""
+    """An object that creates a file when it is unpickled."""
 
     def __init__(self, mark: Path) -> None:
         self.mark = mark
@@ -106,7 +106,7 @@ def objects(mark: Path) -> bytes:
 
 @pytest.mark.parametrize("member", ["", "inputs.npy", "header.npy", "archive/data.pkl", "extra.npy"])
 @pytest.mark.parametrize("payload", [pickled, objects])
-def test_no_code_of_a_file_is_run(
+def test_code_in_a_model_file_is_not_executed(
     files: dict[str, Path], member: str, payload: Callable[[Path], bytes], tmp_path: Path
 ) -> None:
     mark, path = tmp_path / "mark", tmp_path / "m.model"
@@ -119,7 +119,7 @@ def test_no_code_of_a_file_is_run(
         registry.load(path)
     assert not mark.exists() and not len(registry)
     np.load(io.BytesIO(objects(mark)), allow_pickle=True)
-    assert mark.exists()  # it would have
+    assert mark.exists()  # unpickling would have run it
 
 
 # --- forged files -------------------------------------------------------------------------------------------------
@@ -135,7 +135,7 @@ def peak_of(load: Callable[[], object]) -> int:
 
 
 @pytest.mark.parametrize("claimed", [100, 1 << 31])
-def test_a_member_that_unpacks_to_more_than_it_claims_costs_no_memory(tmp_path: Path, claimed: int) -> None:
+def test_member_larger_than_declared_costs_no_memory(tmp_path: Path, claimed: int) -> None:
     path = tmp_path / "bomb.model"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("inputs.npy", bytes(100 << 20))
@@ -152,7 +152,7 @@ def test_a_member_that_unpacks_to_more_than_it_claims_costs_no_memory(tmp_path: 
 
 
 @pytest.mark.parametrize("shape", [(10**9, 3), (10**18, 3), (-1, 3), (2**63, 2**63)])
-def test_an_array_that_claims_to_be_huge_costs_no_memory(
+def test_array_with_a_huge_declared_size_costs_no_memory(
     files: dict[str, Path], shape: tuple[int, ...], tmp_path: Path
 ) -> None:
     header = repr({"descr": "<f8", "fortran_order": False, "shape": shape}).ljust(117).encode() + b"\n"
@@ -198,7 +198,7 @@ LIES: list[tuple[str, tuple[Any, ...], Any]] = [
 
 
 @pytest.mark.parametrize(("kind", "field", "value"), LIES, ids=[f"{k}-{f[-1]}-{n}" for n, (k, f, _) in enumerate(LIES)])
-def test_a_header_that_lies_is_refused(
+def test_rejects_inconsistent_header(
     files: dict[str, Path], kind: str, field: tuple[Any, ...], value: Any, tmp_path: Path
 ) -> None:
     arrays = arrays_of(files[kind])
@@ -232,7 +232,7 @@ def test_a_header_that_lies_is_refused(
         ("extended", "effect_covariance_0", lambda a: a[:0]),
     ],
 )
-def test_an_array_that_lies_is_refused(
+def test_rejects_inconsistent_array(
     files: dict[str, Path], kind: str, name: str, change: Callable[[np.ndarray], np.ndarray], tmp_path: Path
 ) -> None:
     arrays = arrays_of(files[kind])
@@ -242,7 +242,7 @@ def test_an_array_that_lies_is_refused(
 
 
 def refused_in_time(path: Path) -> str:
-    """Why the file is not served; a load that never ends is a failure too."""
+    """The reason why a file is not loaded; a load that never ends fails the test."""
     problems: list[str] = []
     loading = threading.Thread(target=lambda: problems.extend(ModelRegistry().load_all([str(path)])), daemon=True)
     loading.start()
@@ -253,7 +253,7 @@ def refused_in_time(path: Path) -> str:
 
 
 @pytest.mark.parametrize("place", ["~nobody_of_that_name/x", "a\0b", "x" * 300, "loop/x", "/dev/zero", "pipe"])
-def test_a_path_that_leads_nowhere_is_told_and_blocks_nothing(
+def test_unusable_path_is_reported_and_blocks_nothing(
     files: dict[str, Path], place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -273,14 +273,12 @@ def test_a_path_that_leads_nowhere_is_told_and_blocks_nothing(
 # --- under a running server ---------------------------------------------------------------------------------------
 
 
-def test_a_file_overwritten_under_a_server_changes_nothing_until_it_is_loaded_whole(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_overwritten_file_has_no_effect_until_it_is_loaded_completely(files: dict[str, Path], tmp_path: Path) -> None:
     path, new = tmp_path / "served.model", files["analytical"].read_bytes()
     path.write_bytes(files["gp"].read_bytes())
     with server_of([path]) as server:
         before = list(server.push().mean)
-        for written in (0, 40, len(new) // 2, len(new) - 1):  # in place, as a copy that is going on
+        for written in (0, 40, len(new) // 2, len(new) - 1):  # in place, as an unfinished copy
             path.write_bytes(new[:written])
             assert list(server.push().mean) == before
             refused = server.load(path, name="gp")
@@ -304,7 +302,7 @@ def npy(array: np.ndarray) -> bytes:
 
 
 def write(path: Path, members: dict[str, bytes]) -> None:
-    """A zip of these; an array's name may come without its ending."""
+    """Write a zip of these members; an array's name may omit its ending."""
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in {n if "." in n else f"{n}.npy": d for n, d in members.items()}.items():
             archive.writestr(name, data)

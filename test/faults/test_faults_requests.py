@@ -1,6 +1,6 @@
-"""Requests that nobody should send, through every service: refused by field and value, and the next one is answered.
+"""Bad requests to every service: refused by field and value; the next request is answered.
 
-Beside it: node parameters out of range are refused at start and when they are set.
+Node parameters out of range: rejected at start and when they are set.
 """
 
 from __future__ import annotations
@@ -101,19 +101,19 @@ BAD: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-def test_each_bad_request_is_refused_by_field_and_value_and_the_next_is_answered_the_same(server: Server) -> None:
-    """The medians of what an answer takes are printed, not judged: the machine has other work."""
+def test_rejects_bad_requests_by_field_and_value_and_continues(server: Server) -> None:
+    """Median response times are printed only, because the machine's load varies."""
     good, before = answered(server)
-    for told, asked in BAD:
+    for refusal, asked in BAD:
         asked = {"push": (0.02, 0.1, 0.2), **asked}
         response = server.push(**asked)
-        assert not response.success and not np.any(response.mean), told
-        assert response.message.startswith(f"{told} is not accepted, give "), response
+        assert not response.success and not np.any(response.mean), refusal
+        assert response.message.startswith(f"{refusal} is not accepted, give "), response
         batch = server.batch(
             [(0.02, 0.1, 0.2), asked["push"]], **{k: doubled(v) for k, v in asked.items() if k != "push"}
         )
-        assert not batch.success and not len(batch.mean), told
-        assert " is not accepted, give " in batch.message and told.split(":")[0] in batch.message
+        assert not batch.success and not len(batch.mean), refusal
+        assert " is not accepted, give " in batch.message and refusal.split(":")[0] in batch.message
         assert list(server.push().mean) == good
     last, after = answered(server)
     assert last == good
@@ -126,7 +126,7 @@ def doubled(value: Any) -> Any:
 
 
 def answered(server: Server, count: int = 100) -> tuple[list[float], float]:
-    """What a good push is answered, and the median of how long that takes (s)."""
+    """The mean predicted for a good push, and the median response time (s)."""
     taken, mean = [], []
     for _ in range(count):
         begun = time.perf_counter()
@@ -160,7 +160,7 @@ def rollout_request(**change: Any) -> RolloutPushes.Request:
 
 
 @pytest.mark.parametrize(
-    ("told", "request_"),
+    ("refusal", "request_"),
     [
         ("", pose_request()),
         ("pusher_velocity.x: nan", pose_request(pusher_velocity=Vector3(x=NAN))),
@@ -177,15 +177,15 @@ def rollout_request(**change: Any) -> RolloutPushes.Request:
         ("steps[0].duration: nan", rollout_request(duration=NAN, model="analytical")),
     ],
 )
-def test_poses_and_rollouts_are_refused_alike(server: Server, told: str, request_: Any) -> None:
+def test_rejects_bad_poses_and_rollouts(server: Server, refusal: str, request_: Any) -> None:
     good = list(server.push().mean)
     response = harness.call(server.extra[type(request_)], request_)
-    assert response.success == (not told), response.message
-    assert not told or response.message.startswith(f"{told} is not accepted, give "), response.message
+    assert response.success == (not refusal), response.message
+    assert not refusal or response.message.startswith(f"{refusal} is not accepted, give "), response.message
     assert list(server.push().mean) == good
 
 
-def test_none_and_a_million_candidates_are_answered_and_the_next_as_before(server: Server) -> None:
+def test_empty_and_million_push_batches_are_answered(server: Server) -> None:
     good, before = answered(server)
     assert server.batch([]).success
     rng = np.random.default_rng(0)
@@ -210,8 +210,8 @@ def test_none_and_a_million_candidates_are_answered_and_the_next_as_before(serve
 # --- in the library -----------------------------------------------------------------------------------------------
 
 
-def test_mechanics_is_integrated_over_a_metre_and_no_more(models: dict[str, PushModel]) -> None:
-    """A way without end would keep the service busy for ever."""
+def test_rejects_paths_over_one_metre_where_mechanics_is_integrated(models: dict[str, PushModel]) -> None:
+    """A path without limit would block the service."""
     for name in ("analytical", "drifting"):
         given = dict.fromkeys(models[name].needs, 1.0)
         check_request(models[name], PushRequest(FARTHEST / 0.2, 0.1, 0.2, 0.2, given))
@@ -220,10 +220,10 @@ def test_mechanics_is_integrated_over_a_metre_and_no_more(models: dict[str, Push
         columns = {key: np.ones(2) for key in given}
         with pytest.raises(RequestError, match=r"^velocity\[1\]: 1e\+300 is not accepted"):
             check_requests(models[name], np.array([[0.02, 0.1, 0.2], [1e300, 0.1, 0.2]]), 0.2, columns)
-    check_request(models["vhgp"], PushRequest(5.1, 0.1, 0.2, 0.2))  # a learnt model integrates nothing
+    check_request(models["vhgp"], PushRequest(5.1, 0.1, 0.2, 0.2))  # a learned model integrates nothing
 
 
-def test_what_has_no_finite_answer_gets_no_number(
+def test_push_without_a_finite_prediction_is_refused(
     models: dict[str, PushModel], tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
     registry = ModelRegistry()
@@ -236,11 +236,11 @@ def test_what_has_no_finite_answer_gets_no_number(
     ]
     for name, (push, covariates) in far:
         response = PredictPush.Response()
-        with pytest.raises(PushPredictorError, match=f"push 0: {name} has no finite answer"):
+        with pytest.raises(PushPredictorError, match=f"push 0: {name} has no finite prediction"):
             handle_predict_push(registry, query_to_request(name, np.array(push), 0.2, covariates), response)
         both = np.array([(0.02, 0.1, 0.8), push])
         columns = {key: np.array([1.0, value]) for key, value in covariates.items()}
-        with pytest.raises(PushPredictorError, match=f"push 1: {name} has no finite answer"):
+        with pytest.raises(PushPredictorError, match=f"push 1: {name} has no finite prediction"):
             handle_predict_push_batch(
                 lambda: None,
                 registry,
@@ -279,7 +279,7 @@ def wrong_values(param: Param) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_parameters_out_of_range_are_refused_at_start(name: str) -> None:
+def test_rejects_parameters_out_of_range_at_start(name: str) -> None:
     domain = harness.free_domain()
     cases = [(param, value) for param in TABLES[name] for value in wrong_values(param)]
     for param, value in cases:
@@ -290,7 +290,7 @@ def test_parameters_out_of_range_are_refused_at_start(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_parameters_out_of_range_are_refused_when_set(name: str) -> None:
+def test_rejects_parameters_out_of_range_when_set(name: str) -> None:
     with plain_node(harness.free_domain()) as node:
         declare(node, TABLES[name])
         for param in TABLES[name]:

@@ -1,7 +1,7 @@
-"""The launch file: it starts the three nodes with parameters that they have.
+"""The launch file starts the three nodes with parameters that they declare.
 
-Neither launch nor launch_ros can be installed beside the ROS wheels, so the few names that the file uses are stood in
-for here; what is tested is what the file asks of them.
+launch and launch_ros cannot be installed together with the ROS wheels. Fakes replace the few names that the file uses,
+and the tests check what the file passes to them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PARAMETERS = {
 
 @dataclass
 class Standin:
-    """An action of launch: remembers how it was made."""
+    """An action of launch that records its arguments."""
 
     args: tuple[Any, ...]
     kwargs: dict[str, Any] = field(default_factory=dict)
@@ -43,7 +43,7 @@ def standin(name: str) -> type[Standin]:
 
 @pytest.fixture
 def launch_file(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The names the launch file defines."""
+    """The names that the launch file defines."""
     needed = {
         "launch": ("LaunchContext", "LaunchDescription"),
         "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable"),
@@ -62,7 +62,7 @@ def actions(launch_file: dict[str, Any]) -> list[Standin]:
 
 
 def nodes(launch_file: dict[str, Any], **given: str) -> dict[str, dict[str, Any]]:
-    """What each node is started with when these arguments are given, by executable."""
+    """The arguments of each node for these launch arguments, by executable."""
     (opaque,) = (action for action in actions(launch_file) if type(action).__name__ == "OpaqueFunction")
     defaults = {name: value for name, value, _ in launch_file["ARGUMENTS"]}
     assert given.keys() <= defaults.keys()
@@ -98,7 +98,7 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
 
 
 @pytest.mark.parametrize(("outside", "inside"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
-def test_discovery_stays_on_this_machine_unless_the_environment_says_otherwise(
+def test_discovery_is_limited_to_this_machine_unless_the_environment_sets_it(
     outside: str | None, inside: str, launch_file, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
@@ -108,7 +108,7 @@ def test_discovery_stays_on_this_machine_unless_the_environment_says_otherwise(
     assert setting.args == ("ROS_AUTOMATIC_DISCOVERY_RANGE", inside)
 
 
-def test_three_nodes_start_each_with_what_it_needs_to_know(launch_file):
+def test_three_nodes_start_with_their_parameters(launch_file):
     given = {"model": "m.pushmodel", "output": "~/result", "rig": "a.rig.yaml", "rate": "10"}
     started = nodes(launch_file, recording="bags/x", **given)
     here, home = str(Path.cwd()), str(Path.home())
@@ -126,7 +126,7 @@ def test_three_nodes_start_each_with_what_it_needs_to_know(launch_file):
     }
 
 
-def test_every_parameter_is_one_that_the_node_declares_and_accepts(launch_file):
+def test_nodes_declare_and_accept_every_parameter(launch_file):
     given = {"recording": "bags/x", "model": "m", "output": "o", "rig": "r", "rate": "2.5"}
     given |= {"autostart": "false", "use_sim_time": "true"}
     for executable, node in nodes(launch_file, **given).items():
@@ -137,7 +137,7 @@ def test_every_parameter_is_one_that_the_node_declares_and_accepts(launch_file):
             assert table[name].allows(value), f"{executable}: {name} = {value!r}"
 
 
-def test_the_executables_are_those_that_are_installed_under_their_node_names(launch_file):
+def test_executables_are_installed_under_their_node_names(launch_file):
     started = nodes(launch_file, recording="bags/x", namespace="cell", log_level="debug")
     names = {"predict_server": "push_predictor", "push_validator": "push_validator", "push_replay": "push_replay"}
     assert {executable: node["name"] for executable, node in started.items()} == names
@@ -147,7 +147,7 @@ def test_the_executables_are_those_that_are_installed_under_their_node_names(lau
         assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
 
 
-def test_every_node_runs_in_its_enclave_of_the_policy_if_that_is_wanted(launch_file):
+def test_nodes_run_in_their_enclaves_of_the_policy(launch_file):
     policy = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
     enclaves = {enclave.attrib["path"] for enclave in policy.iter("enclave")}
     started = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
@@ -156,20 +156,20 @@ def test_every_node_runs_in_its_enclave_of_the_policy_if_that_is_wanted(launch_f
         assert node["arguments"][-2:] == ["--enclave", f"/push_predictor/{executable}"]
 
 
-def test_without_a_recording_nothing_is_replayed_and_bag_is_another_word_for_it(launch_file):
+def test_no_replay_without_a_recording_and_bag_is_an_alias(launch_file):
     assert "push_replay" not in nodes(launch_file, model="m")
     assert parameters(nodes(launch_file, bag="/b")["push_replay"])["recording"] == "/b"
 
 
-def test_a_parameter_file_holds_where_no_argument_is_given(launch_file):
-    """The later of two sources wins in ROS, so what was not asked for must not be passed at all."""
+def test_parameter_file_applies_where_no_argument_is_given(launch_file):
+    """In ROS the later of two sources wins, so an argument that was not given must not be passed at all."""
     for node in nodes(launch_file, params_file="/p.yaml", bag="/b").values():
         assert node["parameters"][0] == "/p.yaml"
         assert not {"autostart", "use_sim_time", "play.rate"} & parameters(node).keys()
     assert parameters(nodes(launch_file, autostart="false")["predict_server"]) == {"autostart": False}
 
 
-def test_rviz_is_opened_only_if_wanted_with_the_configuration_beside_the_launch_file(launch_file):
+def test_rviz_is_optional_and_uses_the_installed_configuration(launch_file):
     assert "rviz2" not in nodes(launch_file, bag="/b")
     started = nodes(launch_file, bag="/b", rviz="true", namespace="cell", use_sim_time="true")
     assert {"predict_server", "push_validator", "push_replay", "rviz2"} == started.keys()
@@ -181,6 +181,6 @@ def test_rviz_is_opened_only_if_wanted_with_the_configuration_beside_the_launch_
     assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
 
 
-def test_the_launch_file_is_installed():
+def test_launch_file_is_installed():
     assert 'glob("launch/*.launch.py")' in (REPOSITORY / "setup.py").read_text()
     assert 'glob("config/*")' in (REPOSITORY / "setup.py").read_text()

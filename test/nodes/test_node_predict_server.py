@@ -1,4 +1,4 @@
-"""predict_server as a process: what it answers, what it refuses, how it starts and ends."""
+"""predict_server as a process: predictions, refusals, start and end."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(folder):
-    """One server for the tests that leave it as it was: the three models, gp the default."""
+    """One server with three models, gp the default, for all tests that do not change it."""
     models = [folder / f"{kind}.model" for kind in ("analytical", "gp", "vhgp")]
     with server_of(models, default_model="gp") as running:
         assert running.state() == "active"
@@ -70,7 +70,7 @@ def server(folder):
 
 
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])
-def test_it_answers_what_the_model_says(server, folder, kind):
+def test_responses_equal_the_models_predictions(server, folder, kind):
     model = tabulate(load_model(folder / f"{kind}.model"))
     expected = model.predict_rows(MANY, np.full(len(MANY), 0.2))
     answered = prediction_from_response(server.batch(MANY, model=kind))
@@ -81,25 +81,25 @@ def test_it_answers_what_the_model_says(server, folder, kind):
             np.testing.assert_allclose(getattr(single, name)[0], getattr(expected, name)[k], rtol=1e-8, atol=1e-14)
 
 
-def test_an_empty_name_means_the_default_model(server):
+def test_empty_name_means_the_default_model(server):
     assert list(server.push().mean) == list(server.push(model="gp").mean)
     assert list(server.push().mean) != list(server.push(model="analytical").mean)
 
 
-def test_a_push_unlike_the_training_pushes_is_answered_and_marked(server):
+def test_push_outside_the_domain_is_predicted_and_flagged(server):
     assert server.push().in_domain
     far = server.push([0.2, 0.1, 0.2])
     assert far.success
     assert not far.in_domain
 
 
-def test_a_batch_of_none_is_answered_with_empty_arrays(server):
+def test_empty_batch_gets_empty_arrays(server):
     response = server.batch(np.empty((0, 3)))
     assert response.success, response.message
     assert [len(response.mean), len(response.covariance), len(response.in_domain)] == [0, 0, 0]
 
 
-def test_a_long_batch_equals_its_parts(server):
+def test_long_batch_equals_its_parts(server):
     long = np.tile(MANY, (500, 1))
     means = np.array(server.batch(long).mean).reshape(-1, 3)
     np.testing.assert_allclose(means, np.tile(means[: len(MANY)], (500, 1)), rtol=1e-9, atol=1e-12)
@@ -120,7 +120,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("field", "value"), BAD)
-def test_a_bad_push_is_refused_by_field_and_value_and_gets_no_number(server, field, value):
+def test_rejects_bad_push_by_field_and_value(server, field, value):
     push = GOOD.copy()
     push[["velocity", "contact", "angle"].index(field)] = value
     response = server.push(push)
@@ -132,7 +132,7 @@ def test_a_bad_push_is_refused_by_field_and_value_and_gets_no_number(server, fie
 
 
 @pytest.mark.parametrize(("field", "value"), BAD)
-def test_one_bad_push_refuses_the_batch_and_is_named_by_index(server, field, value):
+def test_one_bad_push_refuses_the_batch_by_index(server, field, value):
     pushes = MANY.copy()
     pushes[7, ["velocity", "contact", "angle"].index(field)] = value
     response = server.batch(pushes)
@@ -142,7 +142,7 @@ def test_one_bad_push_refuses_the_batch_and_is_named_by_index(server, field, val
 
 
 @pytest.mark.parametrize("duration", [np.nan, np.inf, 0.0, -0.2, 5.0])
-def test_a_bad_duration_is_refused(server, duration):
+def test_rejects_bad_duration(server, duration):
     for response in (
         server.push(duration=duration),
         server.batch(MANY, duration),
@@ -152,18 +152,18 @@ def test_a_bad_duration_is_refused(server, duration):
         assert response.message.startswith(f"duration: {duration!r} is not accepted")
 
 
-def test_the_analytical_model_answers_for_long_pushes(server):
+def test_analytical_model_predicts_long_pushes(server):
     short, long = (np.array(server.push([0.02, 0.125, 0.0], t, "analytical").mean) for t in (0.2, 2.0))
     assert long[0] == pytest.approx(10.0 * short[0], rel=1e-6)  # through the centre: straight on
 
 
-def test_an_unknown_model_is_refused_with_the_names_there_are(server):
+def test_rejects_unknown_model_and_lists_loaded_names(server):
     for response in (server.push(model="nobody"), server.batch(MANY, model="nobody")):
         assert not response.success
         assert response.message == "model: 'nobody' is not accepted, give one of analytical, gp, vhgp"
 
 
-def test_arrays_of_unequal_length_are_refused(server):
+def test_rejects_arrays_of_unequal_length(server):
     request = query_to_batch_request(PushQuery("", MANY, 0.2, {}))
     request.angle = [0.1]
     response = server.call("predict_push_batch", request)
@@ -171,32 +171,32 @@ def test_arrays_of_unequal_length_are_refused(server):
     assert response.message == "angle length: 1 is not accepted, give 20 values, as many as velocity has"
 
 
-def test_a_batch_longer_than_the_limit_is_refused_before_anything_is_computed():
+def test_rejects_too_long_batch_before_any_prediction():
     request = PredictPushBatch.Request(velocity=array("d", bytes(8 * (MAX_PUSHES + 1))))
     with pytest.raises(RequestError) as caught:
         handle_predict_push_batch(lambda: None, ModelRegistry(), request, PredictPushBatch.Response())
     assert str(caught.value) == "velocity length: 1000001 is not accepted, give at most 1000000 pushes a call"
 
 
-def test_one_push_is_answered_while_a_long_batch_is_computed(server):
+def test_single_push_is_answered_during_a_long_batch(server):
     many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (2500, 1)), 0.2, {}))
     batch = server._clients["predict_push_batch"].call_async(many)
     answered = 0
     while not batch.done() and answered < 100_000:
         assert server.push().success
         answered += 1
-    assert batch.done() and answered > 5  # behind the batch there would be one, or two
+    assert batch.done() and answered > 5  # after the batch, only one or two would be answered
     assert len(batch.result().in_domain) == 50_000
 
 
-def test_covariates_that_no_model_needs_change_nothing(server):
+def test_unneeded_covariates_change_nothing(server):
     assert list(server.push(covariates={"temperature": 300.0}).mean) == list(server.push().mean)
     response = server.push(covariates={"temperature": np.nan})
     assert not response.success
     assert response.message.startswith("covariate temperature: nan")
 
 
-def test_what_nobody_foresaw_is_answered_and_logged_and_the_node_lives(folder, monkeypatch, capfd):
+def test_unexpected_exception_becomes_a_logged_refusal(folder, monkeypatch, capfd):
     def broken(registry, request, response):
         response.mean[0] = 1.0
         raise ZeroDivisionError("a bug")
@@ -225,8 +225,8 @@ def test_thirty_requests_in_flight_are_all_answered(server):
     assert all(future.result().success for future in futures)
 
 
-def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
-    """By a prediction, not by the word that the node is inactive.
+def test_first_request_after_start_gets_a_prediction(folder):
+    """The response is a prediction, not the refusal of an inactive node.
 
     On a busy machine `call` may have to ask again, a limit of the middleware: it waits 0.1 s for a client to be known.
     """
@@ -242,7 +242,7 @@ def test_whoever_asks_as_soon_as_the_service_is_there_is_answered(folder):
         assert response.success, response.message
 
 
-def test_a_long_batch_stops_when_the_node_ends(folder):
+def test_long_batch_stops_when_the_node_ends(folder):
     registry = ModelRegistry()
     registry.load(folder / "analytical.model")
     inputs = np.tile(GOOD, (3 * prediction_services.CHUNK, 1))
@@ -259,7 +259,7 @@ def test_a_long_batch_stops_when_the_node_ends(folder):
     assert len(asked) == 2
 
 
-def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folder):
+def test_rejects_too_many_pushes_without_a_table(folder):
     registry = ModelRegistry()
     registry.load(folder / "analytical.model")
     request = query_to_batch_request(PushQuery("", np.tile(GOOD, (prediction_services.MAX_EXACT + 1, 1)), 0.2, {}))
@@ -270,7 +270,7 @@ def test_more_pushes_than_can_be_answered_soon_without_a_table_are_refused(folde
 # --- models -----------------------------------------------------------------------------------------------------
 
 
-def test_models_are_listed_with_what_they_were_made_from(server, folder):
+def test_list_models_describes_the_training_data(server, folder):
     models = server.list()
     assert list(models.names) == ["analytical", "gp", "vhgp"]
     assert models.default_model == "gp"
@@ -287,7 +287,7 @@ def test_models_are_listed_with_what_they_were_made_from(server, folder):
     }
 
 
-def test_a_folder_is_loaded_and_a_damaged_file_in_it_is_reported(folder, tmp_path):
+def test_folder_is_loaded_and_its_damaged_file_is_reported(folder, tmp_path):
     absent = tmp_path / "absent.model"
     with server_of([folder, absent, folder / "damaged.model"]) as server:
         assert list(server.list().names) == ["analytical", "gp", "vhgp"]
@@ -299,7 +299,7 @@ def test_a_folder_is_loaded_and_a_damaged_file_in_it_is_reported(folder, tmp_pat
         assert server.push().success
 
 
-def test_a_node_without_a_model_says_so_and_takes_one_later(folder):
+def test_node_without_a_model_reports_it_and_accepts_one_later(folder):
     with server_of([folder / "damaged.model"]) as server:
         assert server.state() == "inactive"
         refusal = server.push()
@@ -313,7 +313,7 @@ def test_a_node_without_a_model_says_so_and_takes_one_later(folder):
         assert server.push().success
 
 
-def test_loading_replaces_by_name_only_when_the_file_is_good(folder, tmp_path):
+def test_only_a_good_file_replaces_a_loaded_model(folder, tmp_path):
     table, rig = square_pushes(40, seed=1)
     save_model(train_model(table, rig, "analytical", name="gp"), tmp_path / "other.model")
     foreign = tmp_path / "notes.txt"
@@ -344,7 +344,7 @@ def test_pushes_are_answered_while_their_model_is_replaced(folder):
             assert loading.result().success
 
 
-def test_a_loaded_model_can_become_the_default(folder):
+def test_loaded_model_can_become_the_default(folder):
     with server_of([folder / "gp.model"]) as server:
         first = list(server.push().mean)
         assert server.load(folder / "vhgp.model", name="new").name == "new"
@@ -357,7 +357,7 @@ def test_a_loaded_model_can_become_the_default(folder):
         assert list(server.push().mean) == first
 
 
-def test_a_default_that_is_not_loaded_is_not_silently_another(folder):
+def test_missing_default_model_is_not_replaced_by_another(folder):
     with server_of([folder / "gp.model"], default_model="vhgp") as server:
         response = server.push()
         assert not response.success
@@ -371,7 +371,7 @@ def test_a_default_that_is_not_loaded_is_not_silently_another(folder):
 # --- life cycle, parameters, diagnostics ------------------------------------------------------------------------
 
 
-def test_requests_are_refused_while_it_is_not_active(folder):
+def test_inactive_node_refuses_requests(folder):
     with server_of([folder / "gp.model"], autostart=False) as server:
         assert server.state() == "unconfigured"
         assert server.change(Transition.TRANSITION_CONFIGURE)
@@ -398,14 +398,14 @@ def test_activation_fails_without_a_model():
         assert server.state() == "inactive"
 
 
-def test_the_word_default_stands_for_the_shipped_model_and_it_says_that_it_is_simulated():
+def test_default_loads_the_shipped_model_and_warns_that_it_is_simulated():
     with server_of(["default"]) as server:
         assert list(server.list().names) == ["simulated_square_abs"]
         assert server.push().success
         assert "simulated square" in server.process.text()
 
 
-def test_parameters_are_described_and_bad_values_refused_with_a_reason(server):
+def test_parameters_are_described_and_bad_values_rejected_with_a_reason(server):
     names = ["models", "default_model", "autostart", "introspection", "diagnostics_period"]
     described = server.call("push_predictor/describe_parameters", DescribeParameters.Request(names=names)).descriptors
     assert all(descriptor.description for descriptor in described)
@@ -429,7 +429,7 @@ def test_parameters_are_described_and_bad_values_refused_with_a_reason(server):
 
 
 @pytest.mark.parametrize("period", [0.0, 1e6])
-def test_a_period_out_of_range_ends_the_start_with_one_line(folder, period):
+def test_diagnostics_period_out_of_range_ends_the_start_with_one_line(folder, period):
     domain = harness.free_domain()
     params = {"models": [str(folder)], "diagnostics_period": period}
     with harness.node_process("predict_server", domain=domain, params=params) as process:
@@ -439,7 +439,7 @@ def test_a_period_out_of_range_ends_the_start_with_one_line(folder, period):
         assert "Traceback" not in process.text()
 
 
-def test_diagnostics_count_what_was_served_and_refused(server):
+def test_diagnostics_count_answered_and_refused_requests(server):
     _, before = server.next_status()
     server.push()
     server.push([np.nan, 0.1, 0.1])
@@ -456,7 +456,7 @@ def test_diagnostics_count_what_was_served_and_refused(server):
     assert 0.0 < float(values["callback_p50_us"]) <= float(values["callback_p99_us"])
 
 
-def test_introspection_shows_requests_when_it_is_asked_for(server):
+def test_introspection_publishes_requests_when_enabled(server):
     events = []
     server.node.create_subscription(
         PredictPush.Event, "predict_push/_service_event", lambda m: events.append(m), QoSProfile(depth=100)
@@ -478,14 +478,14 @@ def test_introspection_shows_requests_when_it_is_asked_for(server):
         time.sleep(0.5)
         return len(events) == before
 
-    assert harness.wait_until(quiet)  # those of the last requests come after their answers
+    assert harness.wait_until(quiet)  # events of the last requests arrive after their responses
     events.clear()
     server.push(push)
     time.sleep(1.0)
     assert not events
 
 
-def test_the_shipped_configuration_states_the_defaults():
+def test_shipped_configuration_contains_the_defaults():
     (rows,) = yaml.safe_load(CONFIG.read_text()).values()
     assert rows["ros__parameters"] == {param.name: param.default for param in PARAMETERS}
 
@@ -500,7 +500,7 @@ def test_names_follow_the_namespace_with_the_shipped_configuration(folder):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_cleanly(folder, number):
+def test_signal_ends_the_node_with_status_0(folder, number):
     with server_of([folder / "gp.model"]) as server:
         assert server.push().success
         assert server.process.stop(number) == 0
@@ -508,7 +508,7 @@ def test_a_signal_ends_it_cleanly(folder, number):
 
 
 def time_of_its_libraries() -> float:
-    """The processor time that their import takes at present, in s: 0.4 where the limit below was set."""
+    """The processor time to import the libraries, in s; it was 0.4 when the limit below was set."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [sys.executable, "-c", "import rclpy, scipy.linalg"]
     subprocess.run(command, env=harness.node_environment(harness.free_domain()), check=True, timeout=60.0)
@@ -516,8 +516,8 @@ def time_of_its_libraries() -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def test_it_is_ready_within_two_seconds_of_processor_time(folder):
-    """Or in as many times what its libraries take, on a machine that is slow by itself."""
+def test_node_is_ready_within_two_seconds_of_processor_time(folder):
+    """On a slow machine the limit grows with the import time of the libraries."""
     with server_of([folder / "gp.model"]) as server:
         assert server.push().success
         ticks = Path(f"/proc/{server.process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
@@ -529,7 +529,7 @@ def memory_kb(process) -> int:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 
-def test_memory_stays_flat(folder):
+def test_memory_does_not_grow(folder):
     with server_of([folder / "analytical.model"]) as server:
         bad = np.full(3, np.nan)
 
@@ -537,7 +537,7 @@ def test_memory_stays_flat(folder):
             for k in range(count):
                 assert server.push(GOOD if k % 10 else bad).success == bool(k % 10)
 
-        calls(2500)  # the log of requests is full by then
+        calls(2500)  # the statistics have reached their full size by then
         start = memory_kb(server.process)
         calls(2000)
         grown = memory_kb(server.process) - start

@@ -1,4 +1,4 @@
-"""push_replay as others meet it: a process, topics, services, signals."""
+"""push_replay as a process: topics, services, signals."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ CONTROLS = {
 }
 
 
-class Ears:
-    """What a node in the test's process hears of a replay."""
+class ReplayClient:
+    """A node in the test's process that subscribes to everything a replay publishes."""
 
     def __init__(self, node: Node) -> None:
         self.node = node
@@ -70,7 +70,7 @@ class Ears:
         self.states: list[str] = []
         self.clock: list[int] = []
         self.reports: list[dict[str, str]] = []
-        # All at once: when the last is answered, the node has found the others too, and loses none of their answers.
+        # All clients at once: when one is answered, the replay has discovered the others, and no answer is lost.
         self.controls = {kind: node.create_client(kind, f"push_replay/{name}") for kind, name in CONTROLS.items()}
         for topic, kind in KINDS.items():
             node.create_subscription(kind, topic, self.raw[topic].append, 5000, raw=True)
@@ -83,51 +83,56 @@ class Ears:
         self.reports.append({pair.key: pair.value for pair in message.status[0].values})
 
     @property
-    def heard(self) -> int:
+    def received(self) -> int:
         return sum(map(len, self.raw.values()))
 
     def wait_for(self, state: str) -> None:
-        assert wait_until(lambda: self.states[-1:] == [state]), f"heard {self.states}, not {state}"
+        assert wait_until(lambda: self.states[-1:] == [state]), f"received {self.states}, not {state}"
 
     def report(self, state: str) -> dict[str, str]:
-        """What a replay in `state` says about itself."""
+        """The diagnostics of a replay in `state`."""
         assert wait_until(lambda: bool(self.reports) and self.reports[-1]["state"] == state, 120.0), self.states
         return self.reports[-1]
 
-    def hear_all(self, state: str) -> int:
-        """Wait for all that a replay in `state` has published, and count it: states overtake a backlog of messages."""
+    def receive_all(self, state: str) -> int:
+        """Wait for all messages that a replay in `state` has published; returns their number.
+
+        A state can arrive before a backlog of messages.
+        """
         published = int(self.report(state)["published"])
-        assert wait_until(lambda: self.heard >= published), f"heard {self.heard} of {published}"
+        assert wait_until(lambda: self.received >= published), f"received {self.received} of {published}"
         return published
 
 
 @contextmanager
-def replay(bag: Path, *ros_args: str, namespace: str | None = None, **params: Any) -> Iterator[tuple[Any, Ears]]:
-    """A replay that begins once the test listens; parameters with `__` for a dot."""
+def replay(
+    bag: Path, *ros_args: str, namespace: str | None = None, **params: Any
+) -> Iterator[tuple[Any, ReplayClient]]:
+    """A replay that starts when the test has subscribed; parameters with `__` for a dot."""
     domain = free_domain()
     names = {name.replace("__", "."): value for name, value in params.items()}
     given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60, **names}
     with ros_context(domain, namespace) as node:
-        ears = Ears(node)
+        client = ReplayClient(node)
         with node_process("push_replay", *ros_args, domain=domain, namespace=namespace, params=given) as process:
-            yield process, ears
+            yield process, client
 
 
 @contextmanager
 def listener(output: Path, depth: int, domain: int) -> Iterator[Callable[[], dict[str, list[bytes]]]]:
-    """A subscriber in its own process; calling the value ends it and answers what it heard."""
+    """A subscriber in its own process; calling the value ends it and returns the messages that it received."""
     topics = [f"/{topic}=geometry_msgs/msg/{kind.__name__}" for topic, kind in KINDS.items()]
     command = [sys.executable, str(REPOSITORY / "test/support/replay_listener.py"), str(output), str(depth), *topics]
     process = subprocess.Popen(command, cwd=REPOSITORY, env=node_environment(domain))
 
-    def heard() -> dict[str, list[bytes]]:
+    def received() -> dict[str, list[bytes]]:
         process.send_signal(signal.SIGINT)
         assert process.wait(60.0) == 0
         found: dict[str, list[bytes]] = pickle.loads(output.read_bytes())
         return found
 
     try:
-        yield heard
+        yield received
     finally:
         process.kill()
         process.wait()
@@ -151,9 +156,9 @@ def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_bag(tmp_path_factory.mktemp("bags") / "second.mcap", push_messages(1.0))
 
 
-def service(ears: Ears, kind: Any, **request: Any) -> Any:
-    call(ears.controls[IsPaused], IsPaused.Request())
-    return call(ears.controls[kind], kind.Request(**request))
+def service(client: ReplayClient, kind: Any, **request: Any) -> Any:
+    call(client.controls[IsPaused], IsPaused.Request())
+    return call(client.controls[kind], kind.Request(**request))
 
 
 @pytest.mark.parametrize(("duration", "rate", "depth"), [(6.0, 1.0, 1000), (40.0, 100.0, 0)])
@@ -166,141 +171,141 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
     waiting = {"wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60}
     params = {"recording": bag, "play.rate": rate, "exit_when_finished": True, **waiting}
     with (
-        listener(tmp_path / "heard", depth, domain) as heard,
+        listener(tmp_path / "received", depth, domain) as received,
         node_process("push_replay", domain=domain, params=params) as process,
     ):
         assert process.wait(180.0) == 0, process.text()
-        printed, found = process.text(), heard()
+        printed, found = process.text(), received()
     assert f"published {len(messages)} messages" in printed
     assert "lost 0, acknowledged yes" in printed
     for topic in KINDS:
         assert found[f"/{topic}"] == recorded(messages, topic), printed
 
 
-def test_a_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
-    with replay(second, play__start_paused=True) as (_, ears):
-        ears.wait_for("paused")
+def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
+    with replay(second, play__start_paused=True) as (_, client):
+        client.wait_for("paused")
         begin = time.monotonic()
-        service(ears, Resume)
-        assert wait_until(lambda: ears.heard == len(push_messages(1.0)))
-        assert time.monotonic() - begin > 0.99  # from before the first to after the last: a busy machine adds to it
-        report = ears.report("finished")
+        service(client, Resume)
+        assert wait_until(lambda: client.received == len(push_messages(1.0)))
+        assert time.monotonic() - begin > 0.99  # from before the first message to after the last
+        report = client.report("finished")
     assert report["published"] == str(len(push_messages(1.0)))
     assert report["lost"] == "0"
     assert 0.0 < float(report["late_p50_us"]) <= float(report["late_p99_us"]) <= float(report["late_max_us"])
 
 
-def test_a_rate_beyond_the_machine_says_how_far_it_is_behind(tmp_path: Path) -> None:
+def test_too_high_rate_reports_how_far_the_replay_is_behind(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "long.mcap", push_messages(100.0))
-    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, ears):
-        ears.wait_for("paused")
-        service(ears, Resume)
-        report = ears.report("finished")
-    assert float(report["late_max_us"]) > 1.0e5  # 62 500 messages in 100 us of wall time cannot be
+    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, client):
+        client.wait_for("paused")
+        service(client, Resume)
+        report = client.report("finished")
+    assert float(report["late_max_us"]) > 1.0e5  # 62 500 messages in 100 us of wall time are impossible
     assert report["published"] == str(len(push_messages(100.0)))
 
 
 def test_rig_status_and_clock_are_published(tmp_path: Path) -> None:
     end = START + 4 * 10**9
-    with replay(write_bag(tmp_path / "four.mcap", push_messages(4.0))) as (_, ears):
-        ears.wait_for("finished")
-        assert [json.loads(text) for text in ears.rig] == [RIG]
-        assert ears.states in (["playing", "finished"], ["finished"])
-        assert ears.clock == sorted(ears.clock)
-        during = sorted(t for t in set(ears.clock) if START <= t < end)
+    with replay(write_bag(tmp_path / "four.mcap", push_messages(4.0))) as (_, client):
+        client.wait_for("finished")
+        assert [json.loads(text) for text in client.rig] == [RIG]
+        assert client.states in (["playing", "finished"], ["finished"])
+        assert client.clock == sorted(client.clock)
+        during = sorted(t for t in set(client.clock) if START <= t < end)
         gaps = [after - before for before, after in itertools.pairwise(during)]
-        assert statistics.median(gaps) == pytest.approx(25e6, rel=0.2)  # 40 Hz; a busy machine leaves some out
+        assert statistics.median(gaps) == pytest.approx(25e6, rel=0.2)  # 40 Hz; some are missing on a busy machine
         assert len(during) < 170
-        assert max(ears.clock) <= end
+        assert max(client.clock) <= end
 
 
-def test_a_late_subscriber_still_gets_the_rig(second: Path) -> None:
-    with replay(second) as (_, ears):
-        ears.wait_for("finished")
+def test_late_subscriber_receives_the_rig(second: Path) -> None:
+    with replay(second) as (_, client):
+        client.wait_for("finished")
         late: list[str] = []
-        ears.node.create_subscription(String, "rig", lambda m: late.append(m.data), LATCHED)
+        client.node.create_subscription(String, "rig", lambda m: late.append(m.data), LATCHED)
         assert wait_until(lambda: len(late) == 1)
 
 
-def test_a_rig_file_takes_the_place_of_the_record(second: Path, tmp_path: Path) -> None:
+def test_rig_file_replaces_the_record(second: Path, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({**RIG, "surface": "delrin"}))
-    with replay(second, rig=tmp_path / "other.yaml", play__start_paused=True) as (_, ears):
-        assert wait_until(lambda: bool(ears.rig))
-        assert json.loads(ears.rig[0])["surface"] == "delrin"
+    with replay(second, rig=tmp_path / "other.yaml", play__start_paused=True) as (_, client):
+        assert wait_until(lambda: bool(client.rig))
+        assert json.loads(client.rig[0])["surface"] == "delrin"
 
 
-def test_a_recording_without_a_rig_plays_and_says_how_to_give_one(tmp_path: Path) -> None:
+def test_recording_without_a_rig_plays_and_warns_how_to_give_one(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "norig.mcap", push_messages(0.1), rig=None)
-    with replay(bag) as (process, ears):
-        ears.wait_for("finished")
-        assert ears.rig == []
+    with replay(bag) as (process, client):
+        client.wait_for("finished")
+        assert client.rig == []
         assert "push_rig lacks shape" in process.text()
         assert "node parameter 'rig'" in process.text()
 
 
-def test_the_controls_of_a_paused_player(second: Path) -> None:
-    with replay(second, play__start_paused=True) as (_, ears):
-        ears.wait_for("paused")
-        assert service(ears, IsPaused).paused
-        assert service(ears, PlayNext).success
-        assert service(ears, Burst, num_messages=9).actually_burst == 9
-        assert wait_until(lambda: ears.heard == 10)
-        assert not service(ears, Play).success
-        assert service(ears, Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
-        assert service(ears, Burst, num_messages=0).actually_burst == 62
-        ears.wait_for("finished")
-        assert ears.report("finished")["acknowledged"] == "yes"
+def test_paused_player_steps_bursts_and_seeks(second: Path) -> None:
+    with replay(second, play__start_paused=True) as (_, client):
+        client.wait_for("paused")
+        assert service(client, IsPaused).paused
+        assert service(client, PlayNext).success
+        assert service(client, Burst, num_messages=9).actually_burst == 9
+        assert wait_until(lambda: client.received == 10)
+        assert not service(client, Play).success
+        assert service(client, Seek, time=Time(sec=START // 10**9, nanosec=900_000_000)).success
+        assert service(client, Burst, num_messages=0).actually_burst == 62
+        client.wait_for("finished")
+        assert client.report("finished")["acknowledged"] == "yes"
 
 
 def test_pause_rate_stop_and_play_again(second: Path) -> None:
-    with replay(second, play__rate=0.1) as (_, ears):
-        ears.wait_for("playing")
-        assert service(ears, GetRate).rate == pytest.approx(0.1)
-        assert not service(ears, SetRate, rate=0.0).success
-        service(ears, Pause)
-        ears.wait_for("paused")
-        published = ears.hear_all("paused")
+    with replay(second, play__rate=0.1) as (_, client):
+        client.wait_for("playing")
+        assert service(client, GetRate).rate == pytest.approx(0.1)
+        assert not service(client, SetRate, rate=0.0).success
+        service(client, Pause)
+        client.wait_for("paused")
+        published = client.receive_all("paused")
         time.sleep(0.5)
-        assert (ears.heard, ears.states[-1]) == (published, "paused")
-        service(ears, TogglePaused)
-        assert not service(ears, IsPaused).paused
-        service(ears, Stop)
-        ears.wait_for("finished")
-        assert ears.hear_all("finished") < len(push_messages(1.0))
-        assert service(ears, SetRate, rate=5.0).success
-        for messages in ears.raw.values():
+        assert (client.received, client.states[-1]) == (published, "paused")
+        service(client, TogglePaused)
+        assert not service(client, IsPaused).paused
+        service(client, Stop)
+        client.wait_for("finished")
+        assert client.receive_all("finished") < len(push_messages(1.0))
+        assert service(client, SetRate, rate=5.0).success
+        for messages in client.raw.values():
             messages.clear()
-        assert service(ears, Play, start_offset=Time(nanosec=500_000_000)).success
-        assert wait_until(lambda: ears.heard == len(push_messages(1.0)) - 313)
+        assert service(client, Play, start_offset=Time(nanosec=500_000_000)).success
+        assert wait_until(lambda: client.received == len(push_messages(1.0)) - 313)
 
 
 def test_restamping_adds_one_offset_and_keeps_rate_1(second: Path) -> None:
     messages = push_messages(1.0)
     begin = time.time_ns()
-    with replay(second, restamp=True) as (_, ears):
-        assert wait_until(lambda: bool(ears.states))
-        assert not service(ears, SetRate, rate=2.0).success
-        assert service(ears, GetRate).rate == 1.0
-        assert ears.hear_all("finished") == len(messages)
+    with replay(second, restamp=True) as (_, client):
+        assert wait_until(lambda: bool(client.states))
+        assert not service(client, SetRate, rate=2.0).success
+        assert service(client, GetRate).rate == 1.0
+        assert client.receive_all("finished") == len(messages)
     offsets = {
-        stamp(new) - stamp(old) for t in KINDS for new, old in zip(ears.raw[t], recorded(messages, t), strict=True)
+        stamp(new) - stamp(old) for t in KINDS for new, old in zip(client.raw[t], recorded(messages, t), strict=True)
     }
     assert len(offsets) == 1
     assert begin <= START + offsets.pop() <= time.time_ns()
     assert all(
         new[12:] == old[12:]
-        for new, old in zip(ears.raw["slider/pose"], recorded(messages, "slider/pose"), strict=True)
+        for new, old in zip(client.raw["slider/pose"], recorded(messages, "slider/pose"), strict=True)
     )
-    assert all(begin <= t <= time.time_ns() for t in ears.clock)
+    assert all(begin <= t <= time.time_ns() for t in client.clock)
 
 
 def test_namespace_and_remapping_move_the_topics(second: Path) -> None:
-    with replay(second, "-r", "slider/pose:=/vicon/pose", namespace="/rig1") as (_, ears):
+    with replay(second, "-r", "slider/pose:=/vicon/pose", namespace="/rig1") as (_, client):
         moved: list[bytes] = []
-        ears.node.create_subscription(PoseStamped, "/vicon/pose", moved.append, 1000, raw=True)
-        ears.node.create_subscription(PoseStamped, "slider/pose", lambda m: None, 10)
-        assert wait_until(lambda: len(moved) + len(ears.raw["pusher/pose"]) == 500), ears.heard
-        assert ears.raw["slider/pose"] == []
+        client.node.create_subscription(PoseStamped, "/vicon/pose", moved.append, 1000, raw=True)
+        client.node.create_subscription(PoseStamped, "slider/pose", lambda m: None, 10)
+        assert wait_until(lambda: len(moved) + len(client.raw["pusher/pose"]) == 500), client.received
+        assert client.raw["slider/pose"] == []
 
 
 @pytest.mark.parametrize(
@@ -316,52 +321,55 @@ def test_namespace_and_remapping_move_the_topics(second: Path) -> None:
     ],
 )
 def test_topics_are_filtered_as_rosbag2_does(second: Path, options: dict[str, Any], played: set[str]) -> None:
-    with replay(second, play__rate=10.0, play__wait_acked_timeout=-1.0, **options) as (_, ears):
-        ears.hear_all("finished")
-        assert {topic for topic, heard in ears.raw.items() if heard} == played
+    with replay(second, play__rate=10.0, play__wait_acked_timeout=-1.0, **options) as (_, client):
+        client.receive_all("finished")
+        assert {topic for topic, received in client.raw.items() if received} == played
 
 
-def test_offset_and_duration_choose_a_part(second: Path) -> None:
+def test_offset_and_duration_select_a_part(second: Path) -> None:
     options = {"play__start_offset__nsec": 500_000_000, "play__playback_duration": 0.1}
-    with replay(second, **options) as (_, ears):
-        ears.hear_all("finished")
-        stamps = [stamp(data) for data in ears.raw["pusher/wrench"]]
+    with replay(second, **options) as (_, client):
+        client.receive_all("finished")
+        stamps = [stamp(data) for data in client.raw["pusher/wrench"]]
     assert stamps == [START + 10**6 * (504 + 8 * k) for k in range(12)]
 
 
-def test_a_damaged_recording_plays_up_to_the_damage_and_names_it(tmp_path: Path) -> None:
+def test_damaged_recording_plays_up_to_the_damage_and_names_it(tmp_path: Path) -> None:
     messages = push_messages(8.0)
     whole = write_bag(tmp_path / "whole.mcap", messages).read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
-    with replay(cut, play__rate=20.0) as (process, ears):
-        ears.hear_all("finished")
-        report = ears.report("finished")
-        heard = ears.raw["slider/pose"]
-        assert 100 < len(heard) < 2000
-        assert heard == recorded(messages, "slider/pose")[: len(heard)]
+    with replay(cut, play__rate=20.0) as (process, client):
+        client.receive_all("finished")
+        report = client.report("finished")
+        received = client.raw["slider/pose"]
+        assert 100 < len(received) < 2000
+        assert received == recorded(messages, "slider/pose")[: len(received)]
         assert str(cut) in report["damage"]
         assert wait_until(lambda: "damaged: " in process.text())
 
 
-def test_an_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
+def test_unknown_type_is_skipped_and_reported(tmp_path: Path) -> None:
     alien = [("/alien", "alien_msgs/msg/Saucer", START, b"\0\1\0\0\0\0\0\0")]
     bag = write_bag(tmp_path / "alien.mcap", alien + push_messages(0.2))
-    with replay(bag) as (_, ears):
-        report = ears.report("finished")
+    with replay(bag) as (_, client):
+        report = client.report("finished")
     assert "alien_msgs" in json.loads(report["not_published"])["/alien"]
     assert report["published"] == str(len(push_messages(0.2)))
 
 
-def test_qos_follows_the_file_of_overrides_and_the_parameters(second: Path, tmp_path: Path) -> None:
+def test_qos_follows_override_file_and_parameters(second: Path, tmp_path: Path) -> None:
     (tmp_path / "qos.yaml").write_text("/slider/pose: {reliability: best_effort, depth: 7}\n")
     options = {"play__qos_profile_overrides_path": tmp_path / "qos.yaml", "play__start_paused": True}
-    options["wait_for_subscribers"] = 0.0  # a reliable subscriber never meets a best-effort publisher
-    with replay(second, "-p", "qos_overrides./pusher/pose.publisher.reliability:=best_effort", **options) as (_, ears):
-        ears.wait_for("paused")
-        (slider,) = ears.node.get_publishers_info_by_topic("/slider/pose")
-        (pusher,) = ears.node.get_publishers_info_by_topic("/pusher/pose")
-        (wrench,) = ears.node.get_publishers_info_by_topic("/pusher/wrench")
+    options["wait_for_subscribers"] = 0.0  # a reliable subscriber never matches a best-effort publisher
+    with replay(second, "-p", "qos_overrides./pusher/pose.publisher.reliability:=best_effort", **options) as (
+        _,
+        client,
+    ):
+        client.wait_for("paused")
+        (slider,) = client.node.get_publishers_info_by_topic("/slider/pose")
+        (pusher,) = client.node.get_publishers_info_by_topic("/pusher/pose")
+        (wrench,) = client.node.get_publishers_info_by_topic("/pusher/wrench")
     assert slider.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     assert pusher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     assert wrench.qos_profile.reliability == ReliabilityPolicy.RELIABLE
@@ -376,18 +384,18 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
         "delayed": {"play__delay": 60.0},
         "finished": {"play__rate": 1000.0},
     }[state]
-    with replay(second, **options) as (process, ears):
+    with replay(second, **options) as (process, client):
         if state == "delayed":
-            assert wait_until(lambda: bool(ears.reports))
+            assert wait_until(lambda: bool(client.reports))
         else:
-            ears.wait_for(state)
-        assert process.stop(number, timeout=20.0) == 0  # it would be delayed or play for longer
+            client.wait_for(state)
+        assert process.stop(number, timeout=20.0) == 0  # without the signal it would play for longer
         assert "Traceback" not in process.text()
         assert "late p50" in process.text()
 
 
 @pytest.mark.parametrize(
-    ("params", "said"),
+    ("params", "text"),
     [
         ({}, "recording: '' is not accepted"),
         ({"recording": "/nowhere.mcap"}, "/nowhere.mcap: cannot be read"),
@@ -402,17 +410,17 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
         ({"qos_overrides./slider/pose.publisher.reliability": "perhaps"}, "reliability"),
     ],
 )
-def test_a_bad_parameter_is_one_line_and_status_1(second: Path, params: dict[str, Any], said: str) -> None:
+def test_bad_parameter_ends_in_one_line_and_status_1(second: Path, params: dict[str, Any], text: str) -> None:
     given = {"recording": second, **params} if params else {}
     with node_process("push_replay", domain=free_domain(), params=given) as process:
         assert process.wait(60.0) == 1
         lines = process.text().splitlines()
     assert len(lines) == 1, lines
     assert lines[0].startswith("push_replay: ")
-    assert said in lines[0]
+    assert text in lines[0]
 
 
-def test_a_big_endian_stamp_is_restamped_too() -> None:
+def test_big_endian_stamp_is_restamped() -> None:
     from push_predictor.replay.restamper import Restamper
 
     restamper = Restamper(lambda: START + 5 * 10**9)
@@ -423,7 +431,7 @@ def test_a_big_endian_stamp_is_restamped_too() -> None:
     assert struct.unpack_from(">iI", big, 4) == (START // 10**9 + 5, 0)
 
 
-def test_the_configuration_file_lists_every_parameter_with_its_default() -> None:
+def test_configuration_file_lists_every_parameter_with_its_default() -> None:
     listed = yaml.safe_load((REPOSITORY / "config/push_replay.yaml").read_text())["/**/push_replay"]["ros__parameters"]
     assert flat(listed) == {param.name: param.default for param in PARAMETERS}
 
@@ -435,7 +443,7 @@ def flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-def test_bags_of_the_test_hold_messages_that_ros_understands() -> None:
+def test_bags_of_the_test_contain_messages_that_ros_can_read() -> None:
     from rclpy.serialization import deserialize_message
 
     pose = deserialize_message(stamped(START, [1, 2, 3, 0, 0, 0, 1]), PoseStamped)

@@ -1,4 +1,4 @@
-"""rollout_pushes of predict_server over DDS, and the frame that its poses and samples are in."""
+"""The service rollout_pushes of predict_server, and the frame of its poses and samples."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ask(folder: Path) -> Iterator[Ask]:
-    """From what differs from the usual request to the response."""
+    """A function from changes of the usual request to the response."""
     domain = harness.free_domain()
     running = harness.node_process("predict_server", domain=domain, params={"models": [str(folder)]})
     with running, harness.ros_context(domain) as node:
@@ -81,7 +81,7 @@ def planar(pose: PoseWithCovariance) -> tuple[Array, Array]:
     return np.array([place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w)]), matrix
 
 
-def test_it_answers_what_the_library_says(ask: Ask, folder: Path) -> None:
+def test_response_equals_the_librarys_rollout(ask: Ask, folder: Path) -> None:
     response = ask(particles=7, seed=11)
     assert response.success, response.message
     expected = rollout(tabulate(load_model(folder / "gp.model")), SLIDER, COVARIANCE, STEPS, PARTICLES, 11)
@@ -93,7 +93,7 @@ def test_it_answers_what_the_library_says(ask: Ask, folder: Path) -> None:
     np.testing.assert_allclose(np.reshape(response.samples, (7, 3)), expected.samples[:7], atol=1e-9)
 
 
-def test_the_poses_do_not_depend_on_how_many_samples_are_wanted(ask: Ask) -> None:
+def test_poses_do_not_depend_on_the_number_of_samples(ask: Ask) -> None:
     none, some = ask(seed=3), ask(particles=200, seed=3)
     assert len(none.samples) == 0 and len(some.samples) == 600
     assert none.poses == some.poses
@@ -103,17 +103,17 @@ def test_the_poses_do_not_depend_on_how_many_samples_are_wanted(ask: Ask) -> Non
     np.testing.assert_allclose(samples[:, :2].mean(axis=0), planar(many.poses[-1])[0][:2], atol=1e-12)
 
 
-def test_the_same_seed_gets_the_same_answer(ask: Ask) -> None:
+def test_same_seed_gives_the_same_response(ask: Ask) -> None:
     one, again, other = (ask(particles=5, seed=seed) for seed in (2**63, 2**63, 1))
     assert one == again and one.samples != other.samples
 
 
-def test_no_steps_are_answered_with_no_poses(ask: Ask) -> None:
+def test_no_steps_give_no_poses(ask: Ask) -> None:
     response = ask(steps=[], particles=4)
     assert response.success and response.poses == [] and len(response.samples) == 12
 
 
-def test_it_says_when_samples_leave_what_the_model_has_learnt(ask: Ask) -> None:
+def test_message_reports_samples_that_leave_the_domain(ask: Ask) -> None:
     assert ask(covariance=np.zeros((3, 3)), steps=[[0.02, 0.1, 0.1, 0.2]]).message == ""
     response = ask(steps=[STEPS[0], [0.5, 0.1, 0.1, 0.2]])
     assert response.success
@@ -134,13 +134,13 @@ def test_it_says_when_samples_leave_what_the_model_has_learnt(ask: Ask) -> None:
         ({"frame": "camera"}, "header.frame_id: 'camera'"),
     ],
 )
-def test_what_cannot_be_answered_is_refused_in_words(ask: Ask, change: dict[str, Any], message: str) -> None:
+def test_rejects_bad_request_by_field_and_value(ask: Ask, change: dict[str, Any], message: str) -> None:
     response = ask(**change)
     assert not response.success and message in response.message
     assert response.poses == [] and len(response.samples) == 0
 
 
-def test_a_quaternion_that_is_none_is_refused(ask: Ask) -> None:
+def test_rejects_quaternion_without_unit_norm(ask: Ask) -> None:
     wrong = request()
     wrong.slider.pose.orientation.w = 3.0
     with pytest.raises(RequestError, match=r"slider\.pose\.orientation norm"):
@@ -149,10 +149,10 @@ def test_a_quaternion_that_is_none_is_refused(ask: Ask) -> None:
 
 @pytest.mark.parametrize("quaternion", [vertical_turn(0.7), np.array([0.6, 0.8, 0.0, 0.0])], ids=["turned", "below"])
 def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quaternion: Array) -> None:
-    """The same slider told in another frame, such as that of a camera below the table: the same outcome there."""
+    """A request in another frame, such as that of a camera below the table, gets the same outcome in that frame."""
     model, frame = load_model(folder / "gp.model"), SpatialPose(np.array([1.0, -2.0, 0.5]), quaternion)
     in_world = answered(model, request(particles=3), SAME_FRAME)
-    in_frame = answered(model, told_in(frame, request(particles=3)), frame)
+    in_frame = answered(model, seen_in(frame, request(particles=3)), frame)
     for one, other in zip(in_world.poses, in_frame.poses, strict=True):
         back, expected = frame @ pose_in_space(other), pose_in_space(one)
         np.testing.assert_allclose(back.position, expected.position, atol=1e-9)
@@ -167,14 +167,14 @@ def test_poses_and_samples_are_in_the_frame_of_the_request(folder: Path, quatern
         np.testing.assert_allclose(ahead, [np.cos(heading), np.sin(heading), 0.0], atol=1e-9)
 
 
-def test_a_slider_that_does_not_lie_flat_is_refused() -> None:
+def test_rejects_slider_that_does_not_lie_flat() -> None:
     tilted = SpatialPose(np.zeros(3), np.array([np.sin(0.1), 0.0, 0.0, np.cos(0.1)]))
     with pytest.raises(RequestError, match=r"orientation tilt: 0\.2 .*flat within 0\.1 rad"):
         world_slider(query_from_rollout_request(request()), tilted)
 
 
 def answered(model: PushModel, message: RolloutPushes.Request, frame: SpatialPose) -> RolloutPushes.Response:
-    """What the server answers to a request whose frame lies in the world as `frame`."""
+    """The response to a request whose frame has the pose `frame` in the world."""
     response, query = RolloutPushes.Response(), query_from_rollout_request(message)
     slider = world_slider(query, frame)
     rolled = rollout(model, slider.planar, slider.covariance, query.steps, 200, query.seed)
@@ -182,8 +182,8 @@ def answered(model: PushModel, message: RolloutPushes.Request, frame: SpatialPos
     return response
 
 
-def told_in(frame: SpatialPose, message: RolloutPushes.Request) -> RolloutPushes.Request:
-    """The request of the world, told in another frame."""
+def seen_in(frame: SpatialPose, message: RolloutPushes.Request) -> RolloutPushes.Request:
+    """A request in the world frame, transformed into another frame."""
     there = frame.inverse @ pose_in_space(message.slider)
     position, turn = message.slider.pose.position, message.slider.pose.orientation
     position.x, position.y, position.z = there.position.tolist()

@@ -1,4 +1,4 @@
-"""predict_slider_pose of predict_server over DDS: the slider after a push, in the frame of the request."""
+"""The service predict_slider_pose of predict_server: the slider after a push, in the frame of the request."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ PUSH = WorldPush(np.array([0.3, 0.1, 0.0]), np.array([0.25025, 0.11]), np.array(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A learnt and an analytical model of the square."""
+    """A learned and an analytical model of the square."""
     place, rng = tmp_path_factory.mktemp("models"), np.random.default_rng(0)
     table, rig = square_pushes(60)
-    shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs go together
+    shared = rng.standard_normal((60, 1)) * [1e-4, 2e-4, 5e-3]  # so that the outputs are correlated
     table = replace(table, outcomes=table.outcomes + shared, inputs=table.inputs + rng.random((60, 1)) * [2e-4, 0, 0])
     for kind in ("gp", "analytical"):
         save_model(train_model(table, rig, kind, name=kind), place / f"{kind}.model")
@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextlib.contextmanager
 def server_of(folder: Path, **params: Any) -> Iterator[Any]:
-    """Runs the server; gives a function from a change of EXAMPLE to the response."""
+    """Run the server; yield a function from changes of EXAMPLE to the response."""
     domain = harness.free_domain()
     params = {"models": [str(folder)], "default_model": "gp", **params}
     running = harness.node_process("predict_server", domain=domain, params=params)
@@ -68,7 +68,7 @@ def filled(message: Any, values: dict[str, Any]) -> Any:
 
 
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_it_answers_what_the_library_says(ask: Any, folder: Path, kind: str) -> None:
+def test_response_equals_the_librarys_prediction(ask: Any, folder: Path, kind: str) -> None:
     response = ask(model=kind)
     expected = slider_after(tabulate(load_model(folder / f"{kind}.model")), PUSH)
     assert response.success, response.message
@@ -82,13 +82,13 @@ def test_it_answers_what_the_library_says(ask: Any, folder: Path, kind: str) -> 
     assert response.slider_after.header.frame_id == "world"
 
 
-def test_the_example_is_in_the_domain_and_moves_the_slider(ask: Any) -> None:
+def test_example_is_in_the_domain_and_moves_the_slider(ask: Any) -> None:
     response = ask()
     assert response.in_domain
     assert 0.002 < response.slider_after.pose.pose.position.x - 0.3 < 0.006
 
 
-def test_the_answer_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
+def test_response_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
     header = {"frame_id": "world", "stamp": {"sec": 7, "nanosec": 900_000_000}}
     stamp = ask(header=header).slider_after.header.stamp
     assert (stamp.sec, stamp.nanosec) == (8, 100_000_000)
@@ -110,23 +110,23 @@ def test_the_answer_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
         ({"header": {"frame_id": "map"}}, ("header.frame_id: 'map' is not accepted, give 'world'",)),
     ],
 )
-def test_a_bad_request_gets_a_reason_and_no_number(ask: Any, change: dict[str, Any], names: tuple[str, ...]) -> None:
+def test_rejects_bad_request_with_a_reason(ask: Any, change: dict[str, Any], names: tuple[str, ...]) -> None:
     response = ask(**change)
     assert not response.success
     for name in names:
         assert name in response.message
     assert response.slider_after == PoseWithCovarianceStamped()
     assert not response.in_domain
-    assert ask().success  # and the server goes on
+    assert ask().success  # the server continues
 
 
 @pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2_ros is installed here")
-def test_without_tf_the_refusal_says_so(ask: Any) -> None:
+def test_refusal_states_that_tf_is_missing(ask: Any) -> None:
     expected = "header.frame_id: 'map' is not accepted, give 'world'; tf2_ros is not installed"
     assert ask(header={"frame_id": "map"}).message == expected
 
 
-def test_the_world_has_the_name_that_a_parameter_gives_it(folder: Path) -> None:
+def test_world_frame_has_the_name_from_the_parameter(folder: Path) -> None:
     with server_of(folder, world_frame="table") as ask:
         assert ask(header={"frame_id": "table"}).slider_after.header.frame_id == "table"
         assert "give 'table'" in ask(header={"frame_id": "world"}).message

@@ -1,4 +1,4 @@
-"""The action trace_residual over the graph: a goal, its feedback and result, and everything that can come between."""
+"""The action trace_residual: goal, feedback and result, cancellation and failures."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def drifting(place: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def server(place: Path) -> Iterator[Server]:
-    """One server for the tests that leave it as it was."""
+    """One server for all tests that do not change it."""
     with server_of(place / "deployed.pushmodel") as running:
         yield running
 
@@ -51,7 +51,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
+def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
     place: Path, server: Server, drifting: Path
 ) -> None:
     goal, answered = server.trace(drifting), 0
@@ -61,8 +61,8 @@ def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
         time.sleep(0.02)
     status, result = goal.end()
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True), result.message
-    assert answered > 20  # behind the trace there would be one, or two
-    # Feedback and result are taken apart from each other, in either order.
+    assert answered > 20  # after the trace, only one or two would be answered
+    # Feedback and result can arrive in either order.
     assert harness.wait_until(lambda: goal.stages[-1:] == [("done", 1.0)]), goal.stages
     shares = [share for _, share in goal.stages]
     assert {"measurement", "motion", "report", "done"} <= dict(goal.stages).keys()
@@ -80,10 +80,10 @@ def test_a_trace_ends_in_a_model_that_load_model_takes_while_predictions_go_on(
     assert not refused.success and "covariate elapsed_time" in refused.message
     early, late = (server.push({"elapsed_time": at}, "extended") for at in (0.0, 1000.0))
     assert early.success and late.success and list(early.mean) != list(late.mean)
-    assert server.push().success  # the deployed model is served as before
+    assert server.push().success  # the deployed model still predicts
 
 
-def test_a_cancelled_trace_leaves_nothing(server: Server, drifting: Path) -> None:
+def test_cancelled_trace_leaves_no_files(server: Server, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
     worker = server.held(goal)
@@ -94,7 +94,7 @@ def test_a_cancelled_trace_leaves_nothing(server: Server, drifting: Path) -> Non
     assert server.push().success
 
 
-def test_a_second_goal_is_refused_with_the_reason(server: Server, drifting: Path, tmp_path: Path) -> None:
+def test_second_goal_is_refused_with_the_reason(server: Server, drifting: Path, tmp_path: Path) -> None:
     first = server.trace(drifting, covariates=[])
     server.held(first)
     status, result = server.trace(tmp_path / "other").end()
@@ -105,7 +105,7 @@ def test_a_second_goal_is_refused_with_the_reason(server: Server, drifting: Path
     assert first.end()[0] == GoalStatus.STATUS_CANCELED
 
 
-def test_a_worker_that_dies_is_told_and_the_server_lives_on(server: Server, drifting: Path) -> None:
+def test_killed_process_aborts_the_goal_and_the_server_continues(server: Server, drifting: Path) -> None:
     before = names(drifting)
     goal = server.trace(drifting, covariates=[])
     os.kill(server.held(goal), signal.SIGKILL)
@@ -131,7 +131,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_a_bad_goal_is_told_what_is_wrong_with_it(case: str, server: Server, drifting: Path) -> None:
+def test_bad_goal_is_aborted_with_the_reason(case: str, server: Server, drifting: Path) -> None:
     given, words = BAD[case]
     request: dict[str, Any] = {"output": drifting, **given}
     change = request.pop("change", lambda folder: None)
@@ -145,9 +145,7 @@ def test_a_bad_goal_is_told_what_is_wrong_with_it(case: str, server: Server, dri
     assert ".trace-" not in result.message and names(drifting) == before
 
 
-def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
-    server: Server, drifting: Path, tmp_path: Path
-) -> None:
+def test_goal_without_data_uses_those_of_a_running_validator(server: Server, drifting: Path, tmp_path: Path) -> None:
     last = (drifting / "pushes.csv").read_text().splitlines()[-1]
     with (drifting / "pushes.csv").open("a") as stream:
         stream.write(last[: len(last) // 2])  # the validator is writing
@@ -155,7 +153,7 @@ def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
     save_model(train_model(pushes(20, 4), square_rig(), "analytical", name="deployed"), model)
     params, status = {"model": model, "output": drifting}, Status(server.node)
     with harness.node_process("push_validator", domain=server.domain, params=params):
-        # A validator that sees predict_push has found the server's other services and clients, made earlier, as well.
+        # A validator that has discovered predict_push has also discovered the server's earlier services and clients.
         assert harness.wait_until(lambda: bool(status.all) and "No node offers" not in status.message), status.message
         ended, result = server.trace(tmp_path / "elsewhere").end()
         assert ended == GoalStatus.STATUS_SUCCEEDED, result.message
@@ -163,7 +161,7 @@ def test_without_data_of_its_own_it_takes_those_of_the_validator_that_runs(
         assert load_model(tmp_path / "elsewhere" / EXTENDED).needs == ("elapsed_time",)
 
 
-def test_a_node_that_ends_tells_its_client_and_takes_the_trace_with_it(place: Path, drifting: Path) -> None:
+def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting: Path) -> None:
     before = names(drifting)
     with server_of(place / "deployed.pushmodel", trace_alpha=0.05) as server:
         harness.call(server.change, ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE)))
@@ -180,13 +178,13 @@ def test_a_node_that_ends_tells_its_client_and_takes_the_trace_with_it(place: Pa
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0, -1.0])
-def test_a_level_out_of_range_is_refused_at_start(alpha: float) -> None:
+def test_rejects_alpha_out_of_range_at_start(alpha: float) -> None:
     with harness.node_process("predict_server", domain=harness.free_domain(), params={"trace_alpha": alpha}) as node:
         assert node.wait(harness.START_TIMEOUT) == 1
         assert f"trace_alpha: {alpha} is not accepted" in node.text()
 
 
-def test_what_can_be_traced_in_a_folder(tmp_path: Path) -> None:
+def test_evidence_in_a_folder(tmp_path: Path) -> None:
     assert evidence_in(tmp_path / "absent") == () == evidence_in(tmp_path)
     for bag in ("second", "first", "residuals"):
         (tmp_path / bag).mkdir()

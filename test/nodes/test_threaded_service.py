@@ -1,4 +1,4 @@
-"""ThreadedService: a service that no executor has to get round to."""
+"""ThreadedService: a service that answers without an executor."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def thread_name(request: Trigger.Request, response: Trigger.Response) -> Trigger
     return response
 
 
-def test_it_answers_though_nobody_spins_its_node(client_node, server):
+def test_answers_without_an_executor(client_node, server):
     service = ThreadedService(server, Trigger, "alone", thread_name, DEPTH)
     service.start()
     client = client_node.create_client(Trigger, "alone", qos_profile=DEPTH)
@@ -44,7 +44,7 @@ def test_it_answers_though_nobody_spins_its_node(client_node, server):
     service.close()
 
 
-def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_node, server):
+def test_executor_ignores_it_and_serves_the_other_services(client_node, server):
     service = ThreadedService(server, Trigger, "direct", thread_name, DEPTH)
     service.start()
     server.create_service(Trigger, "usual", thread_name, qos_profile=DEPTH)
@@ -63,7 +63,7 @@ def test_the_executor_of_its_node_leaves_it_alone_and_serves_the_others(client_n
         spinning.join()
 
 
-def test_requests_that_arrive_together_are_all_answered(client_node, server):
+def test_simultaneous_requests_are_all_answered(client_node, server):
     service = ThreadedService(server, Trigger, "many", thread_name, DEPTH)
     service.start()
     client = client_node.create_client(Trigger, "many", qos_profile=DEPTH)
@@ -73,7 +73,7 @@ def test_requests_that_arrive_together_are_all_answered(client_node, server):
     service.close()
 
 
-def test_requests_wait_until_it_begins_and_those_that_wait_when_it_ends_are_answered(client_node, server):
+def test_requests_queue_until_start_and_close_answers_the_queue(client_node, server):
     def slow(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         time.sleep(0.05)
         return thread_name(request, response)
@@ -89,7 +89,7 @@ def test_requests_wait_until_it_begins_and_those_that_wait_when_it_ends_are_answ
     assert harness.wait_until(lambda: all(future.done() for future in futures))
 
 
-def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(client_node, server, capfd):
+def test_exception_in_the_callback_is_logged_and_the_next_request_answered(client_node, server, capfd):
     def broken_once(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if not asked:
             asked.append(request)
@@ -108,8 +108,8 @@ def test_a_callback_that_raises_is_logged_and_the_next_request_is_answered(clien
     service.close()
 
 
-def test_closing_ends_the_thread_and_takes_the_service_off_the_graph(client_node, server):
-    for _ in range(3):  # it can be offered again
+def test_close_ends_the_thread_and_destroys_the_service(client_node, server):
+    for _ in range(3):  # the service can be created again
         service = ThreadedService(server, Trigger, "passing", thread_name, DEPTH)
         service.start()
         client = client_node.create_client(Trigger, "passing", qos_profile=DEPTH)

@@ -1,4 +1,4 @@
-"""Back pressure of a replay: whom it waits for, and for how long. Publisher, subscriber and clock are made up."""
+"""Flow control of a replay: which subscribers it waits for, and for how long. Publisher and clock are fakes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MESSAGE = RawMessage("/slider/pose", "geometry_msgs/msg/PoseStamped", 0, b"")
 
 
 class Clock:
-    """Passes only where somebody sleeps."""
+    """A clock that advances only during sleeps."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -40,7 +40,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 class Publisher:
-    """With a subscriber who takes what waits `lag` s after it is asked. lost: overwritten before he had it."""
+    """A publisher whose subscriber acknowledges `lag` s after a request. lost: messages overwritten before that."""
 
     def __init__(self, clock: Clock, lag: float = 0.0, depth: int = DEPTH, **qos: Any) -> None:
         policies = {"history": HistoryPolicy.KEEP_LAST, "reliability": ReliabilityPolicy.RELIABLE, "depth": depth}
@@ -63,7 +63,7 @@ class Publisher:
 
 
 def sender_of(publisher: Publisher, control: FlowControl | None = None) -> TopicSender:
-    made: Any = publisher  # has what is used of a Publisher
+    made: Any = publisher  # has the used part of a Publisher
     return TopicSender(made, None, control or FlowControl(lambda: False))
 
 
@@ -76,7 +76,7 @@ def send(sender: TopicSender, clock: Clock, count: int, pause: float = 1e-4) -> 
 
 @pytest.mark.parametrize("depth", [1, 2, 3, 5, 7, 10, 100, 1000])
 @pytest.mark.parametrize("lag", [0.0, 0.025, 2.0])
-def test_a_fast_replay_overwrites_nothing_that_a_subscriber_lacks(clock: Clock, depth: int, lag: float):
+def test_fast_replay_overwrites_no_unreceived_message(clock: Clock, depth: int, lag: float):
     publisher = Publisher(clock, lag, depth)
     sender = sender_of(publisher)
     send(sender, clock, 20 * depth)
@@ -84,7 +84,7 @@ def test_a_fast_replay_overwrites_nothing_that_a_subscriber_lacks(clock: Clock, 
 
 
 @pytest.mark.parametrize("sent", range(0, DEPTH, 7))
-def test_a_stall_of_the_machine_does_not_make_it_look_slow(clock: Clock, sent: int):
+def test_stall_of_the_machine_does_not_look_like_a_slow_replay(clock: Clock, sent: int):
     publisher = Publisher(clock, lag=0.025)
     sender = sender_of(publisher)
     send(sender, clock, sent)
@@ -93,7 +93,7 @@ def test_a_stall_of_the_machine_does_not_make_it_look_slow(clock: Clock, sent: i
     assert publisher.lost == sender.overwritten == 0
 
 
-def test_a_slow_replay_waits_for_nobody(clock: Clock):
+def test_slow_replay_never_waits(clock: Clock):
     publisher = Publisher(clock, lag=1e9)
     send(sender_of(publisher), clock, 5 * DEPTH, pause=0.02)
     assert clock.now == pytest.approx(5 * DEPTH * 0.02) and publisher.asked == 0
@@ -102,13 +102,13 @@ def test_a_slow_replay_waits_for_nobody(clock: Clock):
 @pytest.mark.parametrize(
     "qos", [{"reliability": ReliabilityPolicy.BEST_EFFORT}, {"history": HistoryPolicy.KEEP_ALL, "depth": 0}]
 )
-def test_nobody_is_asked_where_nothing_is_kept_or_all(clock: Clock, qos: dict[str, Any]):
+def test_no_wait_for_best_effort_or_keep_all(clock: Clock, qos: dict[str, Any]):
     publisher = Publisher(clock, lag=1e9, **qos)
     send(sender_of(publisher), clock, 5 * DEPTH)
     assert publisher.asked == 0
 
 
-def test_after_hours_of_slow_replay_no_more_counts_as_lost_than_the_history_held(clock: Clock):
+def test_lost_count_is_bounded_by_the_history_after_a_long_slow_replay(clock: Clock):
     publisher = Publisher(clock)
     sender = sender_of(publisher)
     for _ in range(900):
@@ -119,7 +119,7 @@ def test_after_hours_of_slow_replay_no_more_counts_as_lost_than_the_history_held
     assert publisher.lost <= sender.overwritten <= 3 * DEPTH
 
 
-def test_one_that_hangs_holds_it_up_once_and_is_waited_for_again_when_it_runs(clock: Clock):
+def test_hanging_subscriber_delays_the_replay_once_and_is_waited_for_after_recovery(clock: Clock):
     publisher = Publisher(clock, lag=1e9)
     sender = sender_of(publisher)
     send(sender, clock, 1000 * DEPTH)
@@ -133,7 +133,7 @@ def test_one_that_hangs_holds_it_up_once_and_is_waited_for_again_when_it_runs(cl
     assert (sender.overwritten, publisher.lost) == (counted, lost)
 
 
-def test_control_is_spent_once_for_all_topics(clock: Clock):
+def test_first_timeout_applies_once_for_all_topics(clock: Clock):
     control = FlowControl(lambda: False)
     assert not control.wait("/slider/pose", lambda: False)
     assert not control.wait("/pusher/pose", lambda: False)
@@ -143,6 +143,6 @@ def test_control_is_spent_once_for_all_topics(clock: Clock):
     assert clock.now == pytest.approx(2.0 * FIRST_TIMEOUT + flow_control.RETRY_TIMEOUT, abs=0.02)
 
 
-def test_the_end_of_the_replay_ends_the_wait(clock: Clock):
+def test_end_of_the_replay_ends_the_wait(clock: Clock):
     assert not FlowControl(lambda: clock.now > 0.1).wait("/slider/pose", lambda: False)
     assert clock.now == pytest.approx(0.1, abs=0.01)

@@ -1,4 +1,4 @@
-"""Recorded time runs at a rate, pauses, jumps, and wakes those who sleep on it."""
+"""The replay clock: recorded time runs at a rate, pauses, jumps, and wakes sleepers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor.replay.lateness import Lateness
 
 
 class FakeClock:
-    """Time that passes only when somebody sleeps; a wait without end is the test's mistake."""
+    """A clock that advances only during sleeps; an endless wait is a fault of the test."""
 
     def __init__(self) -> None:
         self.time = 0
@@ -48,16 +48,16 @@ def test_sleeping_takes_the_recorded_time_divided_by_the_rate(rate: float, recor
     assert clock.now() == pytest.approx(recorded, abs=rate + 1.0)
 
 
-def test_deadlines_are_absolute_so_that_lateness_does_not_add_up() -> None:
+def test_deadlines_are_absolute_so_lateness_does_not_accumulate() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)
     for k in range(1, 101):
         sleep_through(clock, k * 1_000_000)
         assert wall.time == k * 1_000_000
-        wall.time += 300_000  # publishing takes its time
+        wall.time += 300_000  # publishing takes time
 
 
-def test_a_paused_clock_stands_still_and_goes_on_where_it_stood() -> None:
+def test_paused_clock_stops_and_resumes_at_the_same_time() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)
     wall.time = 5 * SECOND
@@ -70,7 +70,7 @@ def test_a_paused_clock_stands_still_and_goes_on_where_it_stood() -> None:
     assert clock.deadline(7 * SECOND) == 11 * SECOND
 
 
-def test_a_new_rate_counts_from_now_on() -> None:
+def test_new_rate_applies_from_now_on() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)
     wall.time = 2 * SECOND
@@ -79,14 +79,14 @@ def test_a_new_rate_counts_from_now_on() -> None:
     assert clock.now() == 12 * SECOND
 
 
-def test_a_jump_moves_recorded_time_and_keeps_a_pause() -> None:
+def test_jump_moves_recorded_time_and_keeps_a_pause() -> None:
     clock = PlayerClock(FakeClock(), paused=True)
     clock.jump(42 * SECOND)
     assert clock.paused
     assert clock.now() == 42 * SECOND
 
 
-def test_a_control_that_came_before_the_sleep_is_not_slept_over() -> None:
+def test_control_before_the_sleep_is_not_missed() -> None:
     wall = FakeClock()
     clock = PlayerClock(wall)
     seen = clock.generation
@@ -95,7 +95,7 @@ def test_a_control_that_came_before_the_sleep_is_not_slept_over() -> None:
     assert wall.time == 0
 
 
-def test_the_last_stretch_is_one_plain_sleep() -> None:
+def test_last_part_of_a_wait_is_one_plain_sleep() -> None:
     wall = FakeClock()
     sleep_through(PlayerClock(wall), 10 * SECOND)
     assert len(wall.sleeps) == 1
@@ -103,7 +103,7 @@ def test_the_last_stretch_is_one_plain_sleep() -> None:
 
 
 @pytest.mark.parametrize("control", ["pause", "interrupt", "jump"])
-def test_a_control_wakes_a_long_sleep(control: str) -> None:
+def test_control_wakes_a_long_sleep(control: str) -> None:
     clock = PlayerClock(SystemClock())
     arguments = [0] if control == "jump" else []
     timer = threading.Timer(0.05, getattr(clock, control), arguments)
@@ -123,7 +123,7 @@ def test_spinning_ends_no_earlier_than_the_deadline() -> None:
 
 
 @given(st.lists(st.integers(0, 10**11), min_size=1, max_size=200), st.sampled_from([0.5, 0.9, 0.99, 1.0]))
-def test_percentiles_of_lateness_are_right_to_a_bin(values: list[int], share: float) -> None:
+def test_percentiles_of_lateness_are_accurate_to_a_bin(values: list[int], share: float) -> None:
     lateness = Lateness()
     for value in values:
         lateness.add(value)
@@ -132,5 +132,5 @@ def test_percentiles_of_lateness_are_right_to_a_bin(values: list[int], share: fl
     assert lateness.maximum == max(values)
 
 
-def test_no_lateness_is_zero() -> None:
+def test_percentile_without_values_is_zero() -> None:
     assert Lateness().percentile(0.99) == 0.0

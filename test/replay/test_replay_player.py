@@ -1,4 +1,4 @@
-"""The play loop on a fake clock: what goes out, when, in which order, and what each control does."""
+"""The play loop on a fake clock: which messages are published when, and what each control does."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ListSource:
 
 
 class Stage:
-    """A player over fake time. script: {published so far: what to do then}; a wait without end closes the player."""
+    """A player on fake time. script: {messages published: actions}; an endless wait closes the player."""
 
     def __init__(self, messages: list[RawMessage], **options: object) -> None:
         self.time = 0
@@ -76,7 +76,7 @@ class Stage:
         self.answers = [*getattr(self, "answers", []), result]
 
     def run(self, what: PlayRange | None = None) -> list[float]:
-        """Recorded seconds of what was published."""
+        """Play, and return the recorded seconds of the published messages."""
         assert self.player.play(what or PlayRange())
         thread = threading.Thread(target=self.player.run)
         thread.start()
@@ -98,7 +98,7 @@ TENTHS = [k / 10 for k in range(10)]
 
 
 @given(rate=st.floats(0.1, 50.0), gaps=st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20))
-def test_every_message_goes_out_at_its_recorded_time_over_the_rate(rate: float, gaps: list[float]) -> None:
+def test_every_message_is_published_at_its_recorded_time_over_the_rate(rate: float, gaps: list[float]) -> None:
     at = [sum(gaps[: k + 1]) for k in range(len(gaps))]
     stage = Stage([message(t) for t in at], rate=rate)
     stage.run()
@@ -107,7 +107,7 @@ def test_every_message_goes_out_at_its_recorded_time_over_the_rate(rate: float, 
     assert stage.player.lateness.maximum <= 1
 
 
-def test_a_slow_publisher_makes_messages_late_but_loses_none_and_says_so() -> None:
+def test_slow_publisher_delays_messages_and_loses_none() -> None:
     stage = Stage(TEN)
     stage.cost = round(0.15 * SECOND)
     assert stage.run() == TENTHS
@@ -120,12 +120,12 @@ def test_messages_are_sorted_within_the_window(order: list[int]) -> None:
     assert stage.run() == TENTHS
 
 
-def test_out_of_order_beyond_the_window_is_published_all_the_same() -> None:
+def test_message_out_of_order_beyond_the_window_is_published() -> None:
     stage = Stage([*TEN[1:], TEN[0]], window=3)
     assert sorted(stage.run()) == TENTHS
 
 
-def test_messages_of_one_time_keep_their_order() -> None:
+def test_messages_of_equal_time_keep_their_order() -> None:
     stage = Stage([message(0.5, topic) for topic in ("/b", "/a", "/c")])
     stage.run()
     assert [m.topic for _, m in stage.log] == ["/b", "/a", "/c"]
@@ -138,17 +138,20 @@ def test_messages_of_one_time_keep_their_order() -> None:
         (PlayRange(duration=SECOND // 5), TENTHS[:3]),
         (PlayRange(until=START + SECOND // 10), TENTHS[:2]),
         (PlayRange(offset=SECOND // 2, duration=SECOND // 10), TENTHS[5:7]),
-        (PlayRange(duration=SECOND // 10, until=START + SECOND // 2), TENTHS[:6]),  # the later of the two
+        (
+            PlayRange(duration=SECOND // 10, until=START + SECOND // 2),
+            TENTHS[:6],
+        ),  # the later of the two
         (PlayRange(offset=20 * SECOND), []),
     ],
 )
-def test_a_range_is_played_from_its_offset_to_its_end_inclusive(what: PlayRange, expected: list[float]) -> None:
+def test_range_is_played_from_offset_to_end_inclusive(what: PlayRange, expected: list[float]) -> None:
     stage = Stage(TEN)
     assert stage.run(what) == expected
     assert stage.states[-1] == "finished"
 
 
-def test_an_offset_is_not_waited_for() -> None:
+def test_offset_adds_no_waiting() -> None:
     stage = Stage(TEN)
     stage.run(PlayRange(offset=SECOND // 2))
     assert stage.times[0] == 0.0
@@ -161,17 +164,17 @@ def test_delay_comes_before_each_loop() -> None:
     assert stage.times == pytest.approx([3.0, 3.1, 6.1, 6.2])
 
 
-def test_a_loop_over_nothing_ends() -> None:
+def test_loop_over_an_empty_range_ends() -> None:
     assert Stage([], loop=True).run() == []
 
 
-def test_finished_is_said_after_the_subscribers_have_everything() -> None:
+def test_finished_is_announced_after_subscribers_received_everything() -> None:
     stage = Stage(TEN)
     stage.run()
     assert stage.settled == [10]
 
 
-def test_pause_holds_the_next_message_and_resume_sends_it_when_due() -> None:
+def test_pause_delays_the_next_message_and_resume_publishes_it_when_due() -> None:
     stage = Stage(TEN)
     stage.script[3] = ["pause"]
     stage.when_stuck = ["resume"]
@@ -189,7 +192,7 @@ def test_start_paused_waits_for_play_next_and_burst() -> None:
     assert stage.states == ["paused", "finished"]
 
 
-def test_after_a_burst_the_rest_comes_at_its_pace() -> None:
+def test_messages_after_a_burst_keep_their_pace() -> None:
     stage = Stage(TEN, paused=True)
     stage.when_stuck = [("burst", 5), "resume"]
     stage.run()
@@ -211,7 +214,7 @@ def test_seek_goes_forward_and_back_without_waiting() -> None:
     assert stage.times == pytest.approx([0.0, 0.1, 0.1, 0.2, 0.2])
 
 
-def test_seek_before_the_start_means_the_start() -> None:
+def test_seek_before_the_start_goes_to_the_start() -> None:
     stage = Stage(TEN)
     stage.script[3] = [("seek", 0)]
     assert stage.run() == [0.0, 0.1, 0.2, *TENTHS]
@@ -224,7 +227,7 @@ def test_seek_after_the_end_plays_from_there() -> None:
     assert stage.states == ["playing", "finished", "playing", "finished"]
 
 
-def test_play_begins_again_only_when_nothing_is_playing() -> None:
+def test_play_starts_only_when_nothing_is_playing() -> None:
     stage = Stage(TEN)
     stage.script[2] = [("play", PlayRange())]
     stage.when_stuck = [("play", PlayRange(offset=SECOND // 2))]
@@ -247,27 +250,27 @@ def test_stop_ends_a_pause() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_rate_that_is_not_positive_is_refused(rate: float) -> None:
+def test_rejects_rate_that_is_not_positive(rate: float) -> None:
     stage = Stage(TEN)
     assert not stage.player.set_rate(rate)
     assert stage.player.rate == 1.0
 
 
-def test_a_new_rate_holds_from_the_next_message_on() -> None:
+def test_new_rate_applies_from_the_next_message() -> None:
     stage = Stage(TEN)
     stage.script[5] = [("set_rate", 10.0)]
     stage.run()
     assert stage.times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.41, 0.42, 0.43, 0.44, 0.45])
 
 
-def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
+def test_clock_never_passes_the_next_message() -> None:
     stage = Stage(TEN)
     stage.cost = SECOND
     seen: list[int | None] = []
 
     def look(sent: RawMessage) -> bool:
         done = stage.publish(sent)
-        stage.player.report_time(seen.append)  # late by now, so that the clock alone would be far ahead
+        stage.player.report_time(seen.append)  # late by now: the clock alone would be far ahead
         return done
 
     stage.player._output = PlayerOutput(lambda message: None, look, lambda: None, stage.states.append)
@@ -275,7 +278,7 @@ def test_the_clock_never_passes_a_message_that_is_to_come() -> None:
     assert seen == [*(m.log_time for m in TEN[1:]), TEN[-1].log_time]
 
 
-def test_half_a_window_is_read_without_time_and_all_of_it_with() -> None:
+def test_half_the_window_is_read_without_time_and_all_of_it_with_time() -> None:
     read: list[RawMessage] = []
 
     def source() -> Iterator[RawMessage]:

@@ -1,4 +1,4 @@
-"""Small MCAP recordings, made with the mcap library alone, so that the replay is not judged by its own writer."""
+"""Small MCAP recordings, written with the mcap library alone: independent of the project's own writer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A subscriber in a process of its own: writes down the raw messages of some topics until it is told to stop.
+"""A subscriber in a process of its own: it stores the raw messages of some topics until a signal.
 
 python replay_listener.py OUTPUT DEPTH TOPIC=TYPE...    writes a pickle {topic: [bytes, ...]} on SIGINT
 """
@@ -23,7 +23,7 @@ from push_predictor.nodes.replay.topics import message_class
 
 
 def main(output: str, depth: str, *topics: str) -> None:
-    """Listen; depth 0 keeps all."""
+    """Subscribe; depth 0 keeps all messages."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     done = threading.Event()
     signal.signal(signal.SIGINT, lambda number, frame: done.set())
@@ -41,7 +41,7 @@ def main(output: str, depth: str, *topics: str) -> None:
     spinner = threading.Thread(target=executor.spin)
     spinner.start()
     done.wait()
-    while _still_hearing(heard):
+    while _still_receiving(heard):
         pass
     executor.shutdown()
     spinner.join()
@@ -49,8 +49,8 @@ def main(output: str, depth: str, *topics: str) -> None:
     rclpy.try_shutdown()
 
 
-def _still_hearing(heard: dict[str, list[bytes]]) -> bool:
-    """Has anything come within two seconds? What is in DDS by now is taken at the pace of Python."""
+def _still_receiving(heard: dict[str, list[bytes]]) -> bool:
+    """Whether a message has arrived within two seconds: Python reads DDS's backlog slowly."""
     before = sum(map(len, heard.values()))
     time.sleep(2.0)
     return sum(map(len, heard.values())) > before

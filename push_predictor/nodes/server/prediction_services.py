@@ -68,7 +68,7 @@ def handle_predict_push_batch(
 def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
     """Raise RequestError if too many pushes need the model itself, not its table."""
     if len(query.inputs) > MAX_EXACT and (count := tabulated.exact_count(query.inputs)) > MAX_EXACT:
-        accepted = f"at most {MAX_EXACT} pushes that no table answers (docs/reference/predict_server.md) a call"
+        accepted = f"at most {MAX_EXACT} pushes a call without a table (docs/reference/predict_server.md)"
         raise RequestError("velocity length", f"{count} pushes without a table", accepted)
 
 
@@ -80,6 +80,6 @@ def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int)
     if not finite.all():
         index = start + int(np.argmin(finite))
         raise PredictionError(
-            f"push {index}: {tabulated.model.name} has no finite answer, its velocity or a covariate is too far "
-            "from what the model was trained on"
+            f"push {index}: {tabulated.model.name} has no finite prediction: the velocity or a covariate is too far "
+            "from the training data"
         )
