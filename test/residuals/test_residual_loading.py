@@ -1,4 +1,4 @@
-"""Loading data to judge a model on: every covariate by its name, from recordings and push tables alike."""
+"""Loading data to judge a model on: recordings and push tables, with every covariate by name."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def saved_table(folder: Path, name: str, table: PushTable) -> Path:
     return folder / f"{name}.csv"
 
 
-def test_a_recording_gives_every_documented_covariate_and_its_scalar_topics(tmp_path: Path) -> None:
+def test_recording_has_every_documented_covariate_and_its_scalar_topics(tmp_path: Path) -> None:
     start = int(translating_push().slider.stamp[0])
     loaded = load_evidence([saved(tmp_path, "one", scalars=warming(start))])
     assert set(loaded.table.covariates) == OF_A_RECORDING | {"topic:/surface/temperature"}
@@ -70,7 +70,7 @@ def test_a_recording_gives_every_documented_covariate_and_its_scalar_topics(tmp_
     assert np.array_equal(columns["angle"], loaded.table.inputs[:, 2])
 
 
-def test_time_index_and_way_run_on_from_one_recording_to_the_next_by_the_clock_of_the_stamps(tmp_path: Path) -> None:
+def test_time_count_and_distance_continue_across_recordings_by_their_stamps(tmp_path: Path) -> None:
     second, first = saved(tmp_path, "a", later=LATER), saved(tmp_path, "b")
     table = load_evidence([second, first]).table  # given in the wrong order
     recording, columns = table.covariates["recording"], table.covariates
@@ -82,12 +82,12 @@ def test_time_index_and_way_run_on_from_one_recording_to_the_next_by_the_clock_o
     assert columns["slid_distance"][late[0]] == pytest.approx(0.004 * len(early), abs=1e-4)
 
 
-def test_one_recording_keeps_the_clock_that_the_validator_shows(tmp_path: Path) -> None:
+def test_elapsed_time_of_one_recording_matches_the_validator(tmp_path: Path) -> None:
     elapsed = load_evidence([saved(tmp_path, "late", later=LATER)]).table.covariates["elapsed_time"]
     assert 0.5 <= elapsed[0] < 0.6  # the touch comes 0.5 s after the first sample
 
 
-def test_a_topic_that_one_recording_lacks_is_left_out_and_named(tmp_path: Path) -> None:
+def test_drops_a_topic_that_one_recording_lacks_by_name(tmp_path: Path) -> None:
     start = int(translating_push().slider.stamp[0])
     paths = [saved(tmp_path, "a", scalars=warming(start)), saved(tmp_path, "b", later=LATER)]
     loaded = load_evidence(paths)
@@ -96,7 +96,7 @@ def test_a_topic_that_one_recording_lacks_is_left_out_and_named(tmp_path: Path) 
     assert loaded.dropped == {"topic:/surface/temperature": f"{half} of {2 * half} windows lack it"}
 
 
-def test_a_push_table_gives_its_columns_and_counts_its_pushes_in_their_order(tmp_path: Path) -> None:
+def test_push_table_keeps_its_columns_and_counts_pushes_in_order(tmp_path: Path) -> None:
     table = rows(["b", "b", "a", "c"], humidity=[0.1, 0.2, 0.3, 0.4])
     loaded = load_evidence([saved_table(tmp_path, "pushes", table)])
     assert loaded.recordings is None
@@ -106,7 +106,7 @@ def test_a_push_table_gives_its_columns_and_counts_its_pushes_in_their_order(tmp
     assert loaded.table.covariates["edge"].tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
-def test_what_a_table_says_itself_is_kept(tmp_path: Path) -> None:
+def test_columns_of_a_table_take_precedence(tmp_path: Path) -> None:
     table = rows(["a", "b"], push_index=[7.0, 9.0], recording=[3.0, 4.0], edge=[2.0, 2.0])
     columns = load_evidence([saved_table(tmp_path, "pushes", table)]).table.covariates
     assert columns["push_index"].tolist() == [7.0, 9.0]
@@ -114,14 +114,14 @@ def test_what_a_table_says_itself_is_kept(tmp_path: Path) -> None:
     assert columns["edge"].tolist() == [2.0, 2.0]
 
 
-def test_a_column_with_an_empty_cell_is_left_out_and_named(tmp_path: Path) -> None:
+def test_drops_a_column_with_an_empty_cell_by_name(tmp_path: Path) -> None:
     table = rows(["a", "b", "c"], slider_x=[0.1, np.nan, 0.2], slider_y=[0.1, 0.0, 0.2])
     loaded = load_evidence([saved_table(tmp_path, "pushes", table)])
     assert loaded.dropped == {"slider_x": "1 of 3 windows lack it"}
     assert "slider_y" in loaded.table.covariates
 
 
-def test_pushes_of_the_same_name_in_two_tables_are_two_pushes(tmp_path: Path) -> None:
+def test_equal_push_ids_in_two_tables_are_two_pushes(tmp_path: Path) -> None:
     other = rows(["a", "b"])
     other.outcomes[:] += 0.001
     paths = [saved_table(tmp_path, "one", rows(["a", "b"])), saved_table(tmp_path, "two", other)]
@@ -131,7 +131,7 @@ def test_pushes_of_the_same_name_in_two_tables_are_two_pushes(tmp_path: Path) ->
     assert table.covariates["recording"].tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
-def test_streams_corrected_in_memory_are_cut_anew_into_the_same_kind_of_table(tmp_path: Path) -> None:
+def test_cutting_corrected_streams_again_gives_the_same_columns(tmp_path: Path) -> None:
     loaded = load_evidence([saved(tmp_path, "a"), saved(tmp_path, "b", later=LATER)])
     assert loaded.recordings is not None
     again = cut_again(loaded.recordings, loaded.rig)
@@ -142,7 +142,7 @@ def test_streams_corrected_in_memory_are_cut_anew_into_the_same_kind_of_table(tm
     assert np.any(np.abs(moved.covariates["contact_gap"].mean() - again.covariates["contact_gap"].mean()) > 1e-4)
 
 
-def test_no_rig_and_no_push_are_errors_that_name_the_data(tmp_path: Path) -> None:
+def test_rejects_data_without_rig_or_pushes_by_name(tmp_path: Path) -> None:
     write_table(tmp_path / "bare.csv", rows(["a"]))
     with pytest.raises(RigError, match=r"bare\.csv"):
         load_evidence([tmp_path / "bare.csv"])
@@ -152,7 +152,7 @@ def test_no_rig_and_no_push_are_errors_that_name_the_data(tmp_path: Path) -> Non
         load_evidence([tmp_path / "still"])
 
 
-def test_the_previous_residual_is_the_mean_of_the_push_before_in_the_same_recording() -> None:
+def test_previous_residual_is_the_mean_of_the_previous_push_of_the_recording() -> None:
     table = rows(["a", "a", "b", "c", "d"], recording=[0.0, 0.0, 0.0, 1.0, 1.0])
     z = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 7.0], [-3.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0]])
     assert previous_residual(table, z).tolist() == [0.0, 0.0, 3.0, 0.0, 9.0]

@@ -1,4 +1,4 @@
-"""Errors of measurement: told by the gap between tip and outline, sized, corrected in the stream, never made up."""
+"""Measurement errors: found from the gap between pusher and outline, sized, and corrected in the stream."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def training() -> PushTable:
 
 
 def planted(recording: Recording, mechanism: str, values: tuple[float, ...]) -> Recording:
-    """The recording with the error in its streams: what a correction by the negative would make of it."""
+    """The recording with an error in its streams, made by correcting the negative of the error."""
     return correct(recording, mechanism, [-value for value in values])
 
 
@@ -63,7 +63,7 @@ def judged(table: PushTable, baseline: PushTable | None) -> MeasurementFinding:
     return finding
 
 
-def assert_told(finding: MeasurementFinding, mechanism: str, values: tuple[float, ...]) -> None:
+def assert_found(finding: MeasurementFinding, mechanism: str, values: tuple[float, ...]) -> None:
     strongest = finding.errors[0]
     assert strongest.mechanism == mechanism
     assert np.allclose(strongest.values, values, atol=UNIT[mechanism])
@@ -71,18 +71,18 @@ def assert_told(finding: MeasurementFinding, mechanism: str, values: tuple[float
 
 
 @pytest.mark.parametrize(("mechanism", "values"), PLANTED)
-def test_an_error_planted_in_the_stream_is_named_and_sized(mechanism: str, values: tuple[float, ...]) -> None:
-    assert_told(judged(windows(planted(recorded(2), mechanism, values)), training()), mechanism, values)
+def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, ...]) -> None:
+    assert_found(judged(windows(planted(recorded(2), mechanism, values)), training()), mechanism, values)
 
 
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[3], PLANTED[5]])
-def test_it_is_told_without_training_windows_too(mechanism: str, values: tuple[float, ...]) -> None:
-    """Half a millimetre would take more pushes than these."""
-    assert_told(judged(windows(planted(recorded(2), mechanism, values)), None), mechanism, values)
+def test_planted_error_is_found_without_training_windows(mechanism: str, values: tuple[float, ...]) -> None:
+    """A shift of half a millimetre needs more pushes than these."""
+    assert_found(judged(windows(planted(recorded(2), mechanism, values)), None), mechanism, values)
 
 
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[5]])
-def test_once_corrected_and_cut_again_nothing_is_left(mechanism: str, values: tuple[float, ...]) -> None:
+def test_no_error_remains_after_correction(mechanism: str, values: tuple[float, ...]) -> None:
     wrong = planted(recorded(2), mechanism, values)
     right = wrong
     for error in judged(windows(wrong), training()).errors:
@@ -91,7 +91,7 @@ def test_once_corrected_and_cut_again_nothing_is_left(mechanism: str, values: tu
     assert "corrected for" in right.notes[-1]
 
 
-def test_a_tool_offset_is_a_frame_shift_as_long_as_the_tool_does_not_turn() -> None:
+def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
     finding = judged(windows(planted(recorded(2), "tool_offset", (0.0, 0.0008))), training())
     assert finding.errors[0].mechanism == "frame_shift"
     assert "tool_offset" in finding.errors[0].rivals
@@ -99,46 +99,46 @@ def test_a_tool_offset_is_a_frame_shift_as_long_as_the_tool_does_not_turn() -> N
 
 
 @pytest.mark.parametrize("seed", [2, 3])
-def test_a_clean_recording_has_no_error(seed: int) -> None:
+def test_clean_recording_has_no_error(seed: int) -> None:
     assert judged(windows(recorded(seed)), training()).errors == ()
     assert judged(windows(recorded(seed)), None).errors == ()
 
 
-def test_a_change_of_the_motion_is_no_error_of_measurement() -> None:
+def test_change_of_contact_friction_is_not_a_measurement_error() -> None:
     assert judged(windows(recorded(4, contact_friction=0.5)), training()).errors == ()
 
 
-def test_an_error_that_the_training_windows_have_too_is_no_news() -> None:
+def test_error_that_training_has_too_is_not_reported() -> None:
     both = [windows(planted(recorded(seed), "frame_shift", (0.001, 0.0))) for seed in (1, 2)]
     by_itself, as_before = ({t.mechanism: t.p_value for t in judged(both[1], base).tested} for base in (None, both[0]))
     assert by_itself["frame_shift"] < 0.05 < as_before["frame_shift"]  # 40 pushes alone do not reach a percent
     assert judged(both[1], both[0]).errors == ()
 
 
-def test_a_worn_tip_is_geometry_and_none_of_these() -> None:
+def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
     table = windows(recorded(2))
     gap = table.covariates["contact_gap"] - 0.001
     worn = replace(table, covariates={**table.covariates, "contact_gap": gap})
     assert judged(worn, training()).errors == ()
 
 
-def test_an_error_below_the_trackers_noise_does_not_matter() -> None:
+def test_error_below_the_tracker_noise_is_not_reported() -> None:
     assert judged(windows(planted(recorded(2), "clock_offset", (0.0003,))), training()).errors == ()
 
 
-def test_all_that_was_tried_is_told() -> None:
+def test_reports_every_candidate_tested() -> None:
     tested = {t.mechanism: t.p_value for t in judged(windows(recorded(2)), training()).tested}
     assert set(tested) == {"clock_offset", "frame_rotation", "frame_shift"}
     assert all(0.0 < p <= 1.0 for p in tested.values())
 
 
-def test_windows_without_a_gap_tell_nothing() -> None:
+def test_windows_without_a_gap_give_no_finding() -> None:
     table = windows(recorded(2))
     assert measurement_errors(replace(table, covariates={}), training(), RIG) is None
 
 
-def test_the_responses_are_what_the_geometry_says() -> None:
-    """Tip and outline computed anew at a displaced pose open the gap by the response, to first order."""
+def test_responses_match_the_geometry() -> None:
+    """A gap recomputed at a displaced pose opens by the response, to first order."""
     table = windows(recorded(2))
     fraction = RIG.outline.edge(table.inputs[:, 1])[1]
     table = table.take(np.abs(fraction - 0.5) < 0.4)
@@ -158,8 +158,8 @@ def test_the_responses_are_what_the_geometry_says() -> None:
     assert np.allclose(gap(0.0, 0.0, step) / step, responses["frame_rotation"][:, 0], atol=1e-6)
 
 
-def test_the_clock_is_not_judged_at_the_touch() -> None:
-    """There the slider was at rest a moment before, and a late stream still shows that."""
+def test_clock_response_is_zero_in_the_first_window() -> None:
+    """Just before, the slider was at rest, and a late stream still shows that."""
     table = windows(recorded(2))
     first = table.covariates["time_since_contact"] < 0.03
     lag = gap_responses(table, RIG.outline)["clock_offset"][:, 0]
@@ -171,7 +171,7 @@ def test_the_clock_is_not_judged_at_the_touch() -> None:
     ("mechanism", "values"),
     [*PLANTED, ("tool_offset", (0.001, 0.002)), ("wrench_bias", (0.3, -0.1))],
 )
-def test_a_correction_is_undone_by_its_negative(mechanism: str, values: tuple[float, ...]) -> None:
+def test_negative_correction_undoes_a_correction(mechanism: str, values: tuple[float, ...]) -> None:
     recording = recorded(2)
     back = correct(planted(recording, mechanism, values), mechanism, values)
     for name in ("stamp", "x", "y"):
@@ -182,6 +182,6 @@ def test_a_correction_is_undone_by_its_negative(mechanism: str, values: tuple[fl
     assert np.allclose(back.wrench.fx, recording.wrench.fx)
 
 
-def test_a_mechanism_that_is_not_known_is_refused() -> None:
+def test_rejects_unknown_mechanism() -> None:
     with pytest.raises(KeyError):
         correct(recorded(2), "contact_friction", (0.1,))

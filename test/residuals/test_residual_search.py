@@ -1,4 +1,4 @@
-"""The search for what a model leaves over: rare false alarms, power, and the right name or none."""
+"""The search for unexplained effects: false-alarm rate, power, and correct names."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ SIDE = 0.09
 SQUARE = Outline(0.5 * SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))
 RIG = Rig("square", SQUARE, 0.00475, "made up", 0.8)
 PHYSICS = AnalyticalPush(SQUARE, 0.00475, 0.25)
-SCATTER = np.array([0.0001, 0.00015, 0.004])  # m, m, rad
+NOISE = np.array([0.0001, 0.00015, 0.004])  # m, m, rad
 SIX = (
     "contact_friction", "pressure_spread", "centre_of_friction", "anisotropic_friction", "tilted_surface", "inertia"
 )  # fmt: skip
 DRIVERS = ("elapsed_time", "topic:/temperature", "slider_x", "slider_heading", "edge")
 
 
-def pushes(n: int, seed: int, scatter: np.ndarray = SCATTER) -> PushTable:
-    """Pushes of a square with contact friction 0.25; half of the scatter is common to the windows of a push."""
+def pushes(n: int, seed: int, noise: np.ndarray = NOISE) -> PushTable:
+    """Pushes of a square with contact friction 0.25; half of the noise is common to the windows of a push."""
     rng = np.random.default_rng(seed)
     push = np.repeat(np.arange(n), WINDOWS)
     edge = rng.integers(4, size=n)[push].astype(np.float64)
     contact = (edge + rng.uniform(0.05, 0.95, n)[push]) / 4.0
     inputs = np.column_stack([np.full(len(push), 0.02), contact, rng.uniform(-1.0, 1.0, n)[push]])
     duration = np.full(len(push), 0.2)
-    noise = np.sqrt(0.5) * (rng.normal(size=(n, 3))[push] + rng.normal(size=(len(push), 3)))
+    drawn = np.sqrt(0.5) * (rng.normal(size=(n, 3))[push] + rng.normal(size=(len(push), 3)))
     walk = np.cumsum(rng.normal(size=n))
     covariates = {
         "elapsed_time": 10.0 * push + rng.uniform(0.0, 3.0, n)[push],
@@ -53,7 +53,7 @@ def pushes(n: int, seed: int, scatter: np.ndarray = SCATTER) -> PushTable:
         "slider_heading": rng.uniform(-np.pi, np.pi, n)[push],
         "edge": edge,
     }
-    outcomes = PHYSICS.displacement(inputs, duration) + scatter * noise
+    outcomes = PHYSICS.displacement(inputs, duration) + noise * drawn
     return PushTable(inputs, duration, outcomes, np.array([f"{seed} {k}" for k in push]), covariates)
 
 
@@ -78,7 +78,7 @@ def learnt():
 
 @pytest.fixture(autouse=True)
 def a_library_of_six(monkeypatch) -> None:
-    """Responses take most of the time."""
+    """Computing responses takes most of the time."""
     library = [m for m in LIBRARY if m.name in SIX]
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
@@ -92,7 +92,7 @@ def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> Sear
 
 
 class TestFalseAlarms:
-    """On made-up nulls the family-wise p is at most alpha in about the share alpha of them."""
+    """On synthetic null data the family-wise p is at most alpha with probability alpha."""
 
     REPETITIONS = 200
     ALPHA = 0.05
@@ -120,13 +120,13 @@ class TestFalseAlarms:
         return float(screen([block_scores(z, c, basis, pushed) for c in columns], seed).p_value.min())
 
 
-class TestNothingThere:
-    def test_nothing_is_found_with_a_learnt_base_that_saw_few_pushes(self, learnt) -> None:
+class TestNoEffect:
+    def test_finds_nothing_with_a_learned_base_of_few_pushes(self, learnt) -> None:
         verdicts = [searched(learnt, pushes(150, 100 + seed)) for seed in range(3)]
         assert [len(found.terms) for found in verdicts] == [0, 0, 0]
 
-    def test_what_the_base_lacks_is_no_news_where_training_shows_it_as_well(self) -> None:
-        """A slider whose sides differ, learnt by a model that folds them: as many pushes later it is the same one."""
+    def test_effect_that_training_shows_too_is_not_selected(self) -> None:
+        """A slider whose sides differ, learned by a model that folds them, has not changed since training."""
         shift = DriverBasis("constant"), 0.003, -0.002
         base = train_model(with_effect(pushes(150, 2), "centre_of_friction", *shift), RIG, "gp", name="folds")
         same = searched(base, with_effect(pushes(150, 3), "centre_of_friction", *shift))
@@ -137,16 +137,16 @@ class TestNothingThere:
         )
         assert other.terms[0].best.label == ("centre_of_friction", "edge")
 
-    def test_a_driver_that_goes_with_the_inputs_is_not_tried(self, learnt) -> None:
-        """Pushes done in the order of their angle: time could be blamed for whatever the base gets wrong there."""
+    def test_covariate_confounded_with_the_inputs_is_not_tried(self, learnt) -> None:
+        """In pushes ordered by angle, time would be blamed for errors of the base in the angle."""
         table = pushes(150, 3)
         ordered = replace(table, covariates={**table.covariates, "elapsed_time": 100.0 * table.inputs[:, 2]})
         evidence, inputs = evidence_of(learnt, ordered, PHYSICS), inputs_basis(learnt, ordered)
         assert confounded(evidence, DRIVERS, inputs) == ["elapsed_time"]
         assert "elapsed_time" not in {c.covariate for c in candidates_of(evidence, DRIVERS, inputs)}
 
-    def test_a_touch_that_is_felt_late_is_no_effect_of_the_time_since_contact(self, learnt) -> None:
-        """The window that begins with the touch is then off by the way of the tip; the others are as they were."""
+    def test_late_touch_detection_is_not_an_effect_of_time_since_contact(self, learnt) -> None:
+        """Only the window that begins with the touch is shorter, by the distance that the pusher travels."""
         table = pushes(150, 3)
         since = np.tile([0.0, 0.2], 150)
         late = np.where(since == 0.0, 0.97, 1.0)
@@ -156,11 +156,11 @@ class TestNothingThere:
         found = searched(ANALYTICAL, table, drivers=("time_since_contact",)).terms
         assert "time_since_contact" not in {term.best.covariate for term in found}
 
-    def test_a_learnt_base_is_honest_about_pushes_that_it_is_told_without(self, learnt) -> None:
+    def test_cross_validated_residuals_of_a_learned_base_are_calibrated(self, learnt) -> None:
         deviation = baseline_of(learnt, PHYSICS).deviation
         assert np.all((deviation > 0.85) & (deviation < 1.15))
 
-    def test_it_says_how_small_an_effect_would_have_been_found(self, learnt) -> None:
+    def test_effects_above_the_detectable_size_are_found_and_far_smaller_ones_are_not(self, learnt) -> None:
         table = pushes(150, 103)
         evidence, inputs, baseline = (
             evidence_of(learnt, table, PHYSICS),
@@ -189,7 +189,7 @@ class TestNames:
             ("centre_of_friction", "slider_x", [0.003, 0.002]),
         ],
     )
-    def test_mechanism_and_driver_of_a_planted_effect(self, learnt, mechanism, driver, coefficients) -> None:
+    def test_planted_effect_gets_its_mechanism_and_covariate(self, learnt, mechanism, driver, coefficients) -> None:
         plain = pushes(200, 200)
         found = searched(learnt, with_effect(plain, mechanism, linear(plain, driver), *coefficients))
         first = found.terms[0]
@@ -198,33 +198,33 @@ class TestNames:
         assert driver in first.naming.drivers
         assert first.p_value <= 0.01
 
-    def test_a_grain_of_the_table_is_driven_by_the_heading(self, learnt) -> None:
+    def test_anisotropy_of_the_table_depends_on_the_push_heading(self, learnt) -> None:
         table = with_effect(pushes(200, 201), "anisotropic_friction", DriverBasis("constant"), 0.2, 0.1)
         first = searched(learnt, table).terms[0]
         assert first.best.label == ("anisotropic_friction", "push_heading")
 
-    def test_a_shift_in_the_body_is_told_by_the_sides_that_the_base_folds(self, learnt) -> None:
+    def test_shifted_centre_of_friction_depends_on_the_folded_sides(self, learnt) -> None:
         table = with_effect(pushes(200, 202), "centre_of_friction", DriverBasis("constant"), 0.003, 0.002)
         assert searched(learnt, table).terms[0].best.label == ("centre_of_friction", "edge")
 
-    def test_a_change_without_a_driver_lies_in_the_models_own_inputs(self, learnt) -> None:
+    def test_constant_change_lies_in_the_inputs_of_the_model(self, learnt) -> None:
         table = with_effect(pushes(200, 203), "contact_friction", DriverBasis("constant"), 0.2)
         assert searched(learnt, table).terms[0].best.label == ("contact_friction", "model_inputs")
 
-    def test_contact_friction_other_than_the_textbooks_is_found_by_the_textbook_model(self) -> None:
+    def test_analytical_model_finds_a_different_contact_friction(self) -> None:
         found = searched(ANALYTICAL, pushes(200, 204), drivers=())
         assert found.terms[0].best.label == ("contact_friction", "model_inputs")
         assert found.terms[0].coefficients[0] == pytest.approx(0.25 - 0.3, abs=0.02)
 
-    def test_an_effect_outside_the_library_comes_back_with_its_driver_alone(self, learnt) -> None:
-        """Slip to one side that grows with temperature, with a library that holds only the pressure's spread."""
+    def test_effect_outside_the_library_gets_its_covariate_and_no_mechanism(self, learnt) -> None:
+        """Asymmetric slip grows with temperature, but the library contains only two other mechanisms."""
         plain = pushes(200, 205)
         table = with_effect(plain, "contact_asymmetry", linear(plain, "topic:/temperature"), 0.15)
         first = searched(learnt, table, mechanisms=["pressure_spread", "tilted_surface"]).terms[0]
         assert first.best.label == (None, "topic:/temperature")
         assert not first.naming.known
 
-    def test_drivers_that_go_together_stay_undecided(self, learnt) -> None:
+    def test_correlated_covariates_stay_undecided(self, learnt) -> None:
         plain = pushes(200, 206)
         twins = {**plain.covariates, "slid_distance": 0.003 * plain.covariates["elapsed_time"] + 0.001}
         table = with_effect(replace(plain, covariates=twins), "contact_friction", linear(plain, "elapsed_time"), 0.08)
@@ -234,8 +234,8 @@ class TestNames:
         assert naming.mechanisms[0] == "contact_friction"
 
 
-class TestForm:
-    def test_a_step_is_told_with_its_place(self, learnt) -> None:
+class TestBasis:
+    def test_step_is_found_with_its_place(self, learnt) -> None:
         plain = pushes(200, 300)
         place = 1200.0
         table = with_effect(plain, "contact_friction", DriverBasis("step", ("elapsed_time",), place=place), 0.25)
@@ -243,14 +243,14 @@ class TestForm:
         assert basis.name == "step"
         assert basis.place == pytest.approx(place, abs=150.0)
 
-    def test_a_straight_line_stays_a_straight_line(self, learnt) -> None:
+    def test_linear_dependence_stays_linear(self, learnt) -> None:
         plain = pushes(200, 301)
         table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)
         assert searched(learnt, table).terms[0].best.basis.name == "linear"
 
 
-class TestScatter:
-    def test_that_grows_with_a_driver_is_told_as_variance_and_as_no_shift(self, learnt) -> None:
+class TestVariance:
+    def test_variance_that_grows_with_a_covariate_is_not_a_mean_effect(self, learnt) -> None:
         table = pushes(200, 400)
         warm = table.covariates["topic:/temperature"]
         factor = np.exp(0.5 * (warm - warm.mean()) / warm.std())
@@ -258,19 +258,19 @@ class TestScatter:
         louder = replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
         found = searched(learnt, louder)
         evidence = evidence_of(learnt, louder, PHYSICS)
-        scatter = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline_of(learnt, PHYSICS))
+        noise = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline_of(learnt, PHYSICS))
         assert not found.terms
-        assert scatter.found[0].covariate == "topic:/temperature"
-        assert scatter.found[0].ratio > 2.0
+        assert noise.found[0].covariate == "topic:/temperature"
+        assert noise.found[0].ratio > 2.0
 
-    def test_of_the_training_is_no_finding(self, learnt) -> None:
+    def test_variance_as_in_training_is_not_reported(self, learnt) -> None:
         table = pushes(200, 401)
         evidence = evidence_of(learnt, table, PHYSICS)
         assert not variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
 
-    def test_that_is_larger_than_in_training_needs_no_driver(self, learnt) -> None:
-        table = pushes(200, 402, scatter=2.0 * SCATTER)
+    def test_larger_variance_than_in_training_is_reported_as_constant(self, learnt) -> None:
+        table = pushes(200, 402, noise=2.0 * NOISE)
         evidence = evidence_of(learnt, table, PHYSICS)
-        scatter = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
-        assert scatter[0].covariate == "model_inputs"
-        assert scatter[0].ratio == pytest.approx(2.0, rel=0.25)
+        noise = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
+        assert noise[0].covariate == "model_inputs"
+        assert noise[0].ratio == pytest.approx(2.0, rel=0.25)

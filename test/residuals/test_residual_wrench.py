@@ -1,4 +1,4 @@
-"""The wrench channel: what changes the force of a push and not its motion is found there, and only there."""
+"""The wrench channel: effects on the force of a push are found there, and only there."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def made(
     bias: tuple[float, float] = (0.0, 0.0),
     contact_friction: float = 0.25,
 ) -> PushTable:
-    """Windows whose force is that of the limit surface: log fmax drifts and is shifted, the sensor reads too much."""
+    """Windows with the force of a limit surface: log fmax drifts and is shifted, the sensor is biased."""
     rng = np.random.default_rng(seed)
     n = PUSHES * WINDOWS
     push = np.repeat(np.arange(PUSHES), WINDOWS)
@@ -69,14 +69,14 @@ def found(table: PushTable, baseline: PushTable | None) -> WrenchFinding:
     return wrench_effects(table, baseline, PHYSICS, alpha=0.002)
 
 
-def test_every_window_gives_the_friction_on_the_surface_by_itself() -> None:
-    """Whatever the direction of the push and the friction at the contact."""
+def test_load_does_not_depend_on_push_direction_or_contact_friction() -> None:
+    """Every window determines the surface friction by itself."""
     for contact_friction in (0.1, 0.5):
         table = made(0, contact_friction=contact_friction)
         assert np.median(np.exp(loads(table, PHYSICS).size)) == pytest.approx(FMAX, rel=0.02)
 
 
-def test_the_change_by_a_bias_is_the_derivative() -> None:
+def test_sensitivity_to_a_bias_is_the_derivative() -> None:
     plain, step = loads(made(0), PHYSICS), 1e-6
     for k, bias in enumerate([(step, 0.0), (0.0, step)]):
         moved = loads(made(0, bias=bias), PHYSICS)
@@ -86,7 +86,7 @@ def test_the_change_by_a_bias_is_the_derivative() -> None:
 
 @pytest.mark.parametrize("baseline", [made(1), None], ids=["against training", "alone"])
 @pytest.mark.parametrize("drift", [0.2, -0.4])
-def test_a_drift_of_the_surface_friction_is_found_and_sized(drift: float, baseline: PushTable | None) -> None:
+def test_drift_of_surface_friction_is_found_and_sized(drift: float, baseline: PushTable | None) -> None:
     effects = found(made(2, drift=drift), baseline).effects
     assert [(e.mechanism, e.covariate) for e in effects] == [("surface_friction", "elapsed_time")]
     size = effects[0].parameters[0]
@@ -94,7 +94,7 @@ def test_a_drift_of_the_surface_friction_is_found_and_sized(drift: float, baseli
     assert size.unit == "1"
 
 
-def test_another_level_shows_against_the_training_windows_alone() -> None:
+def test_changed_level_is_found_only_against_training() -> None:
     table = made(2, level=0.15)
     effects = found(table, made(1)).effects
     assert [(e.mechanism, e.covariate, e.basis) for e in effects] == [("surface_friction", "model_inputs", "constant")]
@@ -103,14 +103,14 @@ def test_another_level_shows_against_the_training_windows_alone() -> None:
 
 
 @pytest.mark.parametrize("baseline", [made(1), None], ids=["against training", "alone"])
-def test_a_bias_of_the_sensor_is_no_friction(baseline: PushTable | None) -> None:
+def test_sensor_bias_is_not_reported_as_friction(baseline: PushTable | None) -> None:
     effects = found(made(2, bias=(0.15, -0.1)), baseline).effects
     assert [e.mechanism for e in effects] == ["wrench_bias"]
     assert all(p.low < truth < p.high for p, truth in zip(effects[0].parameters, (0.15, -0.1), strict=True))
     assert {p.unit for p in effects[0].parameters} == {"N"}
 
 
-def test_a_drift_that_the_training_windows_have_over_the_place_is_no_news() -> None:
+def test_dependence_on_place_that_training_has_too_is_not_reported() -> None:
     def sloped(seed: int) -> PushTable:
         table = made(seed)
         grip = np.exp(5.0 * table.covariates["slider_x"])
@@ -121,29 +121,29 @@ def test_a_drift_that_the_training_windows_have_over_the_place_is_no_news() -> N
     assert found(sloped(2), sloped(1)).effects == ()
 
 
-def test_without_an_effect_nothing_is_found() -> None:
+def test_finds_nothing_without_an_effect() -> None:
     for seed in range(10, 22):
         assert found(made(seed), made(1)).effects == ()
         assert found(made(seed), None).effects == ()
 
 
-def test_another_contact_friction_is_no_surface_friction() -> None:
+def test_changed_contact_friction_is_not_reported_as_surface_friction() -> None:
     assert found(made(2, contact_friction=0.4), made(1)).effects == ()
 
 
-def test_all_that_was_tried_is_told() -> None:
+def test_reports_every_candidate_tested() -> None:
     tested = {(t.mechanism, t.covariate) for t in found(made(2), made(1)).tested}
     assert {("surface_friction", "elapsed_time"), ("wrench_bias", "model_inputs")} <= tested
     assert {("surface_friction", "model_inputs"), ("surface_friction", "topic:/hum")} <= tested
 
 
-def test_windows_without_a_force_tell_nothing() -> None:
+def test_windows_without_a_force_give_no_finding() -> None:
     table = made(2)
     assert found(replace(table, covariates={}), table) == found(replace(table, covariates={}), None)
     assert found(replace(table, covariates={}), table).tested == ()
 
 
-def test_in_a_recording_a_drift_of_the_force_moves_no_motion_and_is_found() -> None:
+def test_drift_of_the_force_in_a_recording_is_found_and_leaves_the_motion_unchanged() -> None:
     pushes = random_pushes(60, (0.02, 0.05), rng=np.random.default_rng(3))
     recording = simulate(SimulationSpec("rect1", "delrin", pushes, seed=3))
     rig, wrench = recording.rig, recording.wrench

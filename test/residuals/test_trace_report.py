@@ -12,7 +12,7 @@ from typing import Any
 import made_up_traces as made_up
 import numpy as np
 import pytest
-from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, planted, slippery, told
+from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, planted, slippery, without_motion_effect
 
 from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.driver_basis import DriverBasis
@@ -40,6 +40,7 @@ from push_predictor.residuals.reporting.summary import comparisons_of, summary_l
 from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
 
 LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
+FIFTH = Sized("change", 0.2, 0.1, 0.3, "1")
 PIXEL = bytes.fromhex("89504e470d0a1a0a")
 UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
 
@@ -114,14 +115,16 @@ def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effect
     ("trace", "words"),
     [
         (
-            lambda: told("measurement", "clock_offset", "model_inputs", LATE),
+            lambda: without_motion_effect("measurement", "clock_offset", "model_inputs", LATE),
             "The lateness of the slider's stamps is 12.0 ms (95 % CI 10.5 to 13.5, p = 0.002).",
         ),
         (
-            lambda: told("wrench_only", "surface_friction", "elapsed_time", Sized("change", 0.2, 0.1, 0.3, "1")),
+            lambda: without_motion_effect(
+                "wrench_only", "surface_friction", "elapsed_time", Sized("change", 0.2, 0.1, 0.3, "1")
+            ),
             "The force needed to push the slider changes with elapsed time; the motion does not",
         ),
-        (lambda: told("variance", "", "elapsed_time", None), "The noise of dy is "),
+        (lambda: without_motion_effect("variance", "", "elapsed_time", None), "The noise of dy is "),
         (
             lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
             "The slider moves differently than predicted, depending on elapsed time; no known mechanism fits",
@@ -143,7 +146,7 @@ def test_every_verdict_has_its_page(tmp_path: Path, unpainted: None, trace: Call
 
 
 def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path, unpainted: None) -> None:
-    trace = told("measurement", "clock_offset", "model_inputs", LATE)
+    trace = without_motion_effect("measurement", "clock_offset", "model_inputs", LATE)
     held, fewer = trace.held_out, slice(0, 30)
     after = held.after
     cut = replace(

@@ -1,4 +1,4 @@
-"""What trace says of recordings of the rig simulator whose measurement is wrong, or only looks as if it were."""
+"""Verdicts on simulated recordings whose measurement is wrong, or only appears to be."""
 
 from __future__ import annotations
 
@@ -47,44 +47,48 @@ def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
     return trace(learnt(), LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig))
 
 
-def test_nothing_is_said_of_a_second_recording_of_the_same_rig() -> None:
+def test_second_recording_of_the_same_rig_has_no_effect() -> None:
     assert traced().verdict == "none"
 
 
-def test_a_bias_of_the_force_sensor_that_is_there_between_pushes_is_zeroed_away() -> None:
+def test_constant_bias_of_the_force_sensor_is_removed_by_zeroing() -> None:
     assert traced(wrench_bias=(0.5, 0.0, 0.0)).verdict == "none"
 
 
-def test_one_that_comes_with_the_contact_is_an_error_of_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_force_bias_during_contact_is_a_measurement_error(monkeypatch: pytest.MonkeyPatch) -> None:
     pulls = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
     effect = WrenchEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ())
     found = WrenchFinding((effect,), (), 0.1, True)
     monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
-    told = trace_json(traced())
-    assert (told["verdict"], told["channel"], told["motion_model_changed"]) == ("measurement", "measurement", False)
-    assert [effect["mechanism"] for effect in told["effects"]] == ["wrench_bias"] * 2
+    result = trace_json(traced())
+    assert (result["verdict"], result["channel"], result["motion_model_changed"]) == (
+        "measurement",
+        "measurement",
+        False,
+    )
+    assert [effect["mechanism"] for effect in result["effects"]] == ["wrench_bias"] * 2
 
 
-def test_a_clock_that_is_late_is_corrected() -> None:
+def test_late_clock_is_corrected() -> None:
     found = traced(clock_offset=0.03)
     assert found.verdict == "measurement" and found.effects[0].mechanism == "clock_offset"
     assert found.effects[0].parameter is not None
     assert found.effects[0].parameter.value == pytest.approx(0.03, abs=0.006)
 
 
-def test_a_soft_tip_is_not_called_a_late_clock() -> None:
-    """It opens the gap as a late clock does, but with the clock put right the predictions stay as wrong."""
+def test_compliant_tip_is_not_reported_as_a_late_clock() -> None:
+    """It opens the gap like a late clock, but correcting the clock does not improve the predictions."""
     found = traced(compliance=2e-3)
     assert found.verdict not in ("none", "measurement")
 
 
-def test_what_lies_in_the_models_own_inputs_is_told_and_left_to_a_refit() -> None:
-    """A slippery rod: every window is other than it was, and the same model trained anew has it."""
+def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> None:
+    """Lower contact friction changes every window, and the same model learns it when retrained."""
     found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2)))
-    told = trace_json(found)
-    assert (told["verdict"], told["kind"], told["covariates"][0]) == ("effect", "mean", "model_inputs")
-    assert not told["motion_model_changed"] and found.extended is None
-    assert told["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
-    refit, before = (sum(told[model]["nlpd"].values()) for model in ("refit", "before"))
+    result = trace_json(found)
+    assert (result["verdict"], result["kind"], result["covariates"][0]) == ("effect", "mean", "model_inputs")
+    assert not result["motion_model_changed"] and found.extended is None
+    assert result["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
+    refit, before = (sum(result[model]["nlpd"].values()) for model in ("refit", "before"))
     assert refit < before
     assert "Retraining on the new pushes fixes this." in worth_sentence(found)

@@ -1,4 +1,4 @@
-"""Traces whose truth is known: pushes by the analytical model with a planted effect, and the effect as if found."""
+"""Traces with known truth: pushes of the analytical model with a planted effect, and a trace that found it."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def slippery(size: float) -> Effect:
 
 
 def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", **other: Any) -> Trace:
-    """A trace that found exactly these effects; other: fields that are to be otherwise."""
+    """A trace that found exactly these effects; other: fields to replace."""
     model = train_model(pushes(60, 1), square_rig(), kind, name="deployed")
     table = pushes(count, 2, *effects)
     held = held_out_rows(table)
@@ -97,7 +97,7 @@ def made_up_trace(*effects: Effect, count: int = 150, kind: str = "analytical", 
 
 
 def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tuple[Effect, ...]) -> Trace:
-    """What a trace that finds these effects would say."""
+    """The trace that finds these effects."""
     refit = refit_base(model, analysis)
     evidence = evidence_of(model, analysis)
     candidates = [candidate(evidence, e.mechanism, e.covariate, e.basis) for e in effects]
@@ -131,7 +131,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
 
 
 def found(term: Effect) -> FoundEffect:
-    """An effect as a trace tells it."""
+    """An effect as a trace reports it."""
     sd = float(np.sqrt(term.covariance[0, 0]))
     value = float(term.coefficients[0])
     size = Sized("change per 300 s", value, value - 1.96 * sd, value + 1.96 * sd, "1")
@@ -139,8 +139,8 @@ def found(term: Effect) -> FoundEffect:
     return FoundEffect(term.mechanism, term.covariate, ("dy", "dtheta"), term.basis.name, parameter, 0.001, 0.23)
 
 
-def told(verdict: Any, mechanism: str, covariate: str, size: Sized | None, **other: Any) -> Trace:
-    """A trace whose finding leaves the motion model alone."""
+def without_motion_effect(verdict: Any, mechanism: str, covariate: str, size: Sized | None, **other: Any) -> Trace:
+    """A trace whose finding does not change the motion model."""
     outputs = () if verdict in ("measurement", "wrench_only") else ("dy",)
     effect = FoundEffect(mechanism or None, covariate, outputs, "constant", size, 0.002, float("nan"))
     kind: Literal["mean", "variance"] = "variance" if verdict == "variance" else "mean"

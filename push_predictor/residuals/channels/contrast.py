@@ -24,9 +24,7 @@ GROSS = 5.0  # robust standard deviations; windows farther out are rejected
 TRIMMING_ROUNDS = 4
 FEWEST_PUSHES = 12  # of a training table that is used
 MAD_TO_SD = 1.4826
-COLLINEAR = (
-    1e-6  # share of a column's square that the controls leaves; below it the column cannot be told from the controls
-)
+COLLINEAR = 1e-6  # share of a column's square that the controls do not explain; less counts as collinear
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,8 @@ def effects_table(trace: Trace) -> str:
     head = ("mechanism", "depends on", "parameter", "value", "outputs", "share", "p")
     caption = (
         "Effects found, strongest first. In brackets: 95 % intervals. Share: of the squared standardised residual of "
-        "the analysis pushes. p: family-wise, over all candidates."
+        "the analysis pushes. p: family-wise, over all candidates. Along a covariate, the value is the change over its "
+        "range."
     )
     return html.table(caption, head, rows)
 

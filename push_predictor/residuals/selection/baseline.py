@@ -2,7 +2,7 @@
 
 A learnt base saw few pushes, so its error is a function of its inputs even where nothing changed. An effect in these
 inputs therefore counts only as the relation in the new data minus the relation in training, uncertain in both. The same
-holds for covariates that share the tracker's noise with the residual.
+is true of covariates that share the tracker's noise with the residual.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, grid
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.figures.partial import Binned, Rows, Strength, binned, per_push, responses
-from push_predictor.residuals.reporting.phrases import covariate_phrase, label, with_unit
+from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, label, with_unit
 from push_predictor.types import Array, IntArray
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _paint_panel(ax: Axes, trace: Trace, strength: Strength, analysis: Rows, hel
     ax.set_ylim(_limits(strength, trace, analysis, q))
     unit = strength.units[q]
     ax.set_xlabel(driver_label(basis))
-    ax.set_ylabel(strength.names[q] if unit == "1" else f"{strength.names[q]} ({unit})")
+    ax.set_ylabel(capitalised(strength.names[q]) if unit == "1" else f"{capitalised(strength.names[q])} ({unit})")
     if basis.name == "category":
         ax.set_xticks(basis.levels)
 

@@ -13,7 +13,7 @@ from push_predictor.residuals.reporting.figures.driver_basis import hidden_pushe
 from push_predictor.residuals.reporting.figures.partial import Rows, Strength, analysis_rows, held_out_rows, strength_of
 from push_predictor.residuals.reporting.figures.shifts import course_of, paint_course, paint_shifts
 from push_predictor.residuals.reporting.figures.tested import FLOOR, best_of, grid_of, paint_tested
-from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, effect_phrase, listed
+from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, effect_phrase, listed, moved_noun
 from push_predictor.residuals.reporting.quantities import count
 from push_predictor.residuals.reporting.summary import comparisons_of
 
@@ -96,7 +96,9 @@ def _basis_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows,
     wide = len(effect.basis.drivers) > 1
     height = 3.4 * len(strength.names) if wide else 4.2
     draw(path, (WIDTH, height), lambda figure: paint_basis(figure, trace, strength, analysis, held_out))
-    what = f"{capitalised(effect_phrase(effect.mechanism, effect.covariate))}, {effect.basis.name}"
+    name = capitalised(moved_noun(effect.mechanism))
+    covariates = listed([covariate_phrase(driver) for driver in effect.basis.drivers])
+    what = f"{name} against {covariates} ({effect.basis.name})"
     hidden = hidden_pushes(strength, trace, analysis)
     data = (
         "Left: the fitted map. Right: each cell estimated by itself."
@@ -111,10 +113,8 @@ def _basis_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows,
         else " The mechanism is unknown, so the strongest pattern over contact point and push angle is shown: "
         f"{100.0 * strength.share:.0f} % of the fitted coefficients' sum of squares."
     )
-    covariates = listed([covariate_phrase(name) for name in effect.basis.drivers])
-    return Picture(
-        path, f"Fitted effect against {covariates}, with the data.", f"{what}. {data} {_data_words(trace)}{pattern}"
-    )
+    caption = f"{what}. {data} {_data_words(trace)}{pattern}"
+    return Picture(path, f"Fitted effect against {covariates}, with the data.", caption)
 
 
 def _course_picture(path: Path, trace: Trace, effect: Effect, analysis: Rows) -> Picture:
