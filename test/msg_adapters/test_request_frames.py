@@ -1,7 +1,6 @@
-"""Requests in the world frame and in others: frames in space, messages, and a made-up tf.
+"""Requests in the world frame and in other frames: poses in space, messages, and a fake tf.
 
-tf2_ros is not among what the tests can install: MadeUpTf stands for it, and shows no more than that it is asked as its
-documentation says.
+The tests cannot install tf2_ros. FakeTf replaces it, and checks only that it is called as documented.
 """
 
 from __future__ import annotations
@@ -42,12 +41,12 @@ POSES = st.builds(
     st.tuples(NUMBERS, NUMBERS, NUMBERS),
     st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS).filter(lambda q: np.linalg.norm(q) > 0.1),
 )
-TABLE_TOP = SpatialPose(np.array([0.5, -0.3, 0.8]), vertical_turn(2.0))  # flat, but turned and shifted
+TABLE_TOP = SpatialPose(np.array([0.5, -0.3, 0.8]), vertical_turn(2.0))  # flat, but rotated and translated
 CAMERA = SpatialPose(np.array([1.0, 0.2, 1.5]), Rotation.from_euler("xyz", [2.4, 0.3, -1.0]).as_quat())  # looks down
 
 
 def slider_request(frame_id: str = "world", **change: Any) -> PredictSliderPose.Request:
-    """A tip that drives along x at the first edge of the square, which is at (0.3, 0.1, 0.02) and not turned."""
+    """A tip that moves along x at the first edge of the square, whose pose is (0.3, 0.1, 0.02) without rotation."""
     request = PredictSliderPose.Request(
         header=Header(stamp=Time(sec=100, nanosec=900_000_000), frame_id=frame_id),
         slider=Pose(position=Point(x=0.3, y=0.1, z=0.02), orientation=Quaternion(w=1.0)),
@@ -65,7 +64,7 @@ def slider_request(frame_id: str = "world", **change: Any) -> PredictSliderPose.
 
 
 def seen_from(frame: SpatialPose, request: PredictSliderPose.Request, frame_id: str) -> PredictSliderPose.Request:
-    """The same request, asked in another frame."""
+    """The same request in another frame."""
     query, there = query_from_slider_request(request), frame.inverse
     slider, pusher, velocity = there @ query.slider, there.point(query.pusher), there.vector(query.velocity)
     request = slider_request(frame_id)
@@ -94,7 +93,7 @@ def assert_same_pose(one: SpatialPose, other: SpatialPose, atol: float = 1e-12) 
 
 @settings(deadline=None)
 @given(POSES, POSES, st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array))
-def test_poses_compose_as_rotations_and_shifts_do(outer: SpatialPose, inner: SpatialPose, point: np.ndarray) -> None:
+def test_poses_compose_as_rotations_and_translations(outer: SpatialPose, inner: SpatialPose, point: np.ndarray) -> None:
     np.testing.assert_allclose(outer.rotation, Rotation.from_quat(outer.quaternion).as_matrix(), atol=1e-12)
     np.testing.assert_allclose((outer @ inner).point(point), outer.point(inner.point(point)), atol=1e-12)
     np.testing.assert_allclose(outer.inverse.point(outer.point(point)), point, atol=1e-12)
@@ -115,8 +114,8 @@ def test_tilt_is_the_angle_between_the_vertical_axes(pose: SpatialPose, turn: fl
     )
 
 
-def test_a_covariance_in_space_is_that_of_samples_seen_from_the_other_frame() -> None:
-    """Small errors of a pose, drawn in one frame: shift and turn as a fixed-axis rotation vector."""
+def test_a_covariance_is_that_of_samples_in_the_other_frame() -> None:
+    """Small errors of a pose, drawn in one frame: translation and rotation vector about fixed axes."""
     rng = np.random.default_rng(0)
     root = 1e-4 * rng.standard_normal((6, 6))
     body, outer = SpatialPose(np.array([0.1, 0.2, 0.3]), CAMERA.quaternion), TABLE_TOP @ CAMERA
@@ -128,7 +127,7 @@ def test_a_covariance_in_space_is_that_of_samples_seen_from_the_other_frame() ->
         seen.append(np.concatenate([there.position - base.position, turn.as_rotvec()]))
     expected = outer.covariance(root @ root.T)
     assert np.abs(np.cov(np.array(seen).T) - expected).max() < 0.1 * np.abs(expected).max()
-    # The draws themselves rotate exactly, whatever their scatter:
+    # The draws themselves rotate exactly, whatever their spread:
     errors = np.random.default_rng(0)
     errors.standard_normal((6, 6))
     drawn = errors.standard_normal((2000, 6)) @ root.T
@@ -144,7 +143,7 @@ def answered(request: Any, after: SliderAfter, frame: SpatialPose = SAME_FRAME) 
     return deserialize_message(serialize_message(response), PredictSliderPose.Response)
 
 
-def test_a_request_says_what_is_pushed() -> None:
+def test_a_request_becomes_a_push_in_the_world() -> None:
     request = slider_request(
         slider__orientation=Quaternion(z=np.sin(0.35), w=np.cos(0.35)),
         covariate_names=["elapsed_time", "topic:/warmth"],
@@ -158,7 +157,7 @@ def test_a_request_says_what_is_pushed() -> None:
     assert push.covariates == {"elapsed_time": 3.0, "topic:/warmth": 21.5}
 
 
-def test_an_answer_is_a_pose_with_covariance_in_the_order_of_geometry_msgs() -> None:
+def test_a_response_is_a_pose_with_covariance_in_the_order_of_geometry_msgs() -> None:
     response = answered(slider_request(), SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True))
     assert response.success and response.in_domain and response.message == ""
     after = response.slider_after
@@ -179,12 +178,12 @@ def test_an_unknown_time_stays_unknown() -> None:
     assert (after.header.stamp.sec, after.header.stamp.nanosec) == (0, 0)
 
 
-def test_a_time_beyond_what_a_stamp_holds_is_refused() -> None:
+def test_rejects_a_time_beyond_32_bit_seconds() -> None:
     with pytest.raises(MessageError, match="stamp"):
         answered(slider_request(duration=1e10), SliderAfter(np.zeros(3), COVARIANCE, False))
 
 
-def test_a_small_tilt_stays_as_it_was() -> None:
+def test_a_small_tilt_does_not_change() -> None:
     tilted = Rotation.from_euler("z", 0.4) * Rotation.from_euler("xy", [0.03, -0.02])
     request = slider_request(slider__orientation=Quaternion(**axes(tilted.as_quat())))
     response = answered(request, SliderAfter(np.array([0.3, 0.1, 0.4 + 0.2]), COVARIANCE, True))
@@ -205,7 +204,7 @@ def test_a_small_tilt_stays_as_it_was() -> None:
     + [(f"pusher__{axis}", f"pusher.{axis}") for axis in "xyz"]
     + [(f"pusher_velocity__{axis}", f"pusher_velocity.{axis}") for axis in "xyz"],
 )
-def test_a_number_that_is_not_finite_is_refused_by_field(field: str, shown: str, bad: float) -> None:
+def test_rejects_numbers_that_are_not_finite_by_field(field: str, shown: str, bad: float) -> None:
     with pytest.raises(RequestError, match=f"^{shown}: {bad!r} is not accepted, give a finite number"):
         query_from_slider_request(slider_request(**{field: bad}))
 
@@ -225,13 +224,13 @@ def test_a_number_that_is_not_finite_is_refused_by_field(field: str, shown: str,
         ({"covariate_names": ["a", "a"], "covariate_values": [1.0, 2.0]}, "covariate_names: ['a']"),
     ],
 )
-def test_what_is_no_planar_push_is_refused_by_field(change: dict[str, Any], begins: str) -> None:
+def test_rejects_a_push_out_of_the_plane_by_field(change: dict[str, Any], begins: str) -> None:
     with pytest.raises(RequestError) as caught:
         world_push(query_from_slider_request(slider_request(**change)), SAME_FRAME)
     assert str(caught.value).startswith(begins)
 
 
-def test_what_a_tracker_is_off_is_no_tilt_and_no_plunge() -> None:
+def test_accepts_the_errors_of_a_tracker_out_of_the_plane() -> None:
     half = 0.45 * FLAT
     world_push(
         query_from_slider_request(
@@ -249,7 +248,7 @@ def test_what_a_tracker_is_off_is_no_tilt_and_no_plunge() -> None:
 
 
 @pytest.mark.parametrize("frame", [TABLE_TOP, CAMERA], ids=["table_top", "camera"])
-def test_a_request_in_another_frame_is_the_same_push_and_gets_the_same_answer(frame: SpatialPose) -> None:
+def test_a_request_in_another_frame_is_the_same_push_with_the_same_response(frame: SpatialPose) -> None:
     asked, elsewhere = slider_request(), seen_from(frame, slider_request(), "elsewhere")
     here = world_push(query_from_slider_request(asked), SAME_FRAME)
     there = world_push(query_from_slider_request(elsewhere), frame)
@@ -267,8 +266,8 @@ def test_a_request_in_another_frame_is_the_same_push_and_gets_the_same_answer(fr
     np.testing.assert_allclose(frame.covariance(own), world, atol=1e-18)
 
 
-def test_a_flat_frame_gets_a_flat_answer() -> None:
-    """No height, roll or pitch comes in by the transform; the heading's variance is the same in both."""
+def test_a_flat_frame_gets_a_flat_response() -> None:
+    """The transform adds no height, roll or pitch; the heading's variance is the same in both frames."""
     elsewhere = seen_from(TABLE_TOP, slider_request(), "table_top")
     after = answered(elsewhere, SliderAfter(np.array([0.304, 0.101, 0.05]), COVARIANCE, True), TABLE_TOP).slider_after
     pose, matrix = pose_of(after), np.array(after.pose.covariance).reshape(6, 6)
@@ -278,14 +277,14 @@ def test_a_flat_frame_gets_a_flat_answer() -> None:
     assert np.linalg.eigvalsh(matrix[:2, :2]) == pytest.approx(np.linalg.eigvalsh(COVARIANCE[:2, :2]), rel=1e-9)
 
 
-def test_a_slider_that_is_flat_only_in_its_own_frame_is_refused() -> None:
+def test_rejects_a_slider_that_is_flat_only_in_its_own_frame() -> None:
     with pytest.raises(RequestError, match=r"slider\.orientation tilt"):
         world_push(query_from_slider_request(slider_request("camera")), CAMERA)
 
 
 @settings(max_examples=30, deadline=None)
 @given(POSES)
-def test_any_frame_in_space_leads_to_the_same_prediction(frame: SpatialPose) -> None:
+def test_every_frame_in_space_gives_the_same_prediction(frame: SpatialPose) -> None:
     model = analytical()
     here = slider_after(model, world_push(query_from_slider_request(slider_request()), SAME_FRAME))
     elsewhere = query_from_slider_request(seen_from(frame, slider_request(), "elsewhere"))
@@ -297,12 +296,12 @@ def test_any_frame_in_space_leads_to_the_same_prediction(frame: SpatialPose) -> 
 # --- which frames are known -------------------------------------------------------------------------------------
 
 
-class MadeUpError(Exception):
-    """Stands for tf2_ros.TransformException."""
+class FakeError(Exception):
+    """Replaces tf2_ros.TransformException."""
 
 
-class MadeUpBuffer:
-    """Stands for tf2_ros.Buffer: knows `table_top` and `camera` in `world`, from 50 s on."""
+class FakeBuffer:
+    """Replaces tf2_ros.Buffer: knows `table_top` and `camera` in `world`, from 50 s on."""
 
     asked: list[tuple[str, str, int]]
 
@@ -313,24 +312,24 @@ class MadeUpBuffer:
         self.asked.append((target_frame, source_frame, time.nanoseconds))
         known = {"table_top": TABLE_TOP, "camera": CAMERA}
         if source_frame not in known:
-            raise MadeUpError(f'"{source_frame}" passed to lookupTransform argument source_frame does not exist.')
+            raise FakeError(f'"{source_frame}" passed to lookupTransform argument source_frame does not exist.')
         if 0 < time.nanoseconds < 50_000_000_000:
-            raise MadeUpError("Lookup would require extrapolation into the past.")
+            raise FakeError("Lookup would require extrapolation into the past.")
         pose = known[source_frame]
         transform = Transform(translation=Vector3(**axes(pose.position)), rotation=Quaternion(**axes(pose.quaternion)))
         return SimpleNamespace(transform=transform)
 
 
-class MadeUpTf(SimpleNamespace):
-    """Stands for the module tf2_ros."""
+class FakeTf(SimpleNamespace):
+    """Replaces the module tf2_ros."""
 
     def __init__(self) -> None:
-        self.buffers: list[MadeUpBuffer] = []
+        self.buffers: list[FakeBuffer] = []
         self.listeners: list[tuple[Any, Any]] = []
-        super().__init__(TransformException=MadeUpError)
+        super().__init__(TransformException=FakeError)
 
-    def Buffer(self) -> MadeUpBuffer:  # noqa: N802 (its name in tf2_ros)
-        self.buffers.append(MadeUpBuffer())
+    def Buffer(self) -> FakeBuffer:  # noqa: N802 (its name in tf2_ros)
+        self.buffers.append(FakeBuffer())
         return self.buffers[-1]
 
     def TransformListener(self, buffer: Any, node: Any) -> object:  # noqa: N802 (its name in tf2_ros)
@@ -339,8 +338,8 @@ class MadeUpTf(SimpleNamespace):
 
 
 @pytest.fixture
-def tf(monkeypatch: pytest.MonkeyPatch) -> MadeUpTf:
-    made_up = MadeUpTf()
+def tf(monkeypatch: pytest.MonkeyPatch) -> FakeTf:
+    made_up = FakeTf()
     monkeypatch.setitem(sys.modules, "tf2_ros", made_up)
     return made_up
 
@@ -354,30 +353,30 @@ def header(frame_id: str, sec: int = 100) -> Header:
     return Header(frame_id=frame_id, stamp=Time(sec=sec))
 
 
-def test_the_world_frame_is_used_as_it_is(no_tf: None) -> None:
+def test_the_world_frame_needs_no_transform(no_tf: None) -> None:
     assert RequestFrames(object(), "table").pose_in_world(header("table")) is SAME_FRAME
 
 
 @pytest.mark.parametrize("frame_id", ["map", "World"])
-def test_without_tf_another_frame_is_refused_by_name(no_tf: None, frame_id: str) -> None:
+def test_rejects_another_frame_by_name_without_tf(no_tf: None, frame_id: str) -> None:
     with pytest.raises(RequestError) as caught:
         RequestFrames(object(), "world").pose_in_world(header(frame_id))
     expected = f"header.frame_id: {frame_id!r} is not accepted, give 'world'; tf2_ros is not installed"
     assert str(caught.value) == expected
 
 
-def test_a_slash_of_old_habit_is_named(tf: MadeUpTf) -> None:
+def test_rejects_a_leading_slash_by_name(tf: FakeTf) -> None:
     with pytest.raises(RequestError, match="give 'world', without a slash"):
         RequestFrames(object(), "world").pose_in_world(header("/world"))
 
 
-def test_a_frame_without_a_name_is_refused(tf: MadeUpTf) -> None:
+def test_rejects_an_empty_frame_id(tf: FakeTf) -> None:
     with pytest.raises(RequestError, match=r"header\.frame_id: '' is not accepted, give .* 'world'"):
         RequestFrames(object(), "world").pose_in_world(header(""))
     assert not tf.buffers[0].asked
 
 
-def test_made_up_tf_is_asked_for_the_frame_in_the_world_at_the_stamp(tf: MadeUpTf) -> None:
+def test_looks_up_the_frame_in_the_world_at_the_stamp(tf: FakeTf) -> None:
     node = object()
     frames = RequestFrames(node, "world")
     assert tf.listeners == [(tf.buffers[0], node)]
@@ -387,12 +386,12 @@ def test_made_up_tf_is_asked_for_the_frame_in_the_world_at_the_stamp(tf: MadeUpT
     assert tf.buffers[0].asked == [("world", "camera", 100_000_000_000), ("world", "table_top", 0)]
 
 
-@pytest.mark.parametrize(("frame_id", "sec", "said"), [("map", 100, '"map" passed'), ("camera", 10, "extrapolation")])
-def test_what_made_up_tf_says_is_passed_on(tf: MadeUpTf, frame_id: str, sec: int, said: str) -> None:
+@pytest.mark.parametrize(("frame_id", "sec", "error"), [("map", 100, '"map" passed'), ("camera", 10, "extrapolation")])
+def test_passes_on_the_error_of_tf(tf: FakeTf, frame_id: str, sec: int, error: str) -> None:
     with pytest.raises(RequestError) as caught:
         RequestFrames(object(), "world").pose_in_world(header(frame_id, sec))
     assert str(caught.value).startswith(f"header.frame_id: {frame_id!r} is not accepted, give 'world', or a frame")
-    assert said in str(caught.value)
+    assert error in str(caught.value)
 
 
 @cache
@@ -400,7 +399,7 @@ def analytical() -> Any:
     return train_model(*square_pushes(30), "analytical", name="square")
 
 
-def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_path: Any) -> None:
+def test_a_request_in_a_frame_of_tf_is_answered_in_that_frame(tf: FakeTf, tmp_path: Any) -> None:
     registry, frames = ModelRegistry(), RequestFrames(object(), "world")
     save_model(analytical(), tmp_path / "square.model")
     registry.load(tmp_path / "square.model")
@@ -415,7 +414,7 @@ def test_a_request_in_a_frame_of_made_up_tf_is_answered_in_it(tf: MadeUpTf, tmp_
     assert world.any()
 
 
-def test_a_refusal_leaves_no_number_behind(no_tf: None, tmp_path: Any) -> None:
+def test_a_refusal_contains_no_number(no_tf: None, tmp_path: Any) -> None:
     registry, response = ModelRegistry(), PredictSliderPose.Response()
     with pytest.raises(PushPredictorError):
         handle_predict_slider_pose(RequestFrames(object(), "world"), registry, slider_request(), response)
