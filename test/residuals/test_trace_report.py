@@ -16,7 +16,10 @@ from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, plant
 
 from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.request import UNITS
 from push_predictor.residuals import outcome
+from push_predictor.residuals.channels.corrections import CORRECTIONS
 from push_predictor.residuals.outcome import Gain, Sized, Trace
 from push_predictor.residuals.reporting import page as report
 from push_predictor.residuals.reporting.advice import separating_words
@@ -35,6 +38,8 @@ from push_predictor.residuals.reporting.figures.partial import (
 from push_predictor.residuals.reporting.figures.shifts import binned_means, course_of
 from push_predictor.residuals.reporting.figures.tested import best_of, role_of
 from push_predictor.residuals.reporting.page import write_trace_report
+from push_predictor.residuals.reporting.phrases import COVARIATES, MECHANISMS
+from push_predictor.residuals.reporting.quantities import estimate
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
 from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
@@ -192,6 +197,18 @@ def test_worth_sentence_separates_found_from_worth_modelling(drift: Trace, gain:
 def test_verdict_explains_a_candidate_below_alpha_that_is_not_significant(nothing: Trace) -> None:
     near = replace(nothing, tested=(outcome.Tested("inertia", "velocity", 0.008),))
     assert "share the level" in verdict_sentence(near)
+
+
+def test_every_mechanism_and_covariate_has_a_phrase() -> None:
+    assert {mechanism.name for mechanism in LIBRARY} | set(CORRECTIONS) | {"surface_friction"} <= set(MECHANISMS)
+    assert set(UNITS) <= set(COVARIATES)
+    assert not any("_" in phrase for phrase in [*COVARIATES.values(), *(m.noun for m in MECHANISMS.values())])
+
+
+def test_intervals_show_the_digits_that_they_determine() -> None:
+    assert estimate(Gain(0.764, 0.731, 0.802), p_value=0.001) == "0.76 (95 % CI 0.73 to 0.80, p = 0.001)"
+    assert estimate(Gain(-12.04, -13.5, -10.5), "ms") == "−12.0 ms (95 % CI −13.5 to −10.5)"
+    assert estimate(Gain(0.5, float("nan"), float("nan"))) == "0.5"
 
 
 def test_advice_matches_the_rivals() -> None:
