@@ -1,10 +1,10 @@
-"""How often the alarm about a VHGP is false, and how soon it tells of a change, on simulated recordings.
+"""False-alarm rate and delay of the alarm about a VHGP, on simulated recordings.
 
     python -m benchmarks.blind.alarm [--seeds 8] [--json FILE] [--markdown FILE]
 
-For each seed a rig is drawn, a VHGP of 1000 windows is trained on 500 pushes, and two later recordings of 300 pushes
-are judged: one as it is, and one in which the contact friction rises by 0.25 (a medium effect) at a push between the
-90th and the 210th.
+For each seed a rig is drawn and a VHGP of 1000 windows is trained on 500 pushes. Two later recordings of 300 pushes
+follow: one without a change, and one in which the contact friction rises by 0.25 (a medium effect) at a push between
+the 90th and the 210th.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ SHARES = (0.3, 0.7)  # of the later pushes, between which the change comes
 
 @dataclass(frozen=True)
 class Row:
-    """One recording: pushes judged, the push before which the change came (None: no change), and the alarm's answer.
+    """The alarm on one recording.
 
-    fired: how many pushes had been seen then, None if it did not fire; by: the score that did. seconds: of the
-    calibration.
+    change: the push before which the change came, None without one. fired: number of pushes seen when the alarm fired,
+    None if it did not; by: the score that fired. seconds: of the calibration.
     """
 
     seed: int
@@ -57,18 +57,18 @@ class Row:
 
     @property
     def delay(self) -> int | None:
-        """Pushes with the change in them until it was told; None without a change, or if told before or not at all."""
+        """Pushes from the change to the alarm; None without a change, a detection, or if the alarm fired before."""
         late = self.change is not None and self.fired is not None and self.fired > self.change
         return self.fired - self.change if late and self.fired is not None and self.change is not None else None
 
     @property
     def false(self) -> bool:
-        """Whether it fired with nothing to fire at."""
+        """Whether it fired without a change."""
         return self.fired is not None and self.delay is None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what the command line says."""
+    """Print the table of all recordings."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--json", type=Path)
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def rows_of(seed: int) -> list[Row]:
-    """The recordings of one seed, without and with the change."""
+    """Rows of the recordings of one seed, without and with the change."""
     model, plain, changed, change = case_of(seed)
     begin = time.process_time()
     calibration = calibrate(model)
@@ -104,7 +104,7 @@ def rows_of(seed: int) -> list[Row]:
 
 
 def case_of(seed: int) -> tuple[PushModel, PushTable, PushTable, int]:
-    """A model, the windows of later pushes without and with a change, and before which push the change comes."""
+    """A model, the windows of later pushes without and with a change, and the push before which it comes."""
     rng = np.random.default_rng([seed, 7])
     rig = rig_of(rng, f"{seed}", TRAINING)
     plain, other = (later_spec(rig, rng, LATER) for _ in range(2))
@@ -121,12 +121,12 @@ def _risen(change: int, moment: Moment) -> Array:
 
 
 def table_of(spec: SimulationSpec) -> PushTable:
-    """The windows of a recording to be made."""
+    """Simulate a recording and find its windows."""
     return windows_to_table(find_windows(simulate(spec), simulated_rig(spec)))
 
 
 def state_of(model: PushModel, calibration: Calibration, table: PushTable) -> AlarmState:
-    """What the alarm says after all pushes of a table."""
+    """The state of the alarm after all pushes of a table."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
     return alarm_state(calibration, table, prediction.mean, prediction.covariance)
 
@@ -134,14 +134,13 @@ def state_of(model: PushModel, calibration: Calibration, table: PushTable) -> Al
 def markdown_of(rows: Sequence[Row]) -> str:
     """The table for the documentation, with counts and 95 % Wilson intervals."""
     plain, changed = ([row for row in rows if (row.change is None) is without] for without in (True, False))
-    lines = ["| 300 pushes a recording | count | of | 95 % interval |", "| --- | --- | --- | --- |"]
+    lines = ["| recordings of 300 pushes | count | of | 95 % interval |", "| --- | --- | --- | --- |"]
     lines.append(_line("false alarms, recordings without a change", sum(r.false for r in plain), len(plain)))
     lines.append(_line("false alarms, before the change", sum(r.false for r in changed), len(changed)))
     delays = sorted(row.delay for row in changed if row.delay is not None)
-    lines.append(_line("changes told before the end", len(delays), len(changed)))
+    lines.append(_line("changes detected before the end", len(delays), len(changed)))
     if delays:
-        told = f"{', '.join(map(str, delays))}; median {np.median(delays):g}"
-        lines.append(f"\nPushes until the change was told: {told}.")
+        lines.append(f"\nPushes until the alarm: {', '.join(map(str, delays))}; median {np.median(delays):g}.")
     seconds = [row.seconds for row in rows]
     lines.append(f"Calibration: {min(seconds):.1f} to {max(seconds):.1f} s of one core.")
     return "\n".join(lines) + "\n"

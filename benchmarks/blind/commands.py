@@ -6,12 +6,12 @@
     python -m benchmarks.blind removed --data blind/data --truth blind/truth --out blind/removed
     python -m benchmarks.blind score --results blind/results --truth blind/truth [--json FILE] [--markdown FILE]
 
-make: the rig simulator makes, for each number, a model trained on a recording (its windows are in the model; the
-recording is not kept) and a new recording with an effect drawn from benchmarks/blind/effects.py, with none, or with a
-change of the wrench only. What was drawn goes to a folder of its own, which `run` is not told. oracle: what a model
-gains that is given the true mechanism, driver and form. removed: like run, on the recordings with an effect of the
-library, each traced without the mechanism that acts in it: it must come back as unknown. run, oracle and removed go on
-where they were stopped; results and truth of a number are JSON files NNN.json.
+make: simulate, for each number, a model trained on one recording (only its windows are kept, in the model) and a new
+recording. The new one has an effect drawn from benchmarks/blind/effects.py, none, or a change of the wrench only. What
+was drawn goes to a separate folder, which `run` does not receive. oracle: the gain of a model with the true mechanism,
+driver and form. removed: like run, on the recordings with an effect of the library, each traced without the mechanism
+that acts in it, so that it must come back as unknown. run, oracle and removed continue an interrupted run. Results and
+truth of a number are JSON files NNN.json.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CYCLE = (*["none"] * 6, *["wrench"] * 2, *["library"] * 7, *["outside"] * 2, *["
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what the command line says."""
+    """Run one of the commands."""
     options = _parser().parse_args(arguments)
     work: Callable[[argparse.Namespace], None] = options.work
     work(options)
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make(options: argparse.Namespace) -> None:
-    """Make the recordings."""
+    """Simulate the recordings and train their models."""
     size = Size(options.training, options.least, options.most, options.rows, options.model)
     apart(options.out, options.truth)
     options.truth.mkdir(parents=True, exist_ok=True)
@@ -53,7 +53,7 @@ def make(options: argparse.Namespace) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Trace every recording; what fails is kept as a result that says so."""
+    """Trace every recording; a failed trace is recorded as such."""
     options.out.mkdir(parents=True, exist_ok=True)
     found = sorted(path.name for path in options.data.iterdir() if (path / MODEL).exists())
     todo = [(name, options) for name in found if not (options.out / f"{name}.json").exists()]
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def oracle(options: argparse.Namespace) -> None:
-    """Add to every truth what an oracle gains."""
+    """Add the gain of an oracle to every truth."""
     apart(options.data, options.truth)
     todo = [(path, options.data) for path in sorted(options.truth.glob("*.json"))]
     _all(_oracle_kept, [call for call in todo if "oracle_gain" not in json.loads(call[0].read_text())], options.cores)
@@ -71,8 +71,8 @@ def removed(options: argparse.Namespace) -> None:
     """Trace every recording with an effect of the library without that mechanism."""
     apart(options.out, options.truth)
     options.out.mkdir(parents=True, exist_ok=True)
-    told = {path.stem: json.loads(path.read_text()) for path in sorted(options.truth.glob("*.json"))}
-    acting = {name: truth["names"][0] for name, truth in told.items() if truth["group"] == "library"}
+    known = {path.stem: json.loads(path.read_text()) for path in sorted(options.truth.glob("*.json"))}
+    acting = {name: truth["names"][0] for name, truth in known.items() if truth["group"] == "library"}
     todo = [
         (name, argparse.Namespace(**{**vars(options), "without": mechanism}))
         for name, mechanism in acting.items()
@@ -82,7 +82,7 @@ def removed(options: argparse.Namespace) -> None:
 
 
 def score(options: argparse.Namespace) -> None:
-    """Print the table, write it where asked."""
+    """Print the score; write it to the files of --json and --markdown."""
     truths = {path.stem: json.loads(path.read_text()) for path in sorted(options.truth.glob("*.json"))}
     results = {path.stem: json.loads(path.read_text()) for path in sorted(options.results.glob("*.json"))}
     scored = score_of(truths, results)
@@ -95,14 +95,14 @@ def score(options: argparse.Namespace) -> None:
 
 
 def apart(data: Path, truth: Path) -> None:
-    """Refuse folders of which one lies in the other: the trace must not come upon the truth."""
+    """Raise SystemExit if one folder lies in the other: the trace must not find the truth."""
     one, other = data.resolve(), truth.resolve()
     if one == other or one in other.parents or other in one.parents:
-        raise SystemExit(f"--truth: {truth} and {data} must lie apart")
+        raise SystemExit(f"--truth: {truth} and {data} must not contain each other")
 
 
 def trace_one(folder: Path, alpha: float, without: str | None) -> dict[str, Any]:
-    """The verdict on one recording, with the seconds of processor time that it took."""
+    """The verdict on one recording, and the CPU seconds of the trace."""
     from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.trace import trace_data
 
@@ -110,13 +110,13 @@ def trace_one(folder: Path, alpha: float, without: str | None) -> dict[str, Any]
     try:
         with library_without(without):
             verdict = trace_json(trace_data([folder / "new"], folder / MODEL, alpha=alpha))
-    except Exception as error:  # a failed trace is a result, the others go on
+    except Exception as error:  # a failed trace is a result; the others continue
         verdict = {"failed": f"{type(error).__name__}: {error}"}
     return {**verdict, "seconds": time.process_time() - begin, "without": without}
 
 
 def _group(seed: int, number: int) -> str:
-    """Groups come in the shares of CYCLE, in an order that the seed draws."""
+    """The group of a recording: shares as in CYCLE, order drawn from the seed."""
     turn, place = divmod(number, len(CYCLE))
     return str(np.random.default_rng([seed, turn, 99]).permutation(CYCLE)[place])
 
@@ -143,7 +143,7 @@ def _oracle_kept(truth: Path, data: Path) -> None:
 
 
 def _write(path: Path, content: dict[str, Any]) -> None:
-    """All at once: a run that is stopped leaves no half of a file."""
+    """Write atomically: an interrupted run leaves no incomplete file."""
     new = path.with_suffix(".new")
     new.write_text(json.dumps(content, indent=1))
     new.replace(path)
@@ -166,7 +166,7 @@ def _parser() -> argparse.ArgumentParser:
     command = _command(commands, "make", make, out="recordings", truth="truth")
     for name, default in (("seed", 1), ("count", 100), ("training", 500), ("least", 170), ("most", 600)):
         command.add_argument(f"--{name}", type=int, default=default)
-    command.add_argument("--rows", type=int, default=1000, help="rows that the model is trained on")
+    command.add_argument("--rows", type=int, default=1000, help="training rows of the model (default %(default)s)")
     command.add_argument("--model", default="vhgp", choices=("vhgp", "gp", "analytical"))
     command.add_argument("--group", choices=("none", *GROUPS), help="only effects of this group")
     command = _command(commands, "run", run, data="recordings", out="verdicts")

@@ -1,6 +1,6 @@
-"""Undeclared effects for blind recordings: what acts, what drives it, how large, and what the right answer is.
+"""Hidden effects for blind recordings: mechanism, driver, size and the right answer.
 
-A registry of its own: nothing in push_predictor.residuals reads it, nothing here reads that.
+The registry is separate: nothing in push_predictor.residuals reads it, and it reads nothing there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ANGULAR = 2  # a shift, a pull, an anisotropy has a direction: two numbers
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """One recording to come: slider, its weight and table, the conditions of all its pushes, and its own chance."""
+    """A recording to be simulated: outline, weight (N), friction, conditions of its pushes, random generator."""
 
     outline: Outline
     weight: float
@@ -42,11 +42,12 @@ Acts = Callable[[float, Strength, World], Changes | Faults]
 
 @dataclass(frozen=True)
 class Kind:
-    """A mechanism of the simulator. sizes: small, medium, large in `unit`; names: what a trace may rightly call it.
+    """A mechanism of the simulator.
 
-    None among the names: that it is not in the library. channel: motion, wrench, measurement, variance, none. drivers:
-    which of DRIVERS it is crossed with. constant: the covariates that stand for it where nothing drives it; alone: a
-    factor on its size then. only_smaller: a negative size below it is taken as positive.
+    names: the correct names in a trace; None means that it is not in the library. channel: motion, wrench, measurement,
+    variance, none. sizes: small, medium, large in `unit`. drivers: those of DRIVERS that it may depend on. constant:
+    the covariates of a constant effect; alone: factor on its size then. only_smaller: a negative size below this value
+    is made positive.
     """
 
     name: str
@@ -76,8 +77,10 @@ class Driver:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An effect as it was drawn: the truth about a recording. course: linear,
-    saturating, step or the driver's own; place: of a step, in the driver's unit."""
+    """An effect as drawn: the truth about a recording.
+
+    course: linear, saturating, step or the driver's own. place: of a step, in the unit of the driver.
+    """
 
     kind: str
     channel: str
@@ -109,12 +112,12 @@ def draw(kind: Kind, size: str, world: World) -> Drawn:
 
 
 def undisturbed() -> Drawn:
-    """Nothing: the recording is like the training recording."""
+    """No effect: the recording is like the training recording."""
     return Drawn("none", "none", (), (), "constant", "none", 0.0, "")
 
 
 def _strength(driver: Driver, world: World) -> tuple[Strength, str, float | None]:
-    """How strongly a driver lets an effect act at a moment, 0 to 1 over the recording; its shape; a step's place."""
+    """Strength of an effect at a moment, 0 to 1 over the recording; its course; the place of a step."""
     if driver.name in SPECIAL:
         return SPECIAL[driver.name](world), driver.name, None
     values = world.conditions.values[driver.name]

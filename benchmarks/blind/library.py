@@ -1,4 +1,4 @@
-"""The trace with a mechanism taken out of its library: what it drives must come back as unknown."""
+"""The trace without one mechanism of its library, whose effects must then come back as unknown."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from push_predictor.models.mechanisms import LIBRARY
 
 @contextmanager
 def library_without(mechanism: str | None) -> Iterator[None]:
-    """Let every module of push_predictor.residuals that holds LIBRARY hold it without the mechanism; None: as it is.
+    """Remove a mechanism from LIBRARY in every module of push_predictor.residuals; None: change nothing.
 
-    Raises SystemExit for a mechanism that the library does not hold.
+    Raises SystemExit for a mechanism that is not in the library.
     """
     if mechanism is None:
         yield

@@ -1,4 +1,4 @@
-"""What a model gains that is given the truth: the true mechanism with its true driver and basis, on the same split."""
+"""The gain of a model with the true mechanism, driver and basis, on the same split as the trace."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from push_predictor.residuals.extension.refit import refit_base
 
 
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:
-    """NLPD after minus refit on the held-out pushes: value, low, high; None where the mean of the motion is unchanged.
+    """NLPD after minus refit on the held-out pushes: value, low, high; None if the mean of the motion is unchanged.
 
-    A mechanism that the library does not hold is given as the driver with the generic response.
+    A mechanism outside the library becomes the generic response to the true driver.
     """
     if truth["channel"] != "motion":
         return None

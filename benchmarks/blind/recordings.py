@@ -25,14 +25,14 @@ SHAPES = ("rect1", "rect1", "rect1", "ellip2", "hex")
 SURFACES = ("abs", "delrin", "plywood", "pu")
 SPEEDS = (0.01, 0.02, 0.03)  # m/s, slow enough that inertia hardly counts
 WINDOWS, WINDOW = (3.2, 4.4), 0.2  # windows a push, s
-TURN_SPREAD, PLACE_SPREAD = 3.0, 0.05  # rad, m: sliders lie in all directions
-MEAN_PAUSE, LONG_BREAKS, LONG_BREAK = 0.6, 2, 40.0  # s: so that time, number and dwell are not the same
+TURN_SPREAD, PLACE_SPREAD = 3.0, 0.05  # rad, m: sliders have all headings
+MEAN_PAUSE, LONG_BREAKS, LONG_BREAK = 0.6, 2, 40.0  # s: they separate time, push count and dwell time
 MODEL = "model.json"
 
 
 @dataclass(frozen=True)
 class Size:
-    """How large the recordings are: pushes to train on, pushes to judge on (drawn between the two), training rows."""
+    """Pushes to train on, range of the number of new pushes, training rows, kind of model."""
 
     training: int = 500
     least: int = 170
@@ -42,7 +42,7 @@ class Size:
 
 
 def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: Path) -> Drawn:
-    """Make recording `number` of a group ('none' or one of GROUPS) into out/NNN, what was drawn into truth/NNN.json."""
+    """Simulate recording `number` of a group (none or one of GROUPS) into out/NNN, its truth into truth/NNN.json."""
     rng = np.random.default_rng([seed, number])
     plain = rig_of(rng, f"{number:03d}", size.training)
     later = later_spec(plain, rng, int(rng.integers(size.least, size.most + 1)))
@@ -58,14 +58,14 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     rows = min(size.rows, len(table))
     options = TrainingOptions(n_train=rows, seed=seed)
     save_model(train_model(table, rig, size.kind, name=f"{number:03d}", options=options), folder / MODEL)
-    told = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
-    known = {key: value for key, value in asdict(replace(drawn, act=Changes())).items() if key != "act"}
-    (truth / f"{number:03d}.json").write_text(json.dumps({**told, "pushes": len(later.pushes), **known}, indent=1))
+    known = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
+    effect = {key: value for key, value in asdict(replace(drawn, act=Changes())).items() if key != "act"}
+    (truth / f"{number:03d}.json").write_text(json.dumps({**known, "pushes": len(later.pushes), **effect}, indent=1))
     return drawn
 
 
 def rig_of(rng: np.random.Generator, name: str, pushes: int) -> SimulationSpec:
-    """A rig and its training recording, drawn."""
+    """Draw a rig and its training recording."""
     spec = SimulationSpec(
         str(rng.choice(SHAPES)),
         str(rng.choice(SURFACES)),
@@ -77,12 +77,12 @@ def rig_of(rng: np.random.Generator, name: str, pushes: int) -> SimulationSpec:
         place_spread=PLACE_SPREAD,
         turn_spread=TURN_SPREAD,
     )
-    return beside(spec, rng)
+    return with_pauses_and_topics(spec, rng)
 
 
 def later_spec(plain: SimulationSpec, rng: np.random.Generator, pushes: int) -> SimulationSpec:
-    """The same rig another day: pushes, pauses, noise and topics of its own."""
-    return beside(replace(plain, pushes=pushes_of(rng, pushes), seed=int(rng.integers(2**31))), rng)
+    """A later recording of the same rig: other pushes, pauses, noise and topics."""
+    return with_pauses_and_topics(replace(plain, pushes=pushes_of(rng, pushes), seed=int(rng.integers(2**31))), rng)
 
 
 def pushes_of(rng: np.random.Generator, n: int) -> PushPlan:
@@ -92,8 +92,8 @@ def pushes_of(rng: np.random.Generator, n: int) -> PushPlan:
     return PushPlan(rng.random(n), rng.uniform(-1.2, 1.2, n), speed, travel)
 
 
-def beside(spec: SimulationSpec, rng: np.random.Generator) -> SimulationSpec:
-    """The spec with pauses between its pushes and two scalars beside them that drift."""
+def with_pauses_and_topics(spec: SimulationSpec, rng: np.random.Generator) -> SimulationSpec:
+    """The spec with pauses between its pushes and two drifting scalar topics."""
     n = len(spec.pushes)
     pauses = rng.exponential(MEAN_PAUSE, n)
     pauses[rng.integers(n, size=LONG_BREAKS)] += LONG_BREAK
@@ -107,20 +107,20 @@ def beside(spec: SimulationSpec, rng: np.random.Generator) -> SimulationSpec:
 
 
 def wander(rng: np.random.Generator, size: float, n: int) -> np.ndarray:
-    """A random walk of n steps that ranges over about 3 `size`."""
+    """A random walk of n steps with a range of 3 `size`."""
     walk = np.cumsum(rng.standard_normal(n))
     return np.asarray(3.0 * size * (walk - walk.mean()) / np.ptp(walk))
 
 
 def conditions(spec: SimulationSpec) -> Conditions:
-    """Under which conditions the pushes of a spec begin."""
+    """The conditions at the start of each push of a spec."""
     start = start_poses(spec)
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, start, spec.acceleration)
     return conditions_of(spec, start, path, end_times(path, spec.table.friction))
 
 
 def drawn_for(spec: SimulationSpec, group: str, rng: np.random.Generator) -> Drawn:
-    """An effect of a group for this recording."""
+    """Draw an effect of a group for this recording."""
     if group == "none":
         return undisturbed()
     world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, conditions(spec), rng)

@@ -1,4 +1,4 @@
-"""Verdicts against truths: how often the residual loop was right, with 95 % Wilson intervals, beside the targets."""
+"""How often the residual loop was right, with 95 % Wilson intervals, next to the targets."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 
 Z95 = 1.959964
-MEDIUM, LARGE = 0.1, 0.4  # nats that an oracle gains: below the first small, above the second large
+MEDIUM, LARGE = 0.1, 0.4  # nats gained by the oracle: below the first small, above the second large
 UNCHANGED = ("none", "wrench", "measurement")  # channels that leave the motion model alone
 SIZES = ("small", "medium", "large")
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One recording. size: by the oracle's gain where there is one, else as drawn; sets are those of the driver.
+    """The score of one recording.
 
-    name, driver: is the first right; unknown: was it told that the mechanism is none of the library; wrong: was a name
-    given that is not the truth's. share: of the oracle's gain. set_size 0: nothing was named.
+    size: by the oracle's gain if known, else as drawn. name, driver: whether the first one is right. unknown: whether
+    the mechanism was reported as outside the library. wrong: whether a wrong mechanism was named. in_set, set_size: of
+    the drivers that fit equally well; 0 if none was named. share: of the oracle's gain.
     """
 
     group: str
@@ -44,7 +45,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Rate:
-    """A count of a total; low, high: its 95 % Wilson interval; target in words, empty where there is none."""
+    """A count of a total, its 95 % Wilson interval (low, high), and the target in words, empty without one."""
 
     what: str
     count: int
@@ -55,7 +56,7 @@ class Rate:
 
 
 def score_of(truths: Mapping[str, Mapping[str, Any]], results: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Score verdicts (the JSON of trace) by the name of their recording; a truth without a verdict does not count."""
+    """Score verdicts (the JSON of trace) by the name of their recording; truths without a verdict are skipped."""
     judged = {name: judge(truths[name], results[name]) for name in truths if name in results}
     return {
         "recordings": len(judged),
@@ -67,7 +68,7 @@ def score_of(truths: Mapping[str, Mapping[str, Any]], results: Mapping[str, Mapp
 
 
 def judge(truth: Mapping[str, Any], result: Mapping[str, Any]) -> Judged:
-    """Judge one verdict. A mechanism that the run was without is none of the library for it."""
+    """Score one verdict. A mechanism that the run removed counts as outside the library."""
     failed = "failed" in result
     names = [None if name is not None and name == result.get("without") else name for name in truth["names"]]
     effects = [] if failed else result["effects"]
@@ -113,17 +114,17 @@ def rates(judged: Sequence[Judged]) -> list[Rate]:
     return [
         rate("false alarms on recordings without an effect", none, lambda j: j.found, "at most 2 in 30"),
         rate("motion model changed without cause", still, lambda j: j.changed, "none"),
-        rate("wrench-only changes told as such", wrench, lambda j: j.verdict == "wrench_only"),
+        rate("wrench-only changes reported as such", wrench, lambda j: j.verdict == "wrench_only"),
         *_by_size("found, mechanism in the library", inside, lambda j: j.found, ("", "90 %", "95 %")),
         *_by_size("right mechanism and driver first", _found(inside), _right_first, ("", "90 %", "90 %")),
         rate("right mechanism first, all sizes", _found(inside), lambda j: j.name, "90 %"),
         rate("right driver first, all sizes", _found(inside), lambda j: j.driver),
         rate("right driver in the named set", _found(inside), lambda j: j.in_set, "97 %"),
         *_by_size("found, mechanism not in the library", outside, lambda j: j.found, ("", "90 %", "95 %")),
-        rate("of these told as unknown", _found(outside), lambda j: j.unknown),
+        rate("of these reported as unknown", _found(outside), lambda j: j.unknown),
         rate("given a wrong name, mechanism not in the library", outside, lambda j: j.wrong, "none"),
         rate("right driver in the named set, not in the library", _found(outside), lambda j: j.in_set, "97 %"),
-        *_by_size("measurement errors told as such", measured, lambda j: j.found, ("", "", "")),
+        *_by_size("measurement errors reported as such", measured, lambda j: j.found, ("", "", "")),
         rate("right measurement error named", _found(measured), lambda j: j.name),
         *_by_size("variance effects found as such", variance, lambda j: j.found and j.name, ("", "", "")),
         rate("harm: interval of the gain wholly above zero", judged, lambda j: j.harm, "none"),
@@ -145,7 +146,7 @@ def numbers(judged: Sequence[Judged]) -> dict[str, float | None]:
 
 
 def markdown_of(scored: Mapping[str, Any]) -> str:
-    """The score as a table for a page of the docs."""
+    """The score as a Markdown table for the documentation."""
     lines = ["| what | rate | 95 % interval | target |", "| --- | --- | --- | --- |"]
     for r in scored["rates"]:
         interval = f"{100 * r['low']:.0f} to {100 * r['high']:.0f} %" if r["of"] else "no such recording"
@@ -156,14 +157,14 @@ def markdown_of(scored: Mapping[str, Any]) -> str:
 
 
 def rate(what: str, of: Iterable[Judged], holds: Callable[[Judged], bool], target: str = "") -> Rate:
-    """How many of these hold."""
+    """The rate at which a condition is true."""
     among = list(of)
     count = sum(map(holds, among))
     return Rate(what, count, len(among), *wilson(count, len(among)), target)
 
 
 def wilson(count: int, of: int) -> tuple[float, float]:
-    """The 95 % interval of a share by Wilson 1927; 0 to 1 where there is nothing."""
+    """The 95 % interval of a share (Wilson 1927); 0 to 1 for an empty total."""
     if not of:
         return 0.0, 1.0
     share, square = count / of, Z95**2
@@ -192,7 +193,7 @@ def _first_driver(result: Mapping[str, Any]) -> str | None:
 
 
 def _undriven(truth: Mapping[str, Any], mechanism: str | None, names: Sequence[str | None]) -> bool:
-    """Whether a measurement error was named: it has no driver that could be wrong."""
+    """Whether the right measurement error was named; it has no driver that could be wrong."""
     return truth["channel"] == "measurement" and mechanism in names
 
 
@@ -204,7 +205,7 @@ def _size(truth: Mapping[str, Any]) -> str:
 
 
 def _share(truth: Mapping[str, Any], result: Mapping[str, Any], failed: bool) -> float | None:
-    """Share of the oracle's gain, where that is worth having; a model that was not changed gained nothing."""
+    """Share of the oracle's gain if that is at least MEDIUM; an unchanged model gains nothing."""
     oracle = truth.get("oracle_gain")
     if oracle is None or -oracle["value"] < MEDIUM:
         return None

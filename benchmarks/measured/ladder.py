@@ -1,12 +1,11 @@
-"""What the textbook lacks on measured pushes: the residual loop's search, step by step, from the analytical model.
+"""What the textbook model lacks on measured pushes: the residual loop's search, step by step.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.ladder --data FOLDER [--kind mit-square|mlab] [--quick]
 
-FOLDER holds mit_square and mlab. A third of the pushes (residuals/split.py) is put aside and looked at once, when the
-ladder is finished, for all steps together. Of the others a third is the gate. A step is the search on the rest with the
-family-wise level 0.05; its best candidate goes into the model if its parameter is one that a rig could have and the
-density at the gate gets better with 95 % confidence. If not, it was suspected wrongly: it is noted and not tried again.
-The ladder ends when nothing is significant any more.
+FOLDER has mit_square and mlab. A third of the pushes (residuals/evidence/split.py) is held out and used once, at the
+end, for all steps together. A third of the others is the gate. A step is the search on the rest with family-wise level
+0.05. Its best candidate enters the model if its parameter is plausible for a rig and if the density at the gate
+improves with 95 % confidence. Otherwise it is noted and not tried again. The ladder ends when nothing is significant.
 """
 
 from __future__ import annotations
@@ -42,20 +41,21 @@ from push_predictor.residuals.selection.forward_selection import search
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.types import Array
 
-ALPHA = 0.05  # of a step; the gate guards against what this lets in
+ALPHA = 0.05  # of a step; the gate rejects false positives
 MOST_TRIES = 12
 NO_LEVEL = -1.0  # of a category
 Label: TypeAlias = tuple[str | None, str]
-HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE less the step before | NLPD less the step before |
+HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |
 |---|---|---|---|---|"""
-ORDER = ("row_id", "push_index")  # of the square's table: its rows are shuffled, its pushes were made out afterwards
+ORDER = ("row_id", "push_index")  # meaningless in the square's table: its rows are shuffled
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A rung, or a suspicion that came to nothing.
+    """A step of the ladder, accepted or refused.
 
-    model: with the effect; effect: None at the foot. at_gate: its gain in NLPD there. refused: why it did not go in.
+    model: with the effect; effect: None for the first step. at_gate: gain in NLPD at the gate. refused: the reason,
+    empty if accepted.
     """
 
     model: PushModel
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def mit_square(data: Path, work: Path) -> LoadedData:
-    """The 3500 windows of the measured square; nobody knows the order of its pushes."""
+    """Load the 3500 windows of the measured square, without the unknown order of its pushes."""
     import_source("mit-square", [data / "mit_square" / "pushes_3500.npz"], work)
     loaded = load_evidence([work / "pushes_3500.csv"])
     known = {name: column for name, column in loaded.table.covariates.items() if name not in ORDER}
@@ -89,7 +89,7 @@ def mit_square(data: Path, work: Path) -> LoadedData:
 
 
 def mlab(data: Path, work: Path) -> LoadedData:
-    """The seven logs of 50 whole pushes of the triangle, on different supports and two surfaces."""
+    """Load the seven logs of 50 whole pushes of the triangle, on different supports and two surfaces."""
     import_source("mlab", [data / "mlab" / "sensor_log"], work)
     return load_evidence(sorted(work.glob("*.csv")))
 
@@ -98,10 +98,10 @@ LADDERS: dict[str, Callable[[Path, Path], LoadedData]] = {"mit-square": mit_squa
 
 
 def report(loaded: LoadedData, most_tries: int = MOST_TRIES) -> None:
-    """Climb, then open the pushes put aside, and print a row a step."""
+    """Run the ladder, score all steps on the held-out pushes, and print a row per step."""
     aside = held_out_rows(loaded.table)
     table, held = loaded.table.take(~aside), loaded.table.take(aside)
-    print(f"{len(table.pushes)} pushes to climb on, {len(held.pushes)} put aside, sha256 {digest_of(held)[:12]}")
+    print(f"{len(table.pushes)} pushes for the search, {len(held.pushes)} held out, sha256 {digest_of(held)[:12]}")
     print(f"drivers: {', '.join(names_of(loaded))}\n", flush=True)
     tried = climb(loaded, most_tries)
     print(HEAD)
@@ -113,12 +113,12 @@ def report(loaded: LoadedData, most_tries: int = MOST_TRIES) -> None:
 
 
 def names_of(loaded: LoadedData) -> list[str]:
-    """The drivers that are tried."""
+    """Names of the drivers that are tried."""
     return driver_names(loaded.table)
 
 
 def climb(loaded: LoadedData, most_tries: int = MOST_TRIES) -> list[Step]:
-    """What was tried, from the textbook's model on, on the pushes that are not put aside."""
+    """The steps that were tried, from the textbook model on, without the held-out pushes."""
     table = loaded.table.take(~held_out_rows(loaded.table))
     at_gate = held_out_rows(table)
     rest, gate = table.take(~at_gate), table.take(at_gate)
@@ -139,7 +139,7 @@ def climb(loaded: LoadedData, most_tries: int = MOST_TRIES) -> list[Step]:
 
 
 def _suspect(model: PushModel, table: PushTable, names: Sequence[str], refused: Set[Label]) -> SelectedTerm | None:
-    """What gains most of what the search finds without a driver, and with one; but for what was refused."""
+    """The candidate with the largest gain, constant or with a driver, except for refused ones."""
     evidence, inputs = evidence_of(model, table), inputs_basis(model, table)
     candidates = [_of_all_levels(c, table) for c in candidates_of(evidence, names, inputs) if c.label not in refused]
     found: list[SelectedTerm] = []
@@ -151,12 +151,12 @@ def _suspect(model: PushModel, table: PushTable, names: Sequence[str], refused: 
 
 
 def _all_by(covariate: str) -> Set[Label]:
-    """The labels of all that a driver could drive: where the fall-back comes up again, no mechanism fits."""
+    """Labels of all mechanisms with this driver; used when the generic response was refused twice."""
     return {(None, covariate), *((mechanism.name, covariate) for mechanism in LIBRARY)}
 
 
 def _of_all_levels(candidate: Candidate, table: PushTable) -> Candidate:
-    """A category in which every level has its own coefficient: the textbook has none that they could differ from."""
+    """The candidate with one coefficient for every level; the textbook model has no reference level."""
     if candidate.basis.name != "category":
         return candidate
     basis = replace(candidate.basis, levels=(NO_LEVEL, *candidate.basis.levels))
@@ -170,14 +170,14 @@ def _judged(model: PushModel, found: SelectedTerm, rest: PushTable, gate: PushTa
     effect, (_, nlpd) = after.predictor.effects[-1], gain(model, after, gate)
     refused = "" if nlpd.high < 0.0 else "no gain at the gate"
     if not _plausible(effect, rest):
-        refused = "no rig has such a parameter"
+        refused = "implausible parameter"
     others = dict.fromkeys(_label(*rival.candidate.label) for rival in found.rivals)
     others.pop(_label(*best.label), None)
     return Step(after, effect, found.p_value, tuple(others), nlpd, refused)
 
 
 def _plausible(effect: Effect, table: PushTable) -> bool:
-    """Whether the parameters are such as a rig could have, at all of these windows."""
+    """Whether the parameters are plausible for a rig at all of these windows."""
     if effect.mechanism is None:
         return True
     mechanism = mechanism_named(effect.mechanism)
@@ -189,31 +189,31 @@ def _row(before: Step, step: Step, held: PushTable, reference: Array) -> str:
     sums = push_scores(compared(step.model, held, reference))
     outputs = " ".join(f"{value:.3f}" for value in sums.totals().nmse[0])
     errors = f"{by_push(sums, total_nmse).text('.3f')}, {outputs} | {by_push(sums, total_nlpd).text()}"
-    told = [""] * 2 if step is before else [_interval(g) for g in gain(before.model, step.model, held, reference)]
-    return f"| {named(step)} | {errors} | {' | '.join(told)} |"
+    changes = [""] * 2 if step is before else [_interval(g) for g in gain(before.model, step.model, held, reference)]
+    return f"| {named(step)} | {errors} | {' | '.join(changes)} |"
 
 
 def _detail(step: Step) -> str:
     assert step.effect is not None
     assert step.at_gate is not None
-    fate = f"refused: {step.refused}" if step.refused else "taken"
-    told = (
+    fate = f"refused: {step.refused}" if step.refused else "accepted"
+    evidence = (
         f"p {step.p_value:.4f}, NLPD at the gate {_interval(step.at_gate)}; rivals: {', '.join(step.rivals) or 'none'}"
     )
-    return "\n  ".join([f"\n{named(step)}, {fate}; {told}", *parameters(step.effect)])
+    return "\n  ".join([f"\n{named(step)}, {fate}; {evidence}", *parameters(step.effect)])
 
 
 def named(step: Step) -> str:
-    """What a reader calls the step."""
+    """The name of the step for a reader."""
     if step.effect is None:
         return "textbook"
     return f"{_label(step.effect.mechanism, step.effect.covariate)} ({step.effect.basis.name})"
 
 
 def parameters(effect: Effect) -> list[str]:
-    """Each coefficient of a mechanism with its 95 % interval; those of the fall-back mean nothing by themselves."""
+    """The coefficients of a mechanism with 95 % intervals; of the generic response only their number."""
     if effect.mechanism is None:
-        return [f"{len(effect.coefficients)} coefficients of the fall-back"]
+        return [f"{len(effect.coefficients)} coefficients of the generic response"]
     spread = 1.96 * np.sqrt(np.diagonal(effect.covariance))
     mechanism = mechanism_named(effect.mechanism)
     columns = len(effect.coefficients) // len(mechanism.parameters)

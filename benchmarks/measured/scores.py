@@ -1,4 +1,4 @@
-"""What the tables of benchmarks.measured have in common: a model trained and judged, and its row of figures."""
+"""Train and score a model, and format its row: shared by the tables of benchmarks.measured."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WITHIN = COVERAGE_LEVELS.index(0.95)
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """A model, its predictions of n windows it was not trained on, which of them (n,) lie in its domain, CPU s."""
+    """A model, its predictions of n test windows, which of them (n,) lie in its domain, and CPU s of training."""
 
     model: PushModel
     comparison: Comparison
@@ -34,12 +34,12 @@ class Fold:
 
     @property
     def push_scores(self) -> PushScores:
-        """Its sums by push."""
+        """The scores by push."""
         return scores.push_scores(self.comparison)
 
 
 def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool = False) -> Fold:
-    """Train on one table, predict another."""
+    """Train on one table and predict another."""
     start = time.process_time()
     model = train_model(table, rig, kind, name=kind, options=TrainingOptions(fit=fit))
     cpu = time.process_time() - start
@@ -47,7 +47,7 @@ def trained(table: PushTable, test: PushTable, rig: Rig, kind: str, *, fit: bool
 
 
 def pooled(folds: Sequence[Fold]) -> PushScores:
-    """The windows of all folds together; each keeps its own model's training mean as reference of the NMSE."""
+    """Scores of all folds together; the NMSE of each fold refers to its own training mean."""
     return scores.pooled([fold.push_scores for fold in folds])
 
 
@@ -62,7 +62,7 @@ def figures(push_scores: PushScores) -> str:
 
 
 def difference(first: PushScores, second: PushScores) -> str:
-    """The cells under HEAD for what the second model gains over the first on the same rows: differences, paired."""
+    """The cells under HEAD for the paired differences of the second model from the first, on the same rows."""
     nmse, nlpd = (difference_by_push(first, second, figure) for figure in (total_nmse, total_nlpd))
     exact = "" if _gaussian(second) else f"{total(second, 'exact_nlpd') - total(first, 'nlpd'):+.2f}"
     return f"{nmse.value:+.3f} | {_between(nmse, '+.3f')} | {nlpd.value:+.2f} | {_between(nlpd, '+.2f')} | {exact} |"

@@ -1,4 +1,4 @@
-"""The measured square of the MIT set: analytical model, GP and VHGP over n, on a random split and by push."""
+"""The measured square of the MIT set: analytical model, GP and VHGP by n, on a random split and by push."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def mit_square_tables(data: Path, work: Path, quick: bool) -> None:
             for kind in KINDS:
                 print(f"| {kind} | {n} | {_cells(scores[kind])} |", flush=True)
             gp, vhgp = (pooled([s.push_scores for s in scores[kind]]) for kind in ("gp", "vhgp"))
-            print(f"| vhgp less gp | {n} | {difference(gp, vhgp)} | | |", flush=True)
+            print(f"| vhgp minus gp | {n} | {difference(gp, vhgp)} | | |", flush=True)
 
 
 def imported_square(data: Path, work: Path) -> PushSet:
-    """The rows as `import mit-square` writes them."""
+    """The rows of `import mit-square`."""
     import_source("mit-square", [data / "mit_square" / "pushes_3500.npz"], work)
     path = work / "pushes_3500.csv"
     return PushSet(load_data([path]), load_rig_for([path]))

@@ -1,9 +1,9 @@
-"""Models against pushes measured by others: makes the tables of docs/results/measured.md anew.
+"""Models on pushes measured by others: prints the tables of docs/results/measured.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured --data FOLDER [--kind mcube|mit|mit-square] [--quick]
 
-FOLDER holds mcube_preliminary, mit_raw and mit_square. Everything is imported anew into a temporary folder and goes
-the way of the command line: import, windows, train_model, compare. Only the split called random parts pushes.
+FOLDER has mcube_preliminary, mit_raw and mit_square. Everything is imported into a temporary folder and takes the path
+of the command line: import, windows, train_model, compare. Only the random split separates windows of one push.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def mcube_tables(data: Path, work: Path, quick: bool) -> None:
-    """The windows of the eight runs; models of each block against the run they have not seen."""
+    """Print the windows of the eight runs, and the models of each block on held-out runs."""
     runs = sorted(import_source("mcube", [data / "mcube_preliminary"], work).written)
-    print("\n| run | windows | s in windows | tip, mm/s | way of the block, mm | turn, degrees |\n" + 6 * "|---" + "|")
+    print("\n| run | windows | s in windows | tip, mm/s | path of the block, mm | turn, degrees |\n" + 6 * "|---" + "|")
     for run in runs:
         print(f"| {run.name} | {_summary(read_recording(run))} |")
     for prefix, name in BLOCKS.items():
@@ -69,7 +69,7 @@ def mcube_tables(data: Path, work: Path, quick: bool) -> None:
 
 
 def leave_one_run_out(runs: Sequence[Path], kind: str, fit: bool = False, stride: float | None = None) -> list[Fold]:
-    """For every run, a model trained on the other runs. stride (s) overlaps training windows; tested ones tile."""
+    """For every run, a model trained on the other runs. stride (s) overlaps training windows; test windows tile."""
     rig, options = load_rig_for(runs), WindowOptions(stride=stride)
     return [
         trained(
@@ -87,7 +87,7 @@ def mean_speed(recording: Recording, start: int, end: int) -> float:
 
 
 def travelled(windows: Sequence[PushWindow]) -> tuple[float, float]:
-    """Length (m) of the slider's way from window to window, and the sum (rad) of its turns."""
+    """Path length (m) of the slider from window to window, and the sum (rad) of its turns."""
     moved = np.array([window.displacement for window in windows])
     return float(np.hypot(*moved[:, :2].T).sum()), float(moved[:, 2].sum())
 
@@ -111,7 +111,7 @@ def _leave_one_out_row(runs: Sequence[Path], kind: str, fit: bool, stride: float
 
 
 def _nmse_in_domain(folds: Sequence[Fold]) -> float:
-    """Of the windows that their models do not flag, summed over the outputs."""
+    """NMSE of the windows in the domain of their model, summed over the outputs."""
     rows = [(fold.comparison, fold.in_domain) for fold in folds]
     error = np.concatenate([(c.observed - c.mean)[inside] ** 2 for c, inside in rows])
     spread = np.concatenate([(c.observed - c.training_mean)[inside] ** 2 for c, inside in rows])
@@ -119,20 +119,20 @@ def _nmse_in_domain(folds: Sequence[Fold]) -> float:
 
 
 def _physics_in_words(runs: Sequence[Path]) -> str:
-    """What a fit finds, and how much of the textbook model's error in dx is the window's acceleration."""
+    """The fitted parameters, and the part of the textbook model's error in dx due to acceleration within a window."""
     rig, table = load_rig_for(runs), load_data(runs)
     physics = AnalyticalPush(rig.outline, rig.pusher_radius)
     fitted = fit_analytical(physics, table.inputs, table.duration, table.outcomes)
     recordings = [read_recording(run) for run in runs]
     speeds = [mean_speed(r, w.start, w.end) for r in recordings for w in find_windows(r, rig)]
-    told = np.column_stack([speeds, table.inputs[:, 1:]])
-    predicted = [physics.displacement(inputs, table.duration) for inputs in (table.inputs, told)]
+    mean_speeds = np.column_stack([speeds, table.inputs[:, 1:]])
+    predicted = [physics.displacement(inputs, table.duration) for inputs in (table.inputs, mean_speeds)]
     dx = [nmse(mean, table.outcomes, table.outcomes.mean(axis=0))[0] for mean in predicted]
     turn = np.sum(predicted[0][:, 2] * np.sign(table.outcomes[:, 2])) / np.sum(np.abs(table.outcomes[:, 2]))
     return (
         f"fitted to all four: friction {fitted.contact_friction:.2f}, c {1e3 * fitted.support.length:.1f} mm (even "
         f"pressure {1e3 * physics.support.length:.1f} mm). Textbook: turns {turn:.2f} times the observed; NMSE of dx "
-        f"{dx[0]:.3f}, told the mean speed of each window {dx[1]:.3f}"
+        f"{dx[0]:.3f}, with the mean speed of each window {dx[1]:.3f}"
     )
 
 
@@ -140,7 +140,7 @@ def _physics_in_words(runs: Sequence[Path]) -> str:
 
 
 def mit_table(data: Path, work: Path, quick: bool) -> None:
-    """The windows of the one push: what the analytical model says beside what was observed."""
+    """Print the windows of the one push: observed and by the analytical model."""
     (path,) = import_source("mit", [data / "mit_raw"], work).written
     rig, table = load_rig_for([path]), load_data([path])
     for velocity, contact, angle in table.inputs:

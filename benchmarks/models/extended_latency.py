@@ -1,11 +1,11 @@
-"""How long one prediction of an extended model takes in the server's process, effect by effect.
+"""Time of one prediction of an extended model in the server's process, effect by effect.
 
     python -m benchmarks.models.extended_latency [--pushes N] [--seed K]
 
-No ROS. A GP of 300 simulated windows is the base. Every push is asked of the served base, of the served extended model
-and of the same with its effects computed by arrays of one row (as before plain numbers), in turns, so that all see the
-same load of the machine. Ratio: to the base's prediction in the same run. Apart: the largest difference of a mean
-between plain numbers and the model itself, in predicted standard deviations.
+No ROS. The base is a GP of 300 simulated windows. Every push is predicted by the tabulated base, by the tabulated
+extended model, and by the latter with array code for its effects (as before scalar code), in turns, so that all share
+the machine's load. Ratio: to the base's prediction in the same run. Apart: largest difference of a mean between scalar
+code and the model itself, in predicted standard deviations.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def _before(model: PushModel) -> Ask:
-    """The table for the base, and arrays for the effects."""
+    """Predictions by the tabulated base and array code for the effects."""
     predictor = model.predictor
     if not predictor.effects:
         return model.predict_rows
@@ -75,7 +75,7 @@ def _before(model: PushModel) -> Ask:
 
 
 def _times(asks: list[Ask], table: PushTable) -> list[float]:
-    """Median time of each, us."""
+    """Median time of each callable, us."""
     times: list[list[float]] = [[] for _ in asks]
     for k in range(len(table)):
         row = table.take(np.arange(k, k + 1))
@@ -87,7 +87,7 @@ def _times(asks: list[Ask], table: PushTable) -> list[float]:
 
 
 def _apart(model: PushModel, table: PushTable) -> float:
-    """Of pushes asked one by one of the served model, from the same by arrays of one row."""
+    """Largest difference of a mean between scalar and array code over single pushes, in standard deviations."""
     tabulated, before, apart = tabulate(model), _before(model), 0.0
     for k in range(len(table)):
         row = table.take(np.arange(k, k + 1))

@@ -1,10 +1,10 @@
-"""What the correlation of the outputs is worth: joint density against the product of the marginals of the same model.
+"""Gain from the correlation of the outputs: joint density against the product of the marginals of the same model.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.joint [--data FOLDER] [--bags FOLDER] [--model vhgp|gp] [--quick]
 
---data: the folder of the measured data, of which mit_square is taken; by whole pushes (5 folds) and on a random split
-(5 seeds). --bags: the standard recordings of `simulate`; trained on square_abs_train, judged on square_abs_test. Prints
-the tables of docs/results/covariance.md. Differences are paired; their intervals come from resampling whole pushes.
+--data: the folder of the measured data with mit_square; split by push (5 folds) and at random (5 seeds). --bags: the
+standard recordings of `simulate`; trained on square_abs_train, tested on square_abs_test. Prints the tables of
+docs/results/covariance.md. Differences are paired; their intervals resample whole pushes.
 """
 
 from __future__ import annotations
@@ -34,17 +34,19 @@ from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-EVERYWHERE = 1e6  # a bandwidth at which all rows count the same
+EVERYWHERE = 1e6  # a bandwidth at which all rows have the same weight
 HEAD = (
-    "| n | pushes | joint NLPD | product of marginals | joint less product | 95 % | one correlation for all pushes "
-    "less product | 95 % | correlated | bandwidth, shrinkage | CPU s, of it correlation |\n" + 11 * "|---" + "|"
+    "| n | pushes | joint NLPD | product of marginals | joint minus product | 95 % | one correlation for all pushes "
+    "minus product | 95 % | correlated | bandwidth, shrinkage | CPU s, of it correlation |\n" + 11 * "|---" + "|"
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Of n windows: the push of each, and its negative log density (n, 3) with the model's correlation, with one for
-    all pushes, and with none. correlation: of the model. cpu: s of training, and of fitting the correlation.
+    """Negative log densities of n windows.
+
+    nlpd (n, 3): with the model's correlation, with one correlation for all pushes, and with none. correlation: of the
+    model. cpu: s of training, and of fitting the correlation.
     """
 
     push_id: np.ndarray
@@ -69,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def judged(model: PushModel, test: PushTable, cpu: float) -> Judged:
-    """A learnt model against windows that it was not trained on."""
+    """Score a learned model on windows that it was not trained on."""
     assert isinstance(model.predictor, GaussianProcessPredictor)
     start = time.process_time()
     correlation = fit_correlation(model.predictor, model.training.push_id)
@@ -80,14 +82,14 @@ def judged(model: PushModel, test: PushTable, cpu: float) -> Judged:
 
 
 def pooled(parts: Sequence[Judged]) -> tuple[np.ndarray, Array, Array]:
-    """The pushes (p,) of all parts, the windows (p,) of each and their summed densities (p, 3)."""
+    """Pushes (p,) of all parts, number of windows (p,) of each, and summed densities (p, 3)."""
     pushes, index = np.unique(np.concatenate([part.push_id for part in parts]), return_inverse=True)
     sums = by_push(index, np.concatenate([part.nlpd for part in parts]))
     return pushes, np.bincount(index).astype(np.float64), sums
 
 
 def gain(pushes: np.ndarray, windows: Array, sums: Array) -> Estimate:
-    """The mean of sums (p,) over the windows (p,) of each push, with its interval."""
+    """Mean per window of sums (p,) over pushes with `windows` (p,) each, with its interval."""
     weights = push_bootstrap(pushes)
     return of_draws(float(sums.sum() / windows.sum()), (weights @ sums) / (weights @ windows))
 

@@ -1,10 +1,10 @@
-"""Fits of other libraries on standardised rows; benchmarks.peers runs this in an interpreter that has them.
+"""Fits of other libraries on standardised rows; benchmarks.models.peers runs this script in their interpreter.
 
-    python -m benchmarks.models.peer_fits KIND ROWS.npz PREDICTIONS.npz        KIND: gpflow | hetgpy
+    python benchmarks/models/peer_fits.py KIND ROWS.npz PREDICTIONS.npz        KIND: gpflow | hetgpy
 
-ROWS holds x (n, D), y (n, k), new (q, D), inducing and steps. PREDICTIONS gets mean, variance, log_noise_mean and
-log_noise_variance, (q, k) each, the library's version, and seconds, the CPU time of fitting without imports. Standard
-library and numpy besides the peer; nothing of this project.
+ROWS has x (n, D), y (n, k), new (q, D), inducing and steps. PREDICTIONS receives mean, variance, log_noise_mean and
+log_noise_variance, (q, k) each, the library's version, and seconds, the CPU time of fitting without imports. The script
+imports the standard library, numpy and the peer, and nothing of this project.
 """
 
 from __future__ import annotations
@@ -38,8 +38,10 @@ def main() -> None:
 
 
 def gpflow_fit() -> tuple[Fit, str]:
-    """Heteroskedastic SVGP as in GPflow's own notebook: natural gradients for q(f, g), Adam for kernels and inducing
-    inputs, which begin at random rows. Its g is the log of the noise's standard deviation.
+    """GPflow's heteroskedastic SVGP, as in its own notebook.
+
+    Natural gradients for q(f, g), Adam for kernels and inducing inputs, which begin at random rows. Its g is the log of
+    the noise's standard deviation.
     """
     import gpflow
     import tensorflow as tf
@@ -83,7 +85,7 @@ def gpflow_fit() -> tuple[Fit, str]:
 
 
 def hetgpy_fit() -> tuple[Fit, str]:
-    """A port of R's hetGP, built for repeated inputs; its noise is one number an input."""
+    """hetgpy, a port of R's hetGP for repeated inputs; its noise is one value per input."""
     from importlib.metadata import version
 
     from hetgpy import hetGP

@@ -1,12 +1,12 @@
-"""Training cost and quality beside other libraries, on the same rows in one run.
+"""Training cost and quality next to other libraries, on the same rows in one run.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.peers [n ...] [--data FOLDER] [--python PYTHON] [--steps 200]
 
-Ours: GP, VHGP, and the sparse VHGP from 500 rows on. Peers: scikit-learn's GP here; GPflow's heteroskedastic SVGP (100
-inducing inputs) and hetgpy's hetGP in the interpreter PYTHON, each if it is installed there. Rows are made up, or with
---data those of FOLDER/mit_square, a random split and one by push. CPU seconds are those of fitting three outputs on one
-thread, imports not counted; the ratio is to our VHGP. NLPD in the units of the rows (made up: 1, measured: SI), summed
-over the outputs: of the Gaussian, and of the exact predictive where that is another.
+Ours: GP, VHGP, and the sparse VHGP from 500 rows on. Peers: scikit-learn's GP; in the interpreter PYTHON, if installed
+there, GPflow's heteroskedastic SVGP (100 inducing inputs) and hetgpy's hetGP. Rows are made up, or with --data those of
+FOLDER/mit_square, split at random and by push. CPU seconds: fitting three outputs on one thread without imports; the
+ratio is to our VHGP. NLPD in the units of the rows (made up: 1, measured: SI), summed over the outputs, of the Gaussian
+and of the exact predictive density.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ class Rows:
     sd: Array
 
     def first(self, n: int) -> Rows:
-        """With the first n rows to learn from."""
+        """The same with only the first n training rows."""
         return Rows(self.title, self.inputs[:n], self.outputs[:n], self.new, self.truth, self.sd)
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a model of three outputs says of the new rows, and the CPU seconds that its fit took."""
+    """Predictions of the new rows by a model of three outputs, and the CPU seconds of its fit."""
 
     predictions: list[LatentPrediction]
     seconds: float
@@ -82,7 +82,7 @@ def main() -> None:
 
 
 def compare(rows: Rows, *groups: dict[str, Callable[[Rows], Fitted]]) -> None:
-    """Print a line for each model of each group; the first is what times are compared with."""
+    """Print a line for each model of each group, with times relative to the first one."""
     reference = None
     for name, fit in [item for group in groups for item in group.items()]:
         try:
@@ -96,7 +96,7 @@ def compare(rows: Rows, *groups: dict[str, Callable[[Rows], Fitted]]) -> None:
 
 
 def ours(n: int) -> dict[str, Callable[[Rows], Fitted]]:
-    """Our models of n rows."""
+    """Fits of our models for n rows."""
     models = {"VHGP": each_output(fit_vhgp), "GP": each_output(fit_gp)}
     return {**models, f"sparse VHGP {INDUCING}": sparse(INDUCING)} if n >= SPARSE_FROM else models
 
@@ -117,7 +117,7 @@ def each_output(fit: Callable[[Array, Array], Any]) -> Callable[[Rows], Fitted]:
 
 
 def peers(n: int, python: Path | None, steps: int, slowest: int) -> dict[str, Callable[[Rows], Fitted]]:
-    """Other libraries' models of n rows."""
+    """Fits of other libraries' models for n rows."""
     models: dict[str, Callable[[Rows], Fitted]] = {"scikit-learn GP": scikit_learn}
     if python is not None:
         models[f"GPflow SVGP {INDUCING}"] = elsewhere("gpflow", python, steps)
@@ -138,7 +138,7 @@ def scikit_learn(rows: Rows) -> Fitted:
 
 
 def elsewhere(kind: str, python: Path, steps: int = 0, inducing: int = INDUCING) -> Callable[[Rows], Fitted]:
-    """A fit of peer_fits.py in another interpreter, on one thread. It raises CalledProcessError where that fails."""
+    """A fit by peer_fits.py in another interpreter, on one thread. Raises CalledProcessError if that fails."""
 
     def fitted(rows: Rows) -> Fitted:
         with tempfile.TemporaryDirectory(prefix="peers_") as folder:
@@ -188,14 +188,14 @@ def square_rows(data: Path, folds: int = 1) -> Sequence[Rows]:
 
 
 def standardised(title: str, inputs: Array, outcomes: Array, training: IntArray, test: IntArray) -> Rows:
-    """By mean and spread of the rows to learn from."""
+    """Rows standardised by mean and standard deviation of the training rows."""
     x, y = ((values - values[training].mean(axis=0)) / values[training].std(axis=0) for values in (inputs, outcomes))
     return Rows(title, x[training], y[training], x[test], y[test], outcomes[training].std(axis=0))
 
 
 def last_line(text: str) -> str:
-    """What an error says."""
-    return text.strip().splitlines()[-1] if text.strip() else "no word"
+    """The last line of an error message."""
+    return text.strip().splitlines()[-1] if text.strip() else "no message"
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
-"""The sparse VHGP beside GPflow's heteroskedastic SVGP on the measured square, and on many simulated windows.
+"""The sparse VHGP next to GPflow's heteroskedastic SVGP on the measured square, and on many simulated windows.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.sparse [--data FOLDER] [--python PYTHON] [--folds 5]
         [--rows 100000]
 
-With --data, FOLDER/mit_square: 2500 rows of the random split and the rows of all pushes but a fold's; the sparse
-model with 100 and 200 inducing inputs, the dense one of 1000 rows, and, with the interpreter PYTHON that has it, GPflow
-with 100 in 200 steps. Then --rows windows of simulated pushes at three speeds (0 for none): CPU and wall seconds for
-three outputs, most memory so far, CPU ms for 1000 predictions, NLPD beside the dense model of 1000 of them. 1000 other
-windows are held out: of other pushes.
+With --data, FOLDER/mit_square: 2500 rows of the random split, and the training rows of each fold by push. Models:
+sparse with 100 and 200 inducing inputs, dense with 1000 rows and, in the interpreter PYTHON, GPflow with 100 inducing
+inputs and 200 steps. Then --rows windows of simulated pushes at three speeds (0 for none): CPU and wall seconds for
+three outputs, peak memory so far, CPU ms for 1000 predictions, and NLPD on 1000 windows of other pushes, next to a
+dense model of 1000.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def main() -> None:
 
 
 def measured(data: Path, python: Path | None, steps: int, folds: int) -> None:
-    """The square: times beside the sparse model's with 100 inducing inputs."""
+    """Print the measured square's table; times are relative to the sparse model with 100 inducing inputs."""
     print(HEAD.replace("/ VHGP", "/ first"))
     models = {f"sparse VHGP {m}": sparse(m) for m in (100, 200)} | {f"VHGP, {DENSE} rows": dense}
     if python is None:
@@ -78,12 +78,12 @@ def measured(data: Path, python: Path | None, steps: int, folds: int) -> None:
 
 
 def dense(rows: Rows) -> Fitted:
-    """The VHGP of the first rows."""
+    """Fit the dense VHGP to the first rows."""
     return each_output(fit_vhgp)(rows.first(DENSE))
 
 
 def simulated(n: int, inducing: list[int]) -> None:
-    """A line for each number of inducing inputs, after the dense model."""
+    """Print a line for the dense model, then one for each number of inducing inputs."""
     rows = simulated_rows(n)
     print(
         "\nsimulated                n  model                CPU s  wall s  peak MB  1000: ms    NMSE     NLPD   exact"
@@ -109,7 +109,7 @@ def report(rows: Rows, name: str, fit) -> None:  # type: ignore[no-untyped-def] 
 
 
 def simulated_rows(n: int) -> Rows:
-    """Windows of random pushes of the square on abs, in random order; pushes are on one side of the split only."""
+    """Windows of random pushes of the square on ABS, in random order; the split keeps pushes whole."""
     start = time.process_time()
     plan = random_pushes(int(n / WINDOWS_A_PUSH) + HELD_OUT, SPEEDS, LENGTH)
     table = push_outcomes(SimulationSpec("rect1", "abs", plan, seed=1))

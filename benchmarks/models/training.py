@@ -1,11 +1,11 @@
-"""Training cost of GP and VHGP against scikit-learn's GP, all measured in this run on the same rows.
+"""Training cost of GP and VHGP relative to scikit-learn's GP, on the same rows in one run.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.training [n ...] [--data FOLDER]
 
-Rows are made up here, of two inputs and of three; with --data also those of FOLDER/mit_square. For each kernel choice:
-CPU seconds for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the peak memory
-of one fit in dense matrices of n x n doubles. Last the time to rebuild three VHGPs from their parameters and to predict
-one input and a thousand.
+Rows are made up, with two inputs and with three; with --data also those of FOLDER/mit_square. For each choice of
+kernels: CPU seconds for three outputs, ratios to scikit-learn's homoscedastic GP with a squared exponential, and the
+peak memory of one fit in dense matrices of n x n doubles. Last: the time to rebuild three VHGPs from their parameters,
+and to predict one input and a thousand.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def rows(n: int, data: Path | None) -> Iterator[tuple[str, Array, Array]]:
 
 
 def costs(inputs: Array, outputs: Array, choice: KernelChoice, reference: float) -> str:
-    """One line of the table, from the CPU seconds of the reference on."""
+    """One line of the table; reference: CPU seconds of scikit-learn's fits."""
     gp, processes = cpu_seconds(lambda: [fit_gp(inputs, column, choice) for column in outputs.T])
     starts = [(process.outputs, process.parameters) for process in processes]
     vhgp, models = cpu_seconds(lambda: [fit_vhgp(inputs, column, choice, start=start) for column, start in starts])
@@ -119,7 +119,7 @@ def cpu_seconds(work: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def peak_bytes(work: Callable[[], Any]) -> int:
-    """The most memory that `work` takes at a time beyond what there is before, bytes; numpy's arrays count."""
+    """Peak memory of `work` beyond the memory in use before, bytes; includes numpy's arrays."""
     tracemalloc.start()
     try:
         work()

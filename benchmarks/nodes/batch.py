@@ -1,10 +1,10 @@
-"""Predictions per second of predict_push_batch between two processes, beside those of single calls in the same run.
+"""Predictions per second of predict_push_batch between two processes, relative to single calls in the same run.
 
     python -m benchmarks.nodes.batch [--model FILE] [--sizes N ...] [--seconds S] [--domain D]
 
 Without --model a VHGP of 1000 simulated windows is trained first (some 10 s). A call is timed from arrays of pushes to
-arrays of predictions: making the request, sending, predicting, the response, unpacking. Single calls are made between
-the batches. Last, how long single calls take while the server is busy with the longest batch.
+arrays of predictions: request, transport, prediction, response, unpacking. Single calls run between the batches. Last:
+how long single calls take while the server computes the longest batch.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _single_times(client: Caller, single: Client, requests: list[PredictPush.Req
 
 
 def _batch_time(client: Caller, batch: Client, model: PushModel, size: int, seconds: float) -> float:
-    """Median of the calls that fit into so many seconds, three at least."""
+    """Median time of the calls that fit into so many seconds, three at least."""
     times: list[float] = []
     query = _query(model, size)
     end = perf_counter() + seconds
@@ -79,7 +79,7 @@ def _batch_time(client: Caller, batch: Client, model: PushModel, size: int, seco
         prediction = prediction_from_response(response)
         times.append(perf_counter() - start)
         if prediction.covariance.shape != (size, 3, 3):
-            raise SystemExit(f"{size} pushes were asked, {len(prediction.mean)} answered")
+            raise SystemExit(f"{size} pushes requested, {len(prediction.mean)} predicted")
     return float(np.median(times))
 
 
@@ -90,11 +90,11 @@ def _during_a_batch(client: Caller, single: Client, batch: Client, model: PushMo
     times: list[float] = []
     while True:
         elapsed, _ = client.timed(single, push)
-        if answer.done():  # this client has unpacked the batch meanwhile, which is not the server's time
+        if answer.done():  # the client has unpacked the batch meanwhile, which is not the server's time
             break
         times.append(elapsed)
         sleep(0.005)
-    print(f"while {size} are answered ({perf_counter() - start:.2f} s): {len(times)} single calls, ", end="")
+    print(f"during a batch of {size} ({perf_counter() - start:.2f} s): {len(times)} single calls, ", end="")
     p50, p99 = np.percentile(times, [50, 99]) * 1e3 if times else (np.nan, np.nan)
     print(f"p50 {p50:.1f} ms, p99 {p99:.1f} ms, longest {max(times, default=np.nan) * 1e3:.1f} ms")
 
@@ -105,7 +105,7 @@ def _query(model: PushModel, size: int) -> PushQuery:
 
 
 def _peak_memory(process: int) -> float:
-    """The most resident memory that the process ever had, MB."""
+    """Peak resident memory of the process, MB."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
 

@@ -1,15 +1,15 @@
-"""A day through the whole chain in accelerated time: does any node grow?
+"""A day of recorded pushes through the whole chain, accelerated: does any node grow?
 
     python -m benchmarks.nodes.endurance [--minutes 10] [--hours 24] [--rate 100] [--recording BAG] [--domain D]
 
-push_replay plays a recording of pushes in a loop at rate 100, or as fast as this machine can, to push_validator, which
-asks predict_server. Ends after so many minutes, or once so many recorded hours were covered. Prints memory, threads
-and file descriptors of each process, at last how much they grew after the warm-up; status 1 if threads or descriptors
-grew, or memory by more than 5 MB.
+push_replay plays a recording in a loop, at rate 100 or as fast as the machine can, to push_validator, which requests
+predictions from predict_server. The run ends after `minutes`, or once `hours` of recorded time are covered. It prints
+memory, threads and file descriptors of each process, and their growth after the warm-up. The exit status is 1 if
+threads or descriptors grew, or memory by more than 5 MB.
 
-What grows by design: the validator keeps some twenty bytes of memory a window, ten megabytes a day of pushing without
-a break; windows and answers lie in temporary files, half a kilobyte a window. A window that waits for its answer takes
-1.1 kB; they wait as long as the server is away.
+Growth by design: the validator keeps some twenty bytes of memory a window, ten megabytes a day of continuous pushing.
+Windows and predictions lie in temporary files, half a kilobyte a window. A window that waits for its prediction takes
+1.1 kB, for as long as the server is unreachable.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ RECORDING = ROOT / "bags" / "square_abs_test"
 
 
 def main() -> int:
-    """Run, report, judge."""
+    """Run the nodes, print the result; the exit status is 1 if a node grew."""
     options = _options()
     stamps = [message.log_time for message in open_bag(options.recording).messages()]
     hours, count = (max(stamps) - min(stamps)) / 3.6e12, len(stamps)
@@ -44,7 +44,7 @@ def main() -> int:
     with ExitStack() as stack:
         output = stack.enter_context(tempfile.TemporaryDirectory(prefix="push_endurance_"))
         stack.enter_context(graph(options.domain))
-        heard = stack.enter_context(caller())
+        client = stack.enter_context(caller())
         validating = {"model": model, "output": output, "report": False}
         playing = {
             "recording": options.recording,
@@ -57,7 +57,7 @@ def main() -> int:
             "push_validator": stack.enter_context(_node("push_validator", validating)),
             "push_replay": stack.enter_context(_node("push_replay", playing)),
         }
-        seen = _watched(heard, nodes, options, hours / count)
+        seen = _watched(client, nodes, options, hours / count)
         print(f"load average {before} before, {load()} after, two cores")
         grew = _grew(seen, options.warm_up * 60.0, options.most_growth)
         print(f"push_validator wrote its result within {_ended(nodes['push_validator']):.0f} s of SIGTERM")
@@ -65,22 +65,25 @@ def main() -> int:
 
 
 def _watched(
-    heard: Caller, nodes: Mapping[str, int], options: argparse.Namespace, hours_a_message: float
+    client: Caller, nodes: Mapping[str, int], options: argparse.Namespace, hours_a_message: float
 ) -> dict[str, list[Vitals]]:
-    """Each process's vitals over time, from the first window on: until then a node may still be starting.
+    """Vitals of each process over time, from the first window on; before it a node may still be starting.
 
-    hours_a_message: how much of the recording a message stands for.
+    hours_a_message: recorded time per message.
     """
-    heard.spin_until(lambda: _windows(heard.diagnostics) > 0)
-    earlier = int(_of(heard.diagnostics, "push_replay").get("published", 0))
+    client.spin_until(lambda: _windows(client.diagnostics) > 0)
+    earlier = int(_of(client.diagnostics, "push_replay").get("published", 0))
     begun, covered, looks = monotonic(), 0.0, 0
     seen: dict[str, list[Vitals]] = {}
     while monotonic() - begun < options.minutes * 60.0 and covered < options.hours:
         looks += 1
-        heard.spin_until(_clock_at(begun + looks * options.every), options.every + 10.0)
-        told = heard.diagnostics
-        covered = (int(_of(told, "push_replay").get("published", earlier)) - earlier) * hours_a_message
-        print(f"{monotonic() - begun:6.0f} s, {covered:6.2f} h recorded; {_figures(told)}; load {load()}", flush=True)
+        client.spin_until(_clock_at(begun + looks * options.every), options.every + 10.0)
+        diagnostics = client.diagnostics
+        covered = (int(_of(diagnostics, "push_replay").get("published", earlier)) - earlier) * hours_a_message
+        print(
+            f"{monotonic() - begun:6.0f} s, {covered:6.2f} h recorded; {_figures(diagnostics)}; load {load()}",
+            flush=True,
+        )
         for name, number in _with_children(nodes).items():
             seen.setdefault(name, []).append(vitals(number))
             print(f"    {name:25s}{seen[name][-1]}", flush=True)
@@ -94,30 +97,32 @@ def _clock_at(time: float) -> Callable[[], bool]:
 
 
 def _ended(child: int) -> float:
-    """Seconds that a child takes to end: a day's windows are written for minutes."""
+    """Seconds that a child takes to end; writing a day's windows takes minutes."""
     begun = monotonic()
     os.kill(child, signal.SIGTERM)
     os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)
     return monotonic() - begun
 
 
-def _figures(told: Mapping[str, Mapping[str, str]]) -> str:
-    replay, validator = _of(told, "push_replay"), _of(told, "push_validator")
+def _figures(diagnostics: Mapping[str, Mapping[str, str]]) -> str:
+    replay, validator = _of(diagnostics, "push_replay"), _of(diagnostics, "push_validator")
     lost = {key: value for key, value in validator.items() if key.endswith(" lost")}
-    return f"behind by {replay.get('behind_s', '?')} s, {_windows(told)} windows, validator lost {json.dumps(lost)}"
+    return (
+        f"behind by {replay.get('behind_s', '?')} s, {_windows(diagnostics)} windows, validator lost {json.dumps(lost)}"
+    )
 
 
-def _windows(told: Mapping[str, Mapping[str, str]]) -> int:
-    validator = _of(told, "push_validator")
+def _windows(diagnostics: Mapping[str, Mapping[str, str]]) -> int:
+    validator = _of(diagnostics, "push_validator")
     return next((int(value) for key, value in validator.items() if key.endswith(" windows") and key[0] != "k"), 0)
 
 
-def _of(told: Mapping[str, Mapping[str, str]], node: str) -> Mapping[str, str]:
-    return next((values for name, values in told.items() if node in name), {})
+def _of(diagnostics: Mapping[str, Mapping[str, str]], node: str) -> Mapping[str, str]:
+    return next((values for name, values in diagnostics.items() if node in name), {})
 
 
 def _with_children(nodes: Mapping[str, int]) -> dict[str, int]:
-    """The nodes and the processes that they have started, by name and number."""
+    """The nodes and their child processes, by name."""
     found = dict(nodes)
     for name, number in nodes.items():
         found |= {f"{name}, child {k}": child for k, child in enumerate(_children(number))}
@@ -125,7 +130,7 @@ def _with_children(nodes: Mapping[str, int]) -> dict[str, int]:
 
 
 def _children(number: int) -> list[int]:
-    """In the order of their start; a process belongs to the thread that started it."""
+    """Child processes in the order of their start; a child belongs to the thread that started it."""
     threads = Path(f"/proc/{number}/task").iterdir()
     return sorted(int(child) for thread in threads for child in (thread / "children").read_text().split())
 

@@ -1,11 +1,12 @@
-"""Many clients of one predict_server, for a long time: what answers take, whether any is lost, what the server grows.
+"""Many clients of one predict_server for a long time: response times, lost requests, growth of the server.
 
     python -m benchmarks.nodes.load [--clients 50] [--minutes 10] [--rate 5] [--domain D]
 
-Fifty clients, ten a process, each with a node of its own, ask the shipped model one push or, every tenth time, a batch
-of a hundred. Two more ask and take no answer: one never looks (`deaf`), one is stopped as by Ctrl-Z (`stopped`). A
-request that gets no answer within 5 s is an error that its client knows of; `lost` are those that came to nothing at
-all. Status 1 if any was lost, refused, answered wrongly, or the server's memory grew by more than 5 MB after a minute.
+Fifty clients, ten per process and each with its own node, request single pushes from the shipped model and, every tenth
+time, a batch of a hundred. Two more clients send requests and take no response: one never reads (`deaf`), one is
+stopped as by Ctrl-Z (`stopped`). A request without a response within 5 s is a timeout; `lost` are requests with neither
+a response nor a timeout. The exit status is 1 if a request was lost, refused or answered wrongly, or if the server's
+memory grew by more than 5 MB after a minute.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from benchmarks.nodes.server_under_test import caller, graph, load, predict_serv
 from benchmarks.nodes.vitals import Growth, Vitals, growth, vitals
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
-A_PROCESS = 10  # clients; with a process each, localhost discovery would not find them all
+A_PROCESS = 10  # clients per process; with one process each, localhost discovery would miss some
 WARM_UP = 60.0  # s
 MOST_GROWTH = 5.0  # MB
 
 
 def main() -> int:
-    """Run, report, judge."""
+    """Run the clients, print the result; the exit status is 1 after a failure."""
     options = _options()
     os.environ.update(ROS_DOMAIN_ID=str(options.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     seconds, before = options.minutes * 60.0, load()
@@ -50,13 +51,13 @@ def main() -> int:
         running = [stack.enter_context(_clients(f, *common, *g)) for f, g in zip(files, groups, strict=True)]
         for process in running:
             assert process.stdout is not None
-            while process.stdout.readline() not in (b"asking\n", b""):  # the middleware may have a word to say, too
+            while process.stdout.readline() not in (b"asking\n", b""):  # skip lines of the middleware
                 pass
         seen = _watched(server, running[2:], options.every)
         served = _served(stack)
         accounts = [account for file in files[2:] for account in json.loads(file.read_text())]
     print(f"{options.clients} clients, {seconds:g} s; load average {before} before, {load()} after, two cores")
-    print(f"the server says that it answered {served}, those who take no answer included")
+    print(f"the server reports that it answered {served}, clients that take no response included")
     bad = [_report(name, [account[name] for account in accounts]) for name in (SINGLE, MANY)]
     grown = growth(seen, min(WARM_UP, seconds / 3.0))
     print(f"server, after warm-up: {grown}")
@@ -68,10 +69,10 @@ def _grew(grown: Growth) -> bool:
 
 
 def _served(stack: ExitStack) -> str:
-    """How many requests the server says that it has served and refused."""
+    """The numbers of requests that the server reports as served and refused."""
     stack.enter_context(graph(int(os.environ["ROS_DOMAIN_ID"])))
-    told = stack.enter_context(caller()).reported("/push_predictor")
-    return f"{told['requests_served']} and refused {told['requests_refused']}"
+    status = stack.enter_context(caller()).reported("/push_predictor")
+    return f"{status['requests_served']} and refused {status['requests_refused']}"
 
 
 def _watched(server: int, asking: list[subprocess.Popen[bytes]], every: float) -> list[Vitals]:
@@ -88,7 +89,7 @@ def _watched(server: int, asking: list[subprocess.Popen[bytes]], every: float) -
 
 
 def _report(name: str, accounts: list[dict[str, Any]]) -> int:
-    """Print what became of the requests of a service; answers how many it is to be blamed for."""
+    """Print the fate of the requests of a service; returns the number of failures of the server."""
     seconds = np.concatenate([account["seconds"] for account in accounts])
     total = {key: sum(account[key] for account in accounts) for key in ("asked", "refused", "timed_out", "wrong")}
     lost = total["asked"] - len(seconds) - total["timed_out"]
@@ -96,16 +97,16 @@ def _report(name: str, accounts: list[dict[str, Any]]) -> int:
     print(
         f"{name:20s}asked {total['asked']}, answered {len(seconds)}: p50 {p50:.2f} ms, p99 {p99:.2f} ms, longest "
         f"{longest:.1f} ms; refused {total['refused']}, answered wrongly {total['wrong']}, "
-        f"no answer within {TIMEOUT:g} s {total['timed_out']}, lost without an error {lost}"
+        f"no response within {TIMEOUT:g} s {total['timed_out']}, lost without an error {lost}"
     )
     return int(lost + total["refused"] + total["wrong"])
 
 
 @contextmanager
 def _clients(out: Path, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of clients; leaving kills it, for one that is stopped hears no other signal."""
+    """Run a process of clients; leaving kills it, because a stopped process handles no other signal."""
     environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
-    if "--clients" not in arguments:  # stopped, it would hold a lock of the shared memory that all domains use
+    if "--clients" not in arguments:  # a stopped process would keep a lock of the shared memory of all domains
         environment["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
     command = [sys.executable, "-m", "benchmarks.nodes.load_client", "--out", str(out), *arguments]
     running = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE)

@@ -1,12 +1,12 @@
-"""Clients of one predict_server that share a process: what load.py starts a few of.
+"""Clients of one predict_server that share a process; load.py starts several of these.
 
-Each is a node of its own that asks, in turns, one push and a batch, one request at a time, so many a second. Its
-requests never change, so neither may the answers. `--deaf` asks and, once the server knows it, takes no answer;
-`--stopped` is stopped, as by Ctrl-Z, with answers under way. Writes down what became of every request, as JSON.
+Each client is a node that sends a single push or a batch, one request at a time, at a given rate. Its requests never
+change, so its responses must not either. `--deaf` sends requests and, once the server has found it, reads no response;
+`--stopped` stops itself, as by Ctrl-Z, with responses in transit. Writes the fate of every request as JSON.
 
-The middleware hands every answer of a service to all its clients; each takes those of the others too, to drop them. So
-fifty clients take fifty times what they asked for: rclpy's executor has not the time for that on two cores, and here
-they are taken from a wait set, as ThreadedService takes requests.
+The middleware delivers every response of a service to all its clients, and each client must take those of the others to
+drop them. Fifty clients therefore take fifty times their own responses. rclpy's executor is too slow for that on two
+cores, so a wait set takes them here, as ThreadedService takes requests.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from rclpy.utilities import get_default_context
 from push_predictor_interfaces.srv import PredictPush, PredictPushBatch
 
 TIMEOUT = 5.0  # s, after which a client counts a request as failed
-PATIENCE = 60.0  # s until the server is there, and has answered once
-BATCH, EVERY = 100, 10  # pushes in a batch; each so many-th request is one
+PATIENCE = 60.0  # s, for the server to appear and to respond once
+BATCH, EVERY = 100, 10  # pushes in a batch; every tenth request is a batch
 SINGLE, MANY = "predict_push", "predict_push_batch"
 DURATION = 0.2
-DEPTH = 1000  # answers, those to others too, that wait for a client
+DEPTH = 1000  # responses that can wait for a client, those to other clients included
 
 
 @dataclass
 class Account:
-    """What became of requests: seconds of those answered, and how many came to what else."""
+    """The fate of requests: response times (s), and counts of failures."""
 
     asked: int = 0
     refused: int = 0
@@ -51,7 +51,7 @@ class Account:
 
 
 class Asker:
-    """One client: `begin`, then call `step` often, and `take` when one of its `clients` is ready."""
+    """One client. Call `begin`, then `step` often, and `take` when one of its `clients` is ready."""
 
     def __init__(self, number: int, rate: float) -> None:
         self.node = Node(f"client_{os.getpid()}_{number}", enable_rosout=False, start_parameter_services=False)
@@ -63,28 +63,28 @@ class Asker:
         self._open: tuple[int, float, int] | None = None  # kind, when it was asked, its number
         self._count = number
         self.accounts = [Account(), Account()]
-        self.heard = False  # has the server answered it at all?
+        self.answered = False  # whether the server has responded to it
 
     def greet(self) -> None:
-        """Send a request that no account counts, by the client that was made last."""
+        """Send a request that is not counted, from the last client."""
         self.clients[-1].handle.send_request(self._requests[-1])
 
     def begin(self) -> None:
-        """Ask from now on, not all askers at the same moment."""
+        """Start asking, each asker at its own moment."""
         self._due = perf_counter() + self._lag
 
     @property
     def busy(self) -> bool:
-        """Is a request open?"""
+        """Whether a request is open."""
         return self._open is not None
 
     @property
     def due(self) -> float:
-        """When it wants to be called again, perf_counter."""
+        """Time of the next step, by perf_counter."""
         return self._due if self._open is None else self._open[1] + TIMEOUT
 
     def step(self, asking: bool) -> None:
-        """Give the open request up, if its time is over; ask the next one, if it is time and `asking`."""
+        """Give up the open request after its timeout; send the next one if it is due and `asking`."""
         now = perf_counter()
         if self._open is not None and now - self._open[1] > TIMEOUT:
             self.accounts[self._open[0]].timed_out += 1
@@ -102,10 +102,10 @@ class Asker:
         self._open = (kind, begun, self.clients[kind].handle.send_request(self._requests[kind]))
 
     def take(self, kind: int) -> None:
-        """Take an answer; it may be somebody else's, or to a request that was given up."""
+        """Take a response; it may belong to another client, or to a request that was given up."""
         client = self.clients[kind]
         header, answer = client.handle.take_response(client.srv_type.Response)
-        self.heard |= header is not None
+        self.answered |= header is not None
         if header is None or self._open is None or header.request_id.sequence_number != self._open[2]:
             return
         account = self.accounts[kind]
@@ -126,7 +126,7 @@ class Asker:
 
 
 class Waiter:
-    """Waits for answers to any of the clients."""
+    """Waits for responses to any of the clients."""
 
     def __init__(self, askers: list[Asker]) -> None:
         self._owner = {c.handle.pointer: (asker, kind) for asker in askers for kind, c in enumerate(asker.clients)}
@@ -135,7 +135,7 @@ class Waiter:
         self._set = rclpy_implementation.WaitSet(0, 0, 0, len(self._handles), 0, 0, context)
 
     def wait(self, seconds: float) -> None:
-        """At most so long; what has arrived goes to those who asked."""
+        """Wait at most so long and hand each response to its asker."""
         self._set.clear_entities()
         for handle in self._handles:
             self._set.add_client(handle)
@@ -146,7 +146,7 @@ class Waiter:
 
 
 def main() -> int:
-    """Ask for so many seconds, then wait for the last answers."""
+    """Send requests for so many seconds, then wait for the last responses."""
     options = _options()
     rclpy.init()
     askers = [Asker(options.seed * 1000 + k, options.rate) for k in range(options.clients)]
@@ -167,21 +167,21 @@ def main() -> int:
 
 
 def _acquaint(last: Asker) -> None:
-    """Wait until the server knows all clients of this process; it drops what it has to say to one that it does not.
+    """Wait until the server has found all clients of this process; it drops responses to unknown ones.
 
-    It learns of them in the order in which they were made, and answers the last one.
+    It finds them in the order of their creation, so a response to the last one is enough.
     """
     waiter, begun = Waiter([last]), perf_counter()
-    while not last.heard:
+    while not last.answered:
         if (now := perf_counter()) > begun + PATIENCE:
-            raise SystemExit(f"the server did not answer within {PATIENCE:g} s")
+            raise SystemExit(f"the server did not respond within {PATIENCE:g} s")
         last.greet()
-        while not last.heard and (left := now + 1.0 - perf_counter()) > 0.0:
+        while not last.answered and (left := now + 1.0 - perf_counter()) > 0.0:
             waiter.wait(left)
 
 
 def _never_take(asker: Asker, options: argparse.Namespace) -> int:
-    """Ask and never look; to be stopped, ask a hundred at once."""
+    """Send requests and never read; `--stopped` sends a hundred at once."""
     begun = perf_counter()
     while perf_counter() - begun < options.seconds:
         asker.ask()

@@ -1,16 +1,16 @@
-"""Round trip of predict_push between two processes, beside that of an empty service in the same run.
+"""Round trip of predict_push between two processes, relative to an empty service in the same run.
 
     python -m benchmarks.nodes.predict_latency [--pin] [--model FILE] [--calls N] [--domain D]
 
-Without --model two VHGPs are trained first, of 100 and of 1000 simulated windows (some 20 s), each for a server of its
-own: an answer should take as long of one as of the other. All servers run at the same time and are asked in turns, in
-short blocks, so that all see the same load of the machine, which is printed.
+Without --model two VHGPs are trained first, of 100 and of 1000 simulated windows (some 20 s), each for its own server:
+both should take equally long. All servers run at the same time and are called in turns, in short blocks, so that they
+share the machine's load, which is printed.
 
-Two empty services: `empty` is a plain rclpy node with a std_srvs/Trigger. `empty, direct` is answered by a thread of
-its own, as predict_push is: what predict_push takes longer than that is the prediction and its larger messages.
+Two empty services: `empty` is a plain rclpy node with a std_srvs/Trigger. `empty, direct` is answered by a separate
+thread, as predict_push is: the rest of predict_push is the prediction and its larger messages.
 
-Whether client and server share a core changes every time by a factor of two, and the scheduler changes its mind: with
---pin the client has a core of its own, and the servers another.
+Whether client and server share a core changes every time by a factor of two, and the scheduler changes its choice. With
+--pin the client runs on one core and the servers on another.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ SIZES = (100, 1000)  # windows
 
 
 class EmptyServer(Node):
-    """Answers std_srvs/Trigger and does nothing else: the floor of a round trip."""
+    """Answers std_srvs/Trigger and does nothing else: the minimum of a round trip."""
 
     def __init__(self, stop: Stop) -> None:
         super().__init__("empty_server")
         self.create_service(Trigger, "empty", lambda request, response: response, qos_profile=DEPTH)
 
     def close(self) -> None:
-        """Nothing is left to do."""
+        """Do nothing: rclpy destroys the service."""
 
 
 class DirectEmptyServer(Node):
@@ -83,7 +83,7 @@ SERVERS: dict[str, Callable[[Stop], EmptyServer | DirectEmptyServer]] = {
 
 
 def main() -> int:
-    """Measure, or be an empty server that is measured."""
+    """Measure, or run as one of the empty servers."""
     arguments = _arguments()
     if arguments.serve:
         return run(f"{arguments.serve}_server", SERVERS[arguments.serve], ["--ros-args"])
@@ -124,8 +124,8 @@ def _measure(client: Caller, models: list[PushModel], calls: int) -> None:
     print(f"{calls} calls of each service, one at a time; load average {before} before, {load()} after")
     _report({name: np.array(values[WARM_UP:]) * 1e6 for name, values in taken.items()})
     for k, model in enumerate(models):
-        told = client.reported(f"/server_{k}/")
-        times = f"p50 {told['callback_p50_us']} us, p99 {told['callback_p99_us']} us"
+        status = client.reported(f"/server_{k}/")
+        times = f"p50 {status['callback_p50_us']} us, p99 {status['callback_p99_us']} us"
         print(f"callback in the server, n = {len(model.training)}: {times}")
     for model in models:
         _in_this_process(model)
@@ -145,7 +145,8 @@ def _in_this_process(model: PushModel) -> None:
     made = perf_counter() - start
     print(f"{model.name}, {len(model.training)} windows, {tabulated.how}; made in {made:.2f} s")
     print(
-        f"  in this process, p50: served model {_model_time(tabulated):.0f} us, the model {_model_time(model):.0f} us"
+        f"  in this process, p50: tabulated model {_model_time(tabulated):.0f} us, exact model "
+        f"{_model_time(model):.0f} us"
     )
 
 

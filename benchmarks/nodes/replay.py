@@ -1,10 +1,10 @@
-"""Does a replay keep its pace and lose nothing? Compares what another process hears with what the recording holds.
+"""Does a replay keep its rate and lose nothing? Compares received messages with recorded ones.
 
     python -m benchmarks.nodes.replay [--seconds 60] [--rate 1] [--depth 1000]
 
-Simulates pushes with poses at 250 Hz and a wrench at 125 Hz, replays them with push_replay in a process of its own and
-listens here. Lateness is what the node itself reports; the load of the machine is printed beside it. --depth is that of
-the listener's queues, 0 keeps all.
+Simulates pushes with poses at 250 Hz and a wrench at 125 Hz, replays them with push_replay in a separate process and
+subscribes here. The node reports its lateness; the machine's load is printed. --depth is that of the subscriber's
+queues, 0 keeps all messages.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SECONDS_A_PUSH = 2.0  # at least, at 20 mm/s over 30 mm
 
 
 def main() -> int:
-    """Replay and compare; status 0 if every message was heard once, in order, unchanged."""
+    """Replay and compare; the exit status is 0 if every message arrived once, in order, unchanged."""
     options = _options()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", "78")
@@ -48,36 +48,38 @@ def main() -> int:
         sensors = Sensors(rate=250.0, wrench_rate=125.0)
         write_recording(bag, simulate(SimulationSpec("rect1", "abs", plan, sensors=sensors, name="pushes")))
         print(f"load average {os.getloadavg()[0]:.1f} before", flush=True)
-        with _listening(options.depth) as heard:
+        with _subscribed(options.depth) as received:
             status = _replay(bag, options.rate, options.seconds)
         print(f"load average {os.getloadavg()[0]:.1f} after, {os.cpu_count()} cores")
-        return status or _compare(bag, heard, options.seconds)
+        return status or _compare(bag, received, options.seconds)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0, help="of recorded time (default %(default)s)")
     parser.add_argument("--rate", type=float, default=1.0, help="of the replay (default %(default)s)")
-    parser.add_argument("--depth", type=int, default=1000, help="of the listener's queues (default %(default)s)")
+    parser.add_argument("--depth", type=int, default=1000, help="of the subscriber's queues (default %(default)s)")
     return parser.parse_args()
 
 
 @contextmanager
-def _listening(depth: int) -> Iterator[dict[str, list[bytes]]]:
-    """What is heard on the three topics, raw; leaving waits until nothing more comes."""
+def _subscribed(depth: int) -> Iterator[dict[str, list[bytes]]]:
+    """Subscribe to the three topics, raw; leaving waits until no more messages arrive."""
     rclpy.init()
-    node, heard = Node("listener"), {topic: list[bytes]() for topic in TOPICS}
+    node, received = Node("subscriber"), {topic: list[bytes]() for topic in TOPICS}
     history = HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL
     for topic, kind in TOPICS.items():
-        node.create_subscription(kind, topic, heard[topic].append, QoSProfile(depth=depth, history=history), raw=True)
+        node.create_subscription(
+            kind, topic, received[topic].append, QoSProfile(depth=depth, history=history), raw=True
+        )
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     thread = threading.Thread(target=_spin, args=(executor,))
     thread.start()
     try:
-        yield heard
+        yield received
         before = -1
-        while (count := sum(map(len, heard.values()))) > before:
+        while (count := sum(map(len, received.values()))) > before:
             before = count
             sleep(0.5)
     finally:
@@ -106,16 +108,16 @@ def _replay(bag: Path, rate: float, seconds: float) -> int:
     return subprocess.run(command, check=False).returncode
 
 
-def _compare(bag: Path, heard: dict[str, list[bytes]], seconds: float) -> int:
+def _compare(bag: Path, received: dict[str, list[bytes]], seconds: float) -> int:
     played = list(open_bag(bag).messages())
     end = min(message.log_time for message in played) + round(seconds * 1e9)
     wrong = 0
-    for topic, messages in heard.items():
+    for topic, messages in received.items():
         recorded = [bytes(m.data) for m in played if m.topic == topic and m.log_time <= end]
         same = [bytes(data) for data in messages] == recorded
         wrong += not same
         verdict = "each once, in order, unchanged" if same else "NOT as recorded"
-        print(f"{topic:16s} recorded {len(recorded)}, heard {len(messages)}: {verdict}")
+        print(f"{topic:16s} recorded {len(recorded)}, received {len(messages)}: {verdict}")
     return 1 if wrong else 0
 
 

@@ -1,4 +1,4 @@
-"""A predict_server in a process of its own and a client for it: what the benchmarks of its services share."""
+"""A predict_server in a separate process and a client for it, shared by the benchmarks of its services."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ from push_predictor.recordings.table import PushTable
 from push_predictor_interfaces.srv import PredictPush
 
 DEPTH = QoSProfile(depth=100)
-NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])  # m, m, rad: dy and dtheta go together
+NOISE = np.array([[1e-4, 0.0, 0.0], [0.0, 1e-4, 3e-3], [0.0, 0.0, 4e-3]])  # m, m, rad: dy and dtheta are correlated
 
 
 class Caller:
-    """Calls services one at a time, and hears what their nodes report on /diagnostics."""
+    """Calls services one at a time and receives /diagnostics."""
 
     def __init__(self) -> None:
         self.node = Node("benchmark_client")
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.diagnostics: dict[str, dict[str, str]] = {}  # by the name of the status
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 10)
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, 10)
 
     def client(self, kind: Any, name: str) -> Client:
-        """A client whose service is there. Ends the program if it does not appear."""
+        """A client of a service. Raises SystemExit if the service does not appear."""
         client = self.node.create_client(kind, name, qos_profile=DEPTH)
         if not client.wait_for_service(30.0):
             raise SystemExit(f"{client.srv_name}: the service did not appear within 30 s")
         return client
 
     def timed(self, client: Client, request: Any) -> tuple[float, Any]:
-        """Seconds from the call to the response, and the response. A refusal ends the program."""
+        """Seconds from call to response, and the response. Raises SystemExit if the request is refused."""
         start = perf_counter()
         future = client.call_async(request)
         self.spin_until(future.done)
@@ -62,27 +62,27 @@ class Caller:
         return elapsed, response
 
     def spin_until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Handle what arrives until the condition holds. Ends the program after so many seconds."""
+        """Process messages until the condition is true. Raises SystemExit after `seconds`."""
         end = perf_counter() + seconds
         while not condition():  # spin_until_future_complete would leave tasks behind, and slow down
             if perf_counter() > end:
-                raise SystemExit(f"no answer within {seconds:g} s")
+                raise SystemExit(f"no response within {seconds:g} s")
             self.executor.spin_once(timeout_sec=seconds)
 
     def reported(self, node_name: str) -> dict[str, str]:
-        """What the server of that name says of itself, from a status that is heard from now on."""
+        """The next diagnostic status of the node of that name."""
         self.diagnostics.clear()
         self.spin_until(lambda: any(name.startswith(node_name) for name in self.diagnostics), 10.0)
         return next(values for name, values in self.diagnostics.items() if name.startswith(node_name))
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.diagnostics[status.name] = {pair.key: pair.value for pair in status.values}
 
 
 @contextmanager
 def graph(domain: int) -> Iterator[None]:
-    """ROS in this process and those it starts, on this machine only."""
+    """Initialise ROS for this process and its children, on this machine only."""
     os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     rclpy.init()
     try:
@@ -104,7 +104,7 @@ def caller() -> Iterator[Caller]:
 
 @contextmanager
 def predict_server(model: Path, namespace: str = "") -> Iterator[int]:
-    """A running predict_server of one model; its process id."""
+    """Run a predict_server with one model; yields its process id."""
     names = ["-r", f"__ns:={namespace}"] if namespace else []
     arguments = ["--ros-args", "-p", f"models:=['{model}']", *names]
     with process("-m", "push_predictor.nodes.predict_server", *arguments) as number:
@@ -113,8 +113,8 @@ def predict_server(model: Path, namespace: str = "") -> Iterator[int]:
 
 @contextmanager
 def process(*arguments: str) -> Iterator[int]:
-    """Another Python with this repository's packages; its id."""
-    # Inherited, it would keep a Python of another environment from setting its library path.
+    """Run another Python with this repository's packages; yields its process id."""
+    # If inherited, it would keep a Python of another environment from setting its library path.
     environment = {k: v for k, v in os.environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
     environment["OPENBLAS_NUM_THREADS"] = "1"
     root = str(Path(__file__).resolve().parents[2])
@@ -129,7 +129,7 @@ def process(*arguments: str) -> Iterator[int]:
 
 @contextmanager
 def model_files(*sizes: int) -> Iterator[list[Path]]:
-    """For each size a file with a VHGP that learnt from so many simulated windows of the MIT square."""
+    """Write, for each size, a VHGP trained on that many simulated windows of the MIT square."""
     with tempfile.TemporaryDirectory(prefix="push_model_") as folder:
         paths = [Path(folder) / f"vhgp_{size}.pushmodel" for size in sizes]
         for size, path in zip(sizes, paths, strict=True):
@@ -138,7 +138,7 @@ def model_files(*sizes: int) -> Iterator[list[Path]]:
 
 
 def single_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
-    """So many of the model's training pushes, drawn at random."""
+    """Requests for `count` of the model's training pushes, drawn at random."""
     table = model.training
     rows = np.random.default_rng(0).integers(0, len(table), count)
     return [
@@ -148,7 +148,7 @@ def single_requests(model: PushModel, count: int) -> list[PredictPush.Request]:
 
 
 def load() -> str:
-    """The machine's load now, to print beside times."""
+    """The machine's load averages, to print next to times."""
     return "{:.1f} {:.1f} {:.1f}".format(*os.getloadavg())
 
 

@@ -1,10 +1,10 @@
-"""How long the nodes take to be ready, beside an empty node, and the command line to help, beside Python alone.
+"""Start-up time of the nodes, relative to an empty node, and of the command line, relative to Python alone.
 
     python -m benchmarks.nodes.start [--repeats 5] [--domain D]
 
-A node is ready when its service is found by a node that runs already. All are started in turns, so that all see the
-same load of the machine, which is printed. Ratios are of the fastest starts: an announcement that another node misses,
-which happens now and then, is made again only after 3 s.
+A node is ready when a running node finds its service. All programs start in turns, so that they share the machine's
+load, which is printed. Ratios are of the fastest starts: another node occasionally misses an announcement, and the next
+one follows only after 3 s.
 """
 
 from __future__ import annotations

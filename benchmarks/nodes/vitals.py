@@ -1,4 +1,4 @@
-"""What a process takes, from /proc: memory, threads, file descriptors; and whether that grows."""
+"""Memory, threads and file descriptors of a process, from /proc, and their growth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MEGABYTE = 1024.0 * 1024.0
 
 @dataclass(frozen=True)
 class Vitals:
-    """At a time (s, monotonic): resident memory (MB), threads, open file descriptors."""
+    """Resident memory (MB), threads and open file descriptors at a time (s, monotonic)."""
 
     time: float
     memory: float
@@ -25,7 +25,7 @@ class Vitals:
 
 
 def vitals(process: int) -> Vitals:
-    """Of the process with this id. Raises OSError if there is none."""
+    """Read the vitals of the process with this id. Raises OSError if there is none."""
     folder = Path("/proc") / str(process)
     pages = int((folder / "statm").read_text().split()[1])
     threads = len(os.listdir(folder / "task"))
@@ -35,9 +35,10 @@ def vitals(process: int) -> Vitals:
 
 @dataclass(frozen=True)
 class Growth:
-    """From the first fifth after the warm-up to the last: memory (MB) by their means, and its highest; threads and
-    descriptors by the fewest or the most, whichever grew less: a file may be open or closed for a moment; a leak shows
-    in both.
+    """Growth from the first fifth after the warm-up to the last.
+
+    memory: difference of the means, MB; highest: largest excess over the first mean. threads and descriptors: growth of
+    the minimum or of the maximum, whichever is smaller; a leak shows in both, a file that is briefly open in one.
     """
 
     memory: float
@@ -53,7 +54,7 @@ class Growth:
 
 
 def growth(seen: Sequence[Vitals], warm_up: float) -> Growth:
-    """After so many seconds of the first; seen: in order, one at least."""
+    """Growth after `warm_up` seconds; seen: in order of time, one at least."""
     warm = [v for v in seen if v.time >= seen[0].time + warm_up] or list(seen[-1:])
     part = max(1, len(warm) // 5)
     first, last = warm[:part], warm[-part:]

@@ -1,12 +1,12 @@
-"""What a planner gains by knowing the scatter of its pushes: goals on the simulated rig, with and without.
+"""The value of knowing the covariance of a push for a planner: goals reached on the simulated rig.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.planning.planner [--goals N] [--model FILE] [--probability P]
 
-The same planner (planning/choose.py), the same pushes, the same means; only the covariance differs: the model's own;
-one that is the same for every window (the mean of those of the training windows) and grows with a push as the model's
-does; one that is the same for every push (the mean of the pushes'); and none. Goals, places on the table and what
-differs from push to push are drawn once for all. Every regime that is listed below is printed. The model is that of
-bags/square_abs_train, whose rig the simulated cell is.
+The planner (planning/choose.py), the pushes and the means are the same; only the covariance differs. Variants: the
+model's own; the same for every window (the mean over the training windows), growing along a push as the model's does;
+the same for every push (the mean over the pushes); and none. Goals, start poses and the noise of each push are drawn
+once for all. Prints every regime below. The model is one of bags/square_abs_train, recorded on the simulated rig used
+here.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ VELOCITY = 0.02  # m/s, of most of the training pushes
 WINDOWS = (1, 2, 3, 4, 5, 6, 8)  # 4 to 32 mm
 VARIANTS = ("VHGP", "same for every window", "same for every push", "none")
 SEED = 2026
-AREA = 0.12  # m, half the side of the square of the table on which sliders start
-IDLE = (0.125, 0.0, 0.001)  # contact, angle, travel of the push on a slider that is done; not looked at
+AREA = 0.12  # m, half the side of the square on the table in which sliders start
+IDLE = (0.125, 0.0, 0.001)  # contact, angle, travel of the push on a slider at its goal; its outcome is ignored
 
 
 REGIMES = (
@@ -61,8 +61,10 @@ def main(arguments: list[str] | None = None) -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--goals", type=int, default=100, help="of every regime")
-    parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train; trained now unless given")
-    parser.add_argument("--probability", type=float, default=0.9, help="at which one push shall reach")
+    parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train (default: train one)")
+    parser.add_argument(
+        "--probability", type=float, default=0.9, help="wanted probability that a push reaches the goal"
+    )
     parser.add_argument("--regimes", nargs="*", help="names; all unless given")
     options = parser.parse_args(arguments)
     model = load_model(options.model) if options.model else trained()
@@ -79,7 +81,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
-    """One a variant: the same pushes and means, those of the model; the covariances of each."""
+    """A repertoire per variant: the model's pushes and means, and the covariance of the variant."""
     model = tabulated.model
 
     def predict(inputs: Array) -> Prediction:
@@ -101,7 +103,7 @@ def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
 
 
 def run(pushes: Repertoire, regime: Regime, count: int, probability: float) -> Runs:
-    """Bring `count` sliders to their goals, in lockstep."""
+    """Push `count` sliders to their goals, in lockstep."""
     sliders, goals = _drawn(regime, count)
     needed = np.full(count, regime.limit + 1)
     promised, kept = [], []
@@ -122,17 +124,17 @@ def run(pushes: Repertoire, regime: Regime, count: int, probability: float) -> R
 
 
 def _drawn(regime: Regime, count: int) -> tuple[Array, list[Goal]]:
-    """Sliders (n, 3) and their goals; the same for every variant."""
+    """Draw sliders (n, 3) and their goals, the same for every variant."""
     rng = np.random.default_rng([SEED, REGIMES.index(regime)])
     sliders = np.column_stack([rng.uniform(-AREA, AREA, (count, 2)), rng.uniform(-np.pi, np.pi, count)])
-    way, toward = regime.far * rng.uniform(0.25, 1.0, count), rng.uniform(-np.pi, np.pi, count)
+    distance, toward = regime.far * rng.uniform(0.25, 1.0, count), rng.uniform(-np.pi, np.pi, count)
     turned = rng.uniform(-regime.turned, regime.turned, count)
-    shift = np.column_stack([way * np.cos(toward), way * np.sin(toward), turned])
+    shift = np.column_stack([distance * np.cos(toward), distance * np.sin(toward), turned])
     return sliders, [Goal(pose, regime.distance, regime.turn) for pose in sliders + shift]
 
 
 def _spec(chosen: Mapping[int, Choice], count: int, turn: int) -> SimulationSpec:
-    """The chosen pushes, each in the row of its goal, so that a row scatters alike for all variants."""
+    """The chosen pushes, each in the row of its goal, so that a row has the same noise for all variants."""
     rows = np.tile(np.array([*IDLE[:2], VELOCITY, IDLE[2]]), (count, 1))
     for k, choice in chosen.items():
         velocity, contact, angle = choice.push.inputs[0]
@@ -141,14 +143,14 @@ def _spec(chosen: Mapping[int, Choice], count: int, turn: int) -> SimulationSpec
 
 
 def _keys(of: Repertoire) -> TextArray:
-    """What tells the pushes of a repertoire apart."""
+    """Keys of the pushes of a repertoire."""
     return np.array(
         [f"{inputs.tobytes().hex()} {count}" for inputs, count in zip(*vars(of.pushes).values(), strict=True)]
     )
 
 
 def _only(of: Repertoire, keys: TextArray) -> Repertoire:
-    """Its pushes with these keys, in their order."""
+    """The pushes with these keys, in their order."""
     rows = np.argsort(every := _keys(of))[np.searchsorted(np.sort(every), keys)]
     return Repertoire(of.pushes.take(rows), of.mean[rows], of.covariance[rows])
 
@@ -161,7 +163,7 @@ def _with_covariance(predict: Predict, covariance: Array) -> Predict:
 
 
 def trained() -> PushModel:
-    """A VHGP of the recording."""
+    """Train a VHGP on the recording."""
     return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="vhgp", sources=[TRAINING.name])
 
 

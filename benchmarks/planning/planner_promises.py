@@ -1,10 +1,9 @@
-"""Does a push reach as often as the planner promises? Pushes of the repertoire, repeated at random places of the table.
+"""Does a push reach the goal as often as predicted? Pushes of the repertoire, repeated at random places on the table.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.planning.planner_promises [--pushes N] [--repetitions R] [--model FILE]
 
-The goal lies where the push should lead: the mean. For each tolerance and each covariance (see planner.py): how often
- the slider comes to lie within, in bins of the promised probability, and how promised and kept probabilities of
-the pushes are correlated.
+The goal is the mean outcome. For each tolerance and each covariance (see planner.py): the share of pushes that end
+within the tolerance, in bins of the predicted probability, and the correlation of predicted and observed shares.
 """
 
 from __future__ import annotations
@@ -37,18 +36,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pushes", type=int, default=150, help="drawn from the repertoire")
     parser.add_argument("--repetitions", type=int, default=16, help="of each push")
-    parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train; trained now unless given")
+    parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train (default: train one)")
     options = parser.parse_args(arguments)
     repertoires = repertoires_of(tabulate(load_model(options.model) if options.model else trained()))
     rng = np.random.default_rng(SEED)
     rows = rng.choice(len(repertoires[VARIANTS[0]]), options.pushes, replace=False)
-    beside = _beside_the_mean(repertoires[VARIANTS[0]], rows, options.repetitions, rng)
-    print(_table(repertoires, rows, beside))
+    deviations = _deviations(repertoires[VARIANTS[0]], rows, options.repetitions, rng)
+    print(_table(repertoires, rows, deviations))
     return 0
 
 
-def _beside_the_mean(pushes: Repertoire, rows: IntArray, repetitions: int, rng: np.random.Generator) -> Array:
-    """Where sliders come to lie, less where they should: (n, repetitions, 3), in the body frames before the push."""
+def _deviations(pushes: Repertoire, rows: IntArray, repetitions: int, rng: np.random.Generator) -> Array:
+    """Final pose minus mean (n, repetitions, 3), in the body frames before the push."""
     of = pushes.pushes.take(np.repeat(rows, repetitions))
     velocity, contact, angle = of.inputs.T
     count = len(of)
@@ -59,27 +58,27 @@ def _beside_the_mean(pushes: Repertoire, rows: IntArray, repetitions: int, rng: 
     return np.asarray(moved.reshape(len(rows), repetitions, 3) - pushes.mean[rows, None])
 
 
-def _table(repertoires: Mapping[str, Repertoire], rows: IntArray, beside: Array) -> str:
-    heads = [f"promised {low:g} to {min(high, 1.0):g}" for low, high in pairwise(BINS)]
+def _table(repertoires: Mapping[str, Repertoire], rows: IntArray, deviations: Array) -> str:
+    heads = [f"predicted {low:g} to {min(high, 1.0):g}" for low, high in pairwise(BINS)]
     lines = [f"| within | covariance | correlation | {' | '.join(heads)} |", "|---" * (3 + len(heads)) + "|"]
     for distance, turn in TOLERANCES:
         goal = Goal(np.zeros(3), distance, turn)
-        kept = goal.reached(beside).mean(axis=1)
+        kept = goal.reached(deviations).mean(axis=1)
         for name in VARIANTS[:-1]:
             of = repertoires[name]
             promised = goal.reached(of.outcomes[rows] - of.mean[rows, None]).mean(axis=1)
             same = np.ptp(promised) < 1e-9
-            correlation = "-" if same else f"{np.corrcoef(promised, kept)[0, 1]:.2f}"
+            correlation = "–" if same else f"{np.corrcoef(promised, kept)[0, 1]:.2f}"
             cells = " | ".join(_bin(promised, kept, low, high) for low, high in pairwise(BINS))
             lines.append(f"| {1e3 * distance:g} mm, {turn:g} rad | {name} | {correlation} | {cells} |")
     return "\n".join(lines)
 
 
 def _bin(promised: Array, kept: Array, low: float, high: float) -> str:
-    """Promised and kept on average, and of how many pushes."""
+    """Mean predicted and observed share, and the number of pushes."""
     inside = (promised >= low) & (promised < high)
     if not inside.any():
-        return "-"
+        return "–"
     return f"{promised[inside].mean():.2f}: {kept[inside].mean():.2f} ({np.count_nonzero(inside)})"
 
 

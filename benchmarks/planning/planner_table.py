@@ -1,4 +1,4 @@
-"""What planner.py prints: the runs of a regime as a Markdown table."""
+"""The runs of a regime as a Markdown table, for planner.py."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DRAWS = 4000  # of the bootstrap
 
 @dataclass(frozen=True)
 class Regime:
-    """Goals up to `far` m away, turned by up to `turned` rad; tolerances distance m, turn rad; `limit` of pushes."""
+    """Goals up to `far` m away, turned by up to `turned` rad; tolerances (m, rad); largest number of pushes."""
 
     name: str
     far: float
@@ -26,9 +26,10 @@ class Regime:
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What became of n goals: pushes (n,) made until they were reached, limit + 1 where they were not; error (n,) m of
-    the last pose; promised, kept: of the pushes announced at the wanted probability, that probability and whether
-    they reached.
+    """The result for n goals.
+
+    pushes (n,): number until the goal was reached, limit + 1 if it was not. error (n,): of the last pose, m. promised,
+    kept: predicted probability of the pushes with at least the wanted one, and whether they reached the goal.
     """
 
     pushes: IntArray
@@ -38,7 +39,7 @@ class Runs:
 
 
 def table(regime: Regime, runs: Mapping[str, Runs]) -> str:
-    """A regime as Markdown; a goal that was not reached counts as limit + 1 pushes."""
+    """A regime as Markdown; a missed goal counts as limit + 1 pushes."""
     turn = "any heading" if regime.turn is None else f"{regime.turn} rad"
     base = next(iter(runs))
     first = runs[base]
@@ -47,7 +48,7 @@ def table(regime: Regime, runs: Mapping[str, Runs]) -> str:
         f"{1e3 * regime.distance:g} mm, {turn}",
         "",
         f"| covariance | reached in 1 | in 2 | in 3 | in {regime.limit} | pushes | more than {base} "
-        "| error at the end, mm | sure pushes | promised | kept |",
+        "| final error, mm | sure pushes | predicted | reached |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     lines += [_line(name, of, regime.limit, None if of is first else first) for name, of in runs.items()]
@@ -78,7 +79,7 @@ def _share(count: int, n: int) -> str:
 
 
 def _mean_with_interval(values: IntArray, form: str) -> str:
-    """A mean over goals and its 95 % interval by drawing goals anew."""
+    """A mean over goals and its 95 % interval from resampling goals."""
     rows = np.random.default_rng(0).integers(len(values), size=(DRAWS, len(values)))
     low, high = np.quantile(values[rows].mean(axis=1), [0.025, 0.975])
     return f"{values.mean():{form}} ({low:{form}} to {high:{form}})"

@@ -1,15 +1,15 @@
-"""Long pushes rolled out, beside the same pushes repeated on the rig simulator.
+"""Rollouts of long pushes compared with repetitions of the same pushes on the rig simulator.
 
     python -m benchmarks.planning.rollout [--model FILE] [--repeats 200] [--picture PICTURE.png]
 
-Three distributions of the slider's pose at the end of a push are compared with what the simulator's repeats did:
+Three predicted distributions of the slider's pose at the end of a push:
 
-  rollout      samples carried along, with what persists within a push (planning/persistence.py)
-  independent  the same with independent windows
-  naive        one Gaussian: the path of the means, and the sum of the covariances met on it
+  rollout      samples, with the noise that persists within a push (planning/persistence.py)
+  independent  samples with independent windows
+  naive        one Gaussian: the path of the means, and the sum of the covariances along it
 
-By energy distance (heading times the slider's radius of gyration), KL divergence of the Gaussians, and how many of the
-repeats lie in the ellipsoids that hold 50, 90 and 95 % of the samples. Intervals: 95 %, repeats drawn anew.
+Compared by energy distance (heading times the slider's radius of gyration), KL divergence of the Gaussians, and
+coverage of the 50, 90 and 95 % ellipsoids. Intervals: 95 %, from resampling repetitions.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.types import Array
 
 TRAINING = Path(__file__).resolve().parents[2] / "bags" / "square_abs_train"
-SPEED, LENGTHS = 0.02, (0.004, 0.02, 0.06, 0.1)  # m/s; m of way after which poses are compared
+SPEED, LENGTHS = 0.02, (0.004, 0.02, 0.06, 0.1)  # m/s; distances (m) after which poses are compared
 CONTACTS, ANGLES = (0.03, 0.08, 0.125, 0.15, 0.2), (-0.5, 0.0, 0.4)
 ARM = 0.09 / np.sqrt(6.0)  # m, of the square
 SAMPLES = 2000
 MILLIMETRES = 1e3
-IN_TURN = 2  # of LENGTHS: the way of the pushes that are made one after the other
+IN_TURN = 2  # of LENGTHS: the length of the successive pushes
 
 Steps: TypeAlias = Sequence[Sequence[float]]  # velocity m/s, contact, angle rad, duration s
 
@@ -62,24 +62,24 @@ def main() -> int:
     model = load_model(options.model) if options.model else trained()
     tabulated = tabulate(model)
     print(f"{model.name}: {model.kind}, {len(model.training)} windows; {tabulated.how}")
-    print("persistence over 4, 8, 16, 40 mm of way, dx dy dtheta:", *_persistence(model))
+    print("persistence over 4, 8, 16, 40 mm of travel, dx dy dtheta:", *_persistence(model))
     pushes = [(contact, angle) for contact in CONTACTS for angle in ANGLES]
     seen = [_repeated(k, *push, options.repeats) for k, push in enumerate(pushes)]
     for place, length in enumerate(LENGTHS):
         steps = [[[SPEED, *push, length / SPEED]] for push in pushes]
-        _report(tabulated, f"{1e3 * length:.0f} mm of way", steps, [each.poses[place] for each in seen])
+        _report(tabulated, f"pushes of {1e3 * length:.0f} mm", steps, [each.poses[place] for each in seen])
     singles = [[SPEED, *push, LENGTHS[IN_TURN] / SPEED] for push in pushes]
     sequences = np.random.default_rng(0).permutation(len(pushes)).reshape(-1, 3)
     truth = [in_turn([seen[k].poses[IN_TURN] for k in sequence]) for sequence in sequences]
     steps = [[singles[k] for k in sequence] for sequence in sequences]
-    _report(tabulated, f"three pushes of {1e3 * LENGTHS[IN_TURN]:.0f} mm, one after the other", steps, truth)
+    _report(tabulated, f"three successive pushes of {1e3 * LENGTHS[IN_TURN]:.0f} mm", steps, truth)
     if options.picture:
         draw_rollout(tabulated, options.picture)
     return 0
 
 
 def trained() -> PushModel:
-    """The default VHGP of the training recording."""
+    """Train the default VHGP on the training recording."""
     return train_model(load_data([TRAINING], None), load_rig_for([TRAINING], None), "vhgp", name="square_abs")
 
 
@@ -90,7 +90,7 @@ def _repeated(number: int, contact: float, angle: float, count: int) -> Repeats:
 
 def _report(tabulated: TabulatedModel, title: str, cases: Sequence[Steps], truth: Sequence[Array]) -> None:
     weights = weights_of(len(truth[0]))
-    print(f"\n{title}: {len(cases)} of them, {len(truth[0])} repeats of each")
+    print(f"\n{title}: {len(cases)} cases, {len(truth[0])} repetitions of each")
     head = "".join(f"{f'{100.0 * share:.0f} %':>8s}" for share in REGIONS)
     print(f"{'':12s}{'energy distance, mm':>28s}{'over rollout':>24s}{'KL, nats':>10s}{head}")
     first: Array | None = None
@@ -127,7 +127,7 @@ def _independent(tabulated: TabulatedModel, steps: Steps) -> Array:
 
 
 def _naive(tabulated: TabulatedModel, steps: Steps) -> Array:
-    """Samples of the Gaussian along the path of the means."""
+    """Samples of one Gaussian along the path of the means."""
     slider, covariance = np.zeros((1, 3)), np.zeros((3, 3))
     for step in steps:
         slider, added = _step_of_means(tabulated, slider, step)
@@ -160,8 +160,8 @@ DISTRIBUTIONS: dict[str, Callable[[TabulatedModel, Steps], Array]] = {
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", type=Path, help="a model file of the square on ABS (default: train one)")
-    parser.add_argument("--repeats", type=int, default=200, help="of each push (default 200)")
-    parser.add_argument("--picture", type=Path, help="also draw the push that ends in two ways")
+    parser.add_argument("--repeats", type=int, default=200, help="repetitions of each push (default 200)")
+    parser.add_argument("--picture", type=Path, help="also draw a push with two modes")
     return parser.parse_args()
 
 

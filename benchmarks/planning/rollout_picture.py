@@ -1,4 +1,4 @@
-"""One long push through the middle of a side: every step has one mode, the outcome has two."""
+"""Picture of a long push through the middle of a side: every step has one mode, the outcome has two."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DIP_DRAWS = 5000
 
 
 def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
-    """Draw it, and print how surely headings have two modes (Hartigan's dip)."""
+    """Draw the push, and print p values of Hartigan's dip test for one mode of the heading."""
     outline = tabulated.model.rig.outline
     inward = outline.inward_normal(np.array([CONTACT]))[0]
     ahead = np.arctan2(inward[1], inward[0])
@@ -39,7 +39,9 @@ def draw_rollout(tabulated: TabulatedModel, path: Path) -> None:
     predicted = [rollout(tabulated, np.zeros(3), np.zeros((3, 3)), step, COUNT).samples for step in steps]
     for time, samples, seen in zip(TIMES, predicted, truth, strict=True):
         p = p_values(np.concatenate([dip(samples[None, :, 2]), dip(seen[None, :, 2])]), COUNT, DIP_DRAWS)
-        print(f"{1e3 * SPEED * time:.0f} mm: one mode of the heading, p = {p[0]:.2g} of samples, {p[1]:.2g} of repeats")
+        print(
+            f"{1e3 * SPEED * time:.0f} mm: dip test of the heading: p = {p[0]:.2g} (samples), {p[1]:.2g} (repetitions)"
+        )
     draw(path, (9.0, 5.6), lambda figure: _paint(figure, outline, ahead, predicted, truth))
 
 

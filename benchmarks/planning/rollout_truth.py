@@ -1,4 +1,4 @@
-"""The same push again and again on the rig simulator, and how far a predicted distribution is from what it did."""
+"""Repetitions of a push on the rig simulator, and distances of a predicted distribution from them."""
 
 from __future__ import annotations
 
@@ -21,16 +21,14 @@ REGIONS = (0.5, 0.9, 0.95)
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """n repeats of one push: poses (n, 3) after `time` (k,) s from the first touch, as poses (k, n, 3) in the slider's
-    body frame at that touch.
-    """
+    """n repetitions of one push: poses (k, n, 3) at times (k,) s after the first contact, in the body frame then."""
 
     time: Array
     poses: Array
 
 
 def repeats(contact: float, angle: float, speed: float, times: Array, count: int, seed: int) -> Repeats:
-    """Simulate; table and slider are those of bags/square_abs_*, all else is drawn anew for every repeat."""
+    """Simulate repetitions; table and slider are those of bags/square_abs_*, all else is drawn for each repetition."""
     travel = speed * float(max(times)) + BRAKING
     plan = PushPlan(*(np.full(count, value) for value in (contact, angle, speed, travel)))
     poses = []
@@ -45,9 +43,9 @@ def repeats(contact: float, angle: float, speed: float, times: Array, count: int
 
 
 def in_turn(pushes: Sequence[Array]) -> Array:
-    """Poses (n, 3) after pushes, each (n, 3) relative to the slider at its start, made one after the other.
+    """Poses (n, 3) after successive pushes, each (n, 3) relative to the slider at its start.
 
-    Repeats of different pushes are drawn independently of each other, so they may be put together as they come.
+    Repetitions of different pushes are independent, so any combination of them is a repetition of the sequence.
     """
     at = np.zeros_like(pushes[0])
     for moved in pushes:
@@ -67,7 +65,7 @@ class EnergyDistance:
         self._across, self._of_truth = cdist(y, x).mean(axis=1), cdist(y, y)
 
     def value(self, weight: Array | None = None) -> float:
-        """With weights (n,) of the truth's poses: how often each was drawn."""
+        """The distance; weight (n,): how often a bootstrap drew each pose of the truth."""
         w = np.ones(len(self._across)) if weight is None else weight
         of_truth = w @ self._of_truth @ w / (w.sum() ** 2 - w @ w)
         return float(2.0 * w @ self._across / w.sum() - self._within - of_truth)

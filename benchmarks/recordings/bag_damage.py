@@ -1,6 +1,6 @@
-"""Bags in all forms, and damaged copies of them whose truth is known: which messages stand before the damage.
+"""Bags in all forms, and damaged copies of them with known truth: which messages lie before the damage.
 
-The whole bags are written, and the truth is read, with the mcap package alone.
+The mcap package alone writes the undamaged bags and reads the truth.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ class Unit:
 
 @dataclass(frozen=True)
 class Form:
-    """A whole bag: its file's bytes as they are on disk, and as MCAP.
+    """An undamaged bag: the bytes of its file on disk, and as MCAP.
 
-    checked: does a checksum tell which messages are damaged? summed: does one tell at least that some are? packed:
-    what rosbag2 compressed on top, 'file', 'message' or ''. largest: the bytes of its largest chunk, unpacked (where
-    it has no chunks, of one of the other bags).
+    checked: checksums show which messages are damaged. summed: a checksum shows at least that some are. packed: what
+    rosbag2 compressed in addition, 'file', 'message' or ''. largest: bytes of its largest chunk, unpacked (without
+    chunks, that of the other bags).
     """
 
     name: str
@@ -60,10 +60,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Copy:
-    """A damaged copy. must: so many messages stand before.
-
-    near: (from, to) where the damage must be said to be.
-    """
+    """A damaged copy. must: number of messages before the damage; near: (from, to) bytes where a note must place it."""
 
     form: Form
     kind: str
@@ -97,7 +94,7 @@ def forms() -> list[Form]:
 
 
 def write_form(folder: Path, form: Form, disk: bytes) -> Path:
-    """Put a bag, or a damaged copy, on disk; answers what to open."""
+    """Write a bag, or a damaged copy, to disk; returns the path to open."""
     name = "bag_0.mcap.zstd" if form.packed == "file" else "bag_0.mcap"
     (folder / name).write_bytes(disk)
     if not form.packed:
@@ -123,7 +120,7 @@ def _of_packed_file(form: Form, kind: str, changed: bytes, is_mcap: bool) -> Cop
         return _judged(form, kind, zstandard.compress(changed), changed)
     if changed == form.disk:
         return Copy(form, kind, changed, len(form.messages), (0, 0))
-    # What stands 1 kB before the first damaged byte unpacks, as far as whole blocks go.
+    # Data 1 kB before the first damaged byte unpacks, as far as whole blocks go.
     first = max(0, _common(form.disk, changed) - 1024)
     prefix = zstandard.ZstdDecompressor().decompressobj().decompress(form.disk[:first])
     if form.disk.startswith(changed):
@@ -141,12 +138,12 @@ def _judged(form: Form, kind: str, disk: bytes, mcap: bytes) -> Copy:
     last = len(form.mcap) - _common(form.mcap[::-1], mcap[::-1])
     until = next((unit.end for unit in form.units if max(first, last - 1) < unit.end), len(form.mcap))
     if not form.checked and (form.summed or kind == "a chunk missing"):
-        until = len(form.mcap)  # nothing tells more than that something is wrong, at the end
+        until = len(form.mcap)  # the checksum at the end shows only that something is wrong
     return Copy(form, kind, disk, 0 if first < len(MAGIC) else must, (min(hit.start, len(mcap)), until))
 
 
 def _before_cut(data: bytes, unit: Unit, cut: int) -> int:
-    """Messages of a chunk that are whole before a cut, as far as the bytes there unpack."""
+    """Complete messages of a chunk before a cut, as far as the bytes there unpack."""
     (length,) = struct.unpack_from("<I", data, unit.start + 37)
     begin = unit.start + 41 + length + 8
     if cut <= begin:
@@ -225,14 +222,14 @@ def _missing_chunk(form: Form, data: bytearray, random: Random) -> bytes:
 
 
 def _no_summary(form: Form, data: bytearray, random: Random) -> bytes:
-    """Cut where the data ends, or the summary taken out."""
+    """Cut at the end of the data, or remove the summary."""
     end = next(unit for unit in form.units if unit.opcode == Opcode.DATA_END).end
     footer = struct.pack("<BQQQI", Opcode.FOOTER, 20, 0, 0, 0) + MAGIC
     return bytes(data[:end]) + random.choice([b"", footer])
 
 
 def _wrong_checksum(form: Form, data: bytearray, random: Random) -> bytes:
-    """Of a chunk; where there is none, of the data or of the summary."""
+    """Overwrite the checksum of a chunk; without chunks, of the data or of the summary."""
     chunks = [unit for unit in form.units if unit.opcode == Opcode.CHUNK]
     end = next(unit for unit in form.units if unit.opcode == Opcode.DATA_END)
     places = [unit.start + 33 for unit in chunks] or [end.start + 9]
@@ -241,8 +238,8 @@ def _wrong_checksum(form: Form, data: bytearray, random: Random) -> bytes:
     return bytes(data)
 
 
-def _lying_length(form: Form, data: bytearray, random: Random) -> bytes:
-    """2 GB and other lengths in the head of a record, or in a chunk's own fields."""
+def _wrong_length(form: Form, data: bytearray, random: Random) -> bytes:
+    """Write a wrong length into the head of a record, or into a chunk's own fields."""
     unit = random.choice(_large(form))
     fields = (
         [1] if unit.opcode != Opcode.CHUNK else [1, 25, 37, 41 + struct.unpack_from("<I", data, unit.start + 37)[0]]
@@ -250,17 +247,17 @@ def _lying_length(form: Form, data: bytearray, random: Random) -> bytes:
     place = unit.start + random.choice(fields)
     wide = place != unit.start + 37
     lies = [0, 1, 1 << 16, len(data), 1 << 30, 1 << 31, (1 << 32) - 1, 1 << 40, 1 << 63, (1 << 64) - 1]
-    told = struct.unpack_from("<Q" if wide else "<I", data, place)[0]
-    lie = random.choice([*lies, told + 1, told - 1, 2 * told, told + random.randrange(len(data))])
+    stated = struct.unpack_from("<Q" if wide else "<I", data, place)[0]
+    lie = random.choice([*lies, stated + 1, stated - 1, 2 * stated, stated + random.randrange(len(data))])
     struct.pack_into("<Q" if wide else "<I", data, place, lie & ((1 << 64) - 1 if wide else (1 << 32) - 1))
     return bytes(data)
 
 
 def _bomb(form: Form, data: bytearray, random: Random) -> bytes:
-    """A chunk's records replaced by 64 MB of zeros, packed; its size stays as it was told."""
+    """Replace a chunk's records by 64 MB of zeros, compressed; its stated size stays."""
     unit = random.choice(_large(form))
     if unit.opcode != Opcode.CHUNK:
-        return _lying_length(form, data, random)
+        return _wrong_length(form, data, random)
     packed, name = random.choice([(_ZSTD_BOMB, b"zstd"), (_LZ4_BOMB, b"lz4")])
     content = bytes(data[unit.start + 9 : unit.start + 37]) + struct.pack("<I", len(name)) + name
     content += struct.pack("<Q", len(packed)) + packed
@@ -268,8 +265,8 @@ def _bomb(form: Form, data: bytearray, random: Random) -> bytes:
     return bytes(data)
 
 
-def _lying_summary(form: Form, data: bytearray, random: Random) -> bytes:
-    """The footer's or an index's offsets point elsewhere, with a checksum that is right."""
+def _wrong_summary(form: Form, data: bytearray, random: Random) -> bytes:
+    """Make an offset of the footer or of an index wrong, with a correct checksum."""
     start, _, crc = struct.unpack_from("<QQI", data, len(data) - 28)
     places = [unit.start + at for unit in form.units for at in _OFFSETS.get(unit.opcode, ()) if unit.start >= start > 0]
     place = random.choice([*places, len(data) - 28])
@@ -282,7 +279,7 @@ def _lying_summary(form: Form, data: bytearray, random: Random) -> bytes:
 
 
 def _replaced(form: Form, data: bytearray, random: Random) -> bytes:
-    """Another file altogether, or nothing."""
+    """Replace the file by another one, or by nothing."""
     table = b"velocity,contact\n1,2\n"
     return random.choice([b"", table, MAGIC, random.randbytes(5000), MAGIC + random.randbytes(5000), bytes(5000)])
 
@@ -299,9 +296,9 @@ KINDS: dict[str, Callable[[Form, bytearray, Random], bytes]] = {
     "a chunk missing": _missing_chunk,
     "no summary": _no_summary,
     "a checksum wrong": _wrong_checksum,
-    "a length that lies": _lying_length,
+    "a wrong length": _wrong_length,
     "unpacks to 64 MB": _bomb,
-    "a summary that lies": _lying_summary,
+    "a wrong summary": _wrong_summary,
     "another file, or empty": _replaced,
 }
 _OF_MCAP = set(KINDS) - {"cut at any byte", "a bit", "2 to 20 bits", "overwritten", "zeroed", "bytes lost"}
@@ -311,7 +308,7 @@ _LZ4_BOMB = lz4.frame.compress(bytes(1 << 26))
 
 
 def _large(form: Form) -> list[Unit]:
-    """The units that hold messages."""
+    """The units with messages."""
     return [unit for unit in form.units if unit.messages]
 
 
@@ -346,7 +343,7 @@ def _written(options: dict[str, Any], pack: bool) -> bytes:
             time = START + 4_000_000 * step
             data = random.randbytes(1200) if topic == "/camera" else _pose(time, random)
             writer.add_message(channel, time, zstandard.compress(data) if pack else data, time)
-    writer.add_metadata("more", {"what": "stands at the end"})
+    writer.add_metadata("more", {"what": "at the end"})
     writer.finish()
     return stream.getvalue()
 
@@ -368,10 +365,10 @@ def _units(mcap: bytes, packed: bool) -> list[Unit]:
         end = start + _HEAD.size + length
         inside = breakup_chunk(record) if opcode == Opcode.CHUNK else [record]
         topics |= {r.id: r.topic for r in inside if type(r).__name__ == "Channel"}
-        told = [r for r in inside if type(r).__name__ == "Message"]
+        messages = [r for r in inside if type(r).__name__ == "Message"]
         unpacked = zstandard.decompress if packed else bytes
         units.append(
-            Unit(opcode, start, end, tuple((topics[m.channel_id], m.log_time, unpacked(m.data)) for m in told))
+            Unit(opcode, start, end, tuple((topics[m.channel_id], m.log_time, unpacked(m.data)) for m in messages))
         )
         start = end
     return units

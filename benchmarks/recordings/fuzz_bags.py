@@ -1,21 +1,19 @@
-"""Damaged copies of bags are read: is all that stands before the damage used, the damage named, memory and time small?
+"""Read damaged copies of bags: is all data before the damage used, the damage named, memory and time small?
 
     python -m benchmarks.recordings.fuzz_bags [--copies 2000] [--seed 0]
 
-Each copy is read by a process of its own, forked off this one. A copy fails if
+A forked process reads each copy. A copy fails if
 
-- a message that stands before the damage is not given, or one is given that was never recorded, where the bag has
-  checksums;
-- messages are not given or differ, and no note names the file and a byte from the start of the damaged record or
-  chunk to its end (nothing can tell of a bit in a message where there are no checksums, nor of a chunk cleanly taken
-  out where there is no summary);
-- Python holds more than twice the bag's largest chunk and 128 kB (tracemalloc, while messages() is gone through), or
-  the process grows by more than 16 MB (ru_maxrss, which counts what C libraries take; its own noise is some MB);
-- reading, or `push_predictor info`'s reading after it, takes more than 2 s of processor time or 60 s
-  of the wall clock, dies, or ends with another error than
-  those that the command line prints as one line.
+- a message before the damage is missing, or, where the bag has checksums, a message was never recorded;
+- messages are missing or differ, and no note names the file and a byte from the start of the damaged record or chunk to
+  its end. Exceptions: without checksums a flipped bit in a message cannot be detected, and without a summary neither
+  can a chunk that was cleanly removed;
+- Python allocates more than twice the bag's largest chunk and 128 kB (tracemalloc, during messages()), or the process
+  grows by more than 16 MB (ru_maxrss, which includes C libraries and fluctuates by some MB);
+- reading, or the reading of `push_predictor info` after it, takes more than 2 s of processor time or 60 s of wall time,
+  crashes, or ends with an error other than those that the command line prints as one line.
 
-Prints a table by kind of damage and the copies that failed, each with the command that makes it again; exit status 1
+Prints a table by kind of damage and the failed copies, each with the command that reproduces it. The exit status is 1
 if there are any.
 """
 
@@ -50,7 +48,7 @@ HANGS = 60  # s of the wall clock
 
 @dataclass(frozen=True)
 class Reading:
-    """What a process saw. used: messages that are right, from the first on; strange: given but never recorded."""
+    """The result of reading a copy. used: correct messages from the first on; strange: never recorded."""
 
     used: int = 0
     given: int = 0
@@ -70,7 +68,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, help="the number of the one copy to read, its notes are printed")
     options = parser.parse_args()
-    __import__("yaml")  # which takes memory once
+    __import__("yaml")  # its memory counts once, before the readings
     whole, rows, failures = forms(), defaultdict(list), []
     chosen = range(options.copies) if options.only is None else [options.only]
     begin = time.perf_counter()
@@ -89,24 +87,24 @@ def main() -> int:
 
 
 def copy_number(number: int, seed: int, whole: list[Form]) -> Copy:
-    """The same copy whenever it is asked for; kinds and forms take turns."""
+    """Copy number `number`, the same every time; kinds and forms alternate."""
     kinds = list(KINDS)
     form = whole[number // len(kinds) % len(whole)]
     return damaged(form, kinds[number % len(kinds)], Random(f"{seed} {number}"))
 
 
 def faults(copy: Copy, reading: Reading) -> str:
-    """What is wrong with a reading, in words; empty if nothing is."""
+    """The failures of a reading, in words; empty if there are none."""
     whole = len(copy.form.messages)
     lost = reading.used < whole or reading.given > whole
     found = {
         f"died: {reading.died}": bool(reading.died),
         f"{reading.used} messages of {copy.must} before the damage": reading.used < copy.must,
-        f"{reading.strange} messages that nobody recorded": copy.form.checked and reading.strange > 0,
+        f"{reading.strange} messages that were never recorded": copy.form.checked and reading.strange > 0,
         f"not named: {reading.notes} {reading.refused}": lost
         and _can_be_seen(copy, reading)
         and not named(copy, reading),
-        f"Python held {reading.python} bytes": reading.python > 2 * copy.form.largest + SLACK,
+        f"Python allocated {reading.python} bytes": reading.python > 2 * copy.form.largest + SLACK,
         f"the process grew by {reading.growth} bytes": reading.growth > GROWTH,
         f"took {reading.seconds:.1f} s": reading.seconds > LONGEST,
     }
@@ -114,14 +112,14 @@ def faults(copy: Copy, reading: Reading) -> str:
 
 
 def _can_be_seen(copy: Copy, reading: Reading) -> bool:
-    """Nothing tells of a chunk that is taken out, or a bit flipped, where nobody wrote down what there was."""
+    """Whether the damage can be detected; not without checksums or summary, see the module's docstring."""
     if copy.form.name == "no summary" and copy.kind == "a chunk missing":
         return False
     return copy.form.summed or reading.given != len(copy.form.messages)
 
 
 def named(copy: Copy, reading: Reading) -> bool:
-    """Does a note, or the error where nothing is left, name the place?"""
+    """Whether a note, or the error if nothing is readable, names the place."""
     if reading.refused:
         return "bag_0.mcap" in reading.refused
     low, high = copy.near
@@ -137,15 +135,15 @@ def read_apart(copy: Copy) -> Reading:
         if (child := os.fork()) == 0:
             os.close(ours)
             signal.alarm(HANGS)
-            tempfile.tempdir = folder  # what the child unpacks there goes with it, however the child ends
+            tempfile.tempdir = folder  # removes what the child unpacks there, however the child ends
             with os.fdopen(theirs, "wb") as answer:
                 pickle.dump(_read(path, copy), answer)
             os._exit(0)
         os.close(theirs)
         with os.fdopen(ours, "rb") as answer:
-            told = answer.read()
+            result = answer.read()
         _, status = os.waitpid(child, 0)
-    return pickle.loads(told) if told and not status else Reading(died=f"wait status {status}")
+    return pickle.loads(result) if result and not status else Reading(died=f"wait status {status}")
 
 
 def _read(path: Path, copy: Copy) -> Reading:
@@ -173,9 +171,9 @@ def _messages(path: Path, copy: Copy) -> tuple[int, int, int, tuple[str, ...], s
     try:
         bag = open_bag(path)
         for message in bag.messages():
-            told = (message.topic, message.log_time, message.data)
-            used += used == given < len(expected) and told == expected[given]
-            strange += told not in known
+            read = (message.topic, message.log_time, message.data)
+            used += used == given < len(expected) and read == expected[given]
+            strange += read not in known
             given += 1
         notes = tuple(bag.notes)
     except (PushPredictorError, OSError) as error:
@@ -186,15 +184,15 @@ def _messages(path: Path, copy: Copy) -> tuple[int, int, int, tuple[str, ...], s
 
 
 def failed_by_kind(rows: dict[str, list[tuple[Copy, Reading]]]) -> dict[str, int]:
-    """The number of copies that failed."""
+    """The number of failed copies by kind of damage."""
     return {kind: sum(bool(faults(copy, reading)) for copy, reading in of_kind) for kind, of_kind in rows.items()}
 
 
 def table(rows: dict[str, list[tuple[Copy, Reading]]], failed: dict[str, int]) -> str:
-    """In Markdown, a line a kind of damage."""
+    """The result in Markdown, a line per kind of damage."""
     lines = [
         "| damage | copies | used / before the damage | used / in the whole bag | lost some | named with offset"
-        " | held, chunks | grew, MB | most time, s | failed |",
+        " | memory, chunks | growth, MB | longest time, s | failed |",
         "| --- " + "| ---: " * 9 + "|",
     ]
     for kind, of_kind in rows.items():

@@ -1,6 +1,6 @@
-"""How fast the rig simulator is: recorded time over the time it took, and the paper's full grid of repeated pushes.
+"""Speed of the rig simulator: simulated over computing time, and the paper's full grid of repeated pushes.
 
-Run: python -m benchmarks.recordings.simulation [--grid]
+python -m benchmarks.recordings.simulation [--grid]
 """
 
 from __future__ import annotations

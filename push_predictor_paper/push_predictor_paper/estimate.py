@@ -1,4 +1,4 @@
-"""A figure with its 95 % interval over seeds; what the library has for intervals by push is at hand here too."""
+"""Intervals over seeds, in addition to the library's intervals by push."""
 
 from __future__ import annotations
 

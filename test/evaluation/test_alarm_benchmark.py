@@ -26,5 +26,5 @@ def test_the_table_counts_recordings_with_their_intervals() -> None:
     )
     assert "| false alarms, recordings without a change | 1 | 10 | 0.02 to 0.40 |" in text
     assert "| false alarms, before the change | 1 | 4 | 0.05 to 0.70 |" in text
-    assert "| changes told before the end | 2 | 4 | 0.15 to 0.85 |" in text
+    assert "| changes detected before the end | 2 | 4 | 0.15 to 0.85 |" in text
     assert "10, 20; median 15" in text

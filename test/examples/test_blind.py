@@ -136,7 +136,7 @@ def test_table_marks_rates_without_recordings() -> None:
 def test_rejects_truth_folder_inside_data_folder(tmp_path: Path) -> None:
     apart(tmp_path / "data", tmp_path / "truth")
     for truth_folder in (tmp_path / "data", tmp_path / "data" / "truth", tmp_path):
-        with pytest.raises(SystemExit, match="apart"):
+        with pytest.raises(SystemExit, match="must not contain each other"):
             apart(tmp_path / "data", truth_folder)
 
 
@@ -224,5 +224,5 @@ def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     assert counted(record, "traces that failed") == (0, 3)
     assert counted(record, "motion model changed without cause") == (0, 2)
     assert counted(record, "harm: interval of the gain wholly above zero") == (0, 3)
-    assert counted(record, "wrench-only changes told as such") == (1, 1)
+    assert counted(record, "wrench-only changes reported as such") == (1, 1)
     assert "motion model changed without cause | 0 of 2" in table.read_text()

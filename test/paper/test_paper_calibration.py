@@ -289,7 +289,7 @@ def test_speeds_fall_into_three_groups_with_all_windows_in_one() -> None:
     groups = coverage_by_speed(SPEEDS, windows, windows)
     assert [(g.name, g.span) for g in groups] == [
         ("slow", "10 to 75 mm/s"),
-        ("middle", "100 to 200 mm/s"),
+        ("medium", "100 to 200 mm/s"),
         ("fast", "300 to 500 mm/s"),
     ]
     assert coverage_by_speed(SPEEDS[:3], windows, windows)[2].span == "50 mm/s"
@@ -302,25 +302,25 @@ def test_cells_that_miss_their_level_are_named() -> None:
     assert missed(groups, EXACT) == []
 
 
-def test_input_dependent_noise_mends_what_one_level_gets_wrong() -> None:
+def test_speed_claim_holds_if_only_one_noise_level_misses() -> None:
     groups = coverage_by_speed(SPEEDS, misjudged(uniform_pits(30), 0.4), uniform_pits(30))
     finding = speed_finding(groups)
-    assert finding.verdict == "holds" and "3 for the GP" in finding.sentence
+    assert finding.verdict == "holds" and "The GP misses 0.95 in 3 cells" in finding.sentence
 
 
-def test_it_mends_only_in_part_where_some_cells_still_miss() -> None:
+def test_speed_claim_holds_in_part_if_some_cells_of_the_vhgp_miss_too() -> None:
     worst = misjudged(misjudged(uniform_pits(30), 0.4), 0.15)
     assert speed_finding(coverage_by_speed(SPEEDS, worst, misjudged(uniform_pits(30), 0.4))).verdict == (
         "holds in part"
     )
 
 
-def test_it_mends_nothing_where_both_miss_as_often() -> None:
+def test_speed_claim_does_not_hold_if_both_miss_as_often() -> None:
     wrong = misjudged(uniform_pits(30), 0.4)
     assert speed_finding(coverage_by_speed(SPEEDS, wrong, wrong)).verdict == "does not hold"
 
 
-def test_one_level_does_for_all_speeds_where_no_cell_misses() -> None:
+def test_speed_claim_does_not_hold_if_no_cell_misses() -> None:
     right = uniform_pits(30)
     assert speed_finding(coverage_by_speed(SPEEDS, right, right)).verdict == "does not hold"
 

@@ -129,12 +129,12 @@ def test_the_rule_names_what_it_accepts_and_what_the_random_split_would() -> Non
 @pytest.mark.parametrize(
     ("gains", "told"),
     [
-        ({}, "would accept none either."),
+        ({}, "would accept none."),
         (on_both(NUGGET, 0.05), "would accept no other."),
         ({(500, "random", MATERN): 0.05}, f"would accept {MATERN} instead."),
     ],
 )
-def test_what_the_random_split_alone_accepts_is_told_in_plain_words(gains, told: str) -> None:
+def test_states_which_variants_the_random_split_alone_accepts(gains, told: str) -> None:
     assert told in rule_finding(made_up(gains)).sentence
 
 
@@ -239,7 +239,7 @@ def test_a_section_has_table_and_picture_and_a_note_for_a_set_too_small(tmp_path
     made = claim.section(study)
     assert len(made.findings) == 2 and len(made.tables) == 1
     assert [p.path for p in made.pictures] == [tmp_path / "variants_0.png"] and made.pictures[0].path.is_file()
-    assert any("measured: made up" in note and "100 windows" in note for note in made.notes)
+    assert any("measured: made up" in note and "100 training windows" in note for note in made.notes)
     assert all(len(row) == len(made.tables[0].head) for row in made.tables[0].rows)
     assert len(made.tables[0].rows) == 2 * len(CHOICES)
     json.dumps(made.data, allow_nan=False)

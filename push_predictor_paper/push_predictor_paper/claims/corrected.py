@@ -1,4 +1,4 @@
-"""Intervals for a claim that asks several of them at once."""
+"""Intervals for a claim that tests several of them at once."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from push_predictor_paper.estimate import Estimate
 
 
 def corrected(estimate: Estimate, count: int) -> Estimate:
-    """A 95 % interval as wide as one of `count` must be for all of them to hold together in 95 % (Bonferroni).
+    """Widen a 95 % interval so that `count` of them jointly cover with at least 95 % (Bonferroni).
 
-    Both ends move out from the figure as a normal distribution's would.
+    Both ends move away from the value as those of a normal distribution do.
     """
     wider = float(norm.ppf(1.0 - 0.025 / count) / norm.ppf(0.975))
     low, high = (estimate.value + wider * (end - estimate.value) for end in (estimate.low, estimate.high))

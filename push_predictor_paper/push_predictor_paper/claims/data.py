@@ -1,4 +1,4 @@
-"""The data: what there is to learn from, and the repeated pushes that tell the truth about single ones."""
+"""Claims about the data: pushes to learn from, and repeated pushes that show the distribution of an outcome."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from push_predictor_paper.study import Study
 
 ENOUGH_WINDOWS = 10  # at every speed, of every pair
 ENOUGH_SEEN = 0.9  # of the repetitions of a push
-WELL_KNOWN = 0.25  # of a deviation: half the interval of one that counts as given
+WELL_KNOWN = 0.25  # largest half-width of an interval, as a share of the standard deviation
 HALF = 0.5  # of the pushes
 PAPER_SETS = 16
 
 
 def section(study: Study) -> Section:
-    """Learning data by pair and speed; the grid of repetitions and how well it knows mean and deviation."""
+    """Training data by pair and speed; precision of mean and standard deviation from repetitions."""
     counts = speed_counts(study.plan, study.simulated)
     picture = draw(
         study.out / "data.png",
@@ -42,9 +42,9 @@ def section(study: Study) -> Section:
             Picture(
                 picture,
                 "Windows per speed, inputs of the reference set, repetitions seen over the grid",
-                "Left: share of the pushes at each speed that gave at least one window of 0.2 s, all simulated sets "
-                "together, 95 % Wilson intervals. Middle: contact and angle of every window of the reference set. "
-                "Right: share of the repetitions of each push of the grid that gave a first window.",
+                "Left: share of pushes at each speed with at least one window of 0.2 s, all simulated sets, 95 % "
+                "Wilson intervals. Middle: contact and angle of every window of the reference set. Right: share of "
+                "the repetitions of each push of the grid with a first window.",
             ),
         ),
         notes=(*NOTES, *(note for corpus in study.corpora for note in corpus.notes)),
@@ -62,19 +62,19 @@ def section(study: Study) -> Section:
 
 
 NOTES = (
-    "The paper learns from the MIT push data set, measured. The simulated sets have its shapes, masses, pusher and "
-    "speeds, but friction, pressure and their scatter are our guesses (docs/architecture.md): what follows from them "
-    "says nothing about the world.",
-    "A window needs 0.2 s of unbroken contact: 10 cm at 500 mm/s. At high speed the slider flies ahead of the tip, so "
-    "the windows there are those of pushes that kept in touch, a selection.",
+    "The paper learns from the MIT push data set, which is measured. The simulated sets have its shapes, masses, "
+    "pusher and speeds. Friction, pressure and their noise are assumptions of the simulator, so results on them say "
+    "nothing about real materials.",
+    "A window needs 0.2 s of unbroken contact: 10 cm at 500 mm/s. At high speed the slider often leaves the tip. "
+    "Windows at high speed are therefore a selection.",
     "The outermost contacts of the grid lie half a millimetre inside the corners.",
 )
 
 
 def speed_counts(plan: Plan, corpus: Corpus) -> list[SpeedCount]:
-    """For each speed of the plan: pushes commanded, pushes with a window, windows; over all pairs.
+    """Count, for each speed of the plan over all pairs: pushes commanded, pushes with a window, windows.
 
-    A push belongs to the commanded speed that is nearest, as a ratio, to that of its first window.
+    A push belongs to the commanded speed nearest, as a ratio, to the speed of its first window.
     """
     commanded = np.concatenate([learning_spec(plan, *pair).pushes.speed for pair in corpus.sets])
     pushes, windows = zip(*(_by_speed(plan, pushes.table) for pushes in corpus.sets.values()), strict=True)
@@ -91,7 +91,7 @@ def speed_counts(plan: Plan, corpus: Corpus) -> list[SpeedCount]:
 
 
 def _by_speed(plan: Plan, table: PushTable) -> tuple[IntArray, IntArray]:
-    """Pushes and windows (speeds,) of a set at each speed of the plan."""
+    """Number of pushes and windows (speeds,) of a set at each speed of the plan."""
     _, first, windows = np.unique(table.push_id, return_index=True, return_counts=True)
     away = np.abs(np.log(table.inputs[first, 0])[:, None] - np.log(plan.speeds))
     nearest, count = away.argmin(axis=1), len(plan.speeds)
@@ -102,17 +102,17 @@ def _learning_finding(study: Study, counts: list[SpeedCount]) -> Finding:
     pairs, speeds = len(study.simulated.sets), study.plan.speeds
     poor = [c for c in counts if c.fewest < ENOUGH_WINDOWS]
     share = binomtest(counts[-1].with_window, counts[-1].pushes).proportion_ci(method="wilson")
-    told = Estimate(counts[-1].with_window / counts[-1].pushes, share.low, share.high).text(".0%")
+    share_text = Estimate(counts[-1].with_window / counts[-1].pushes, share.low, share.high).text(".0%")
     lacking = f"at {', '.join(f'{c.speed * 1e3:.0f}' for c in poor)} mm/s some set has fewer" if poor else "all have"
     shapes, surfaces = (len({pair[k] for pair in study.simulated.sets}) for k in (0, 1))
     return Finding(
         "Pushes at 10 to 500 mm/s of four shapes on four surfaces to learn from",
         _learning_verdict(pairs, len(poor), len(counts)),
         f"{pairs} of the paper's {PAPER_SETS} sets, shapes: {shapes}, surfaces: {surfaces}, at {len(speeds)} speeds "
-        f"from {speeds[0] * 1e3:.0f} to {speeds[-1] * 1e3:.0f} mm/s, simulated. At every speed every set should have "
-        f"{ENOUGH_WINDOWS} windows: {lacking}. Of the pushes at {speeds[-1] * 1e3:.0f} mm/s {told} kept in touch for "
-        f"a window. Holds if all {PAPER_SETS} sets are there with windows enough at every speed, does not hold if at "
-        "half of the speeds or more a set has too few, else in part.",
+        f"from {speeds[0] * 1e3:.0f} to {speeds[-1] * 1e3:.0f} mm/s, simulated. {ENOUGH_WINDOWS} windows per set and "
+        f"speed are required: {lacking}. At {speeds[-1] * 1e3:.0f} mm/s {share_text} of the pushes stayed in contact "
+        f"for a window. Rule: holds if all {PAPER_SETS} sets have enough windows at every speed; does not hold if a "
+        "set has too few at half of the speeds or more; else in part.",
     )
 
 
@@ -130,20 +130,20 @@ def _grid_finding(grid: RepeatedGrid) -> Finding:
     share = Estimate(given / len(grid.cells), interval.low, interval.high)
     typical = f"±{np.median(widths):.0%}" if len(widths) else "unknown"
     return Finding(
-        "Repeated pushes give the mean and the deviation of each push",
+        "Repeated pushes determine the mean and the standard deviation of each push",
         _grid_verdict(share),
-        f"{len(grid.cells)} pushes on {grid.surface}, {grid.cells[0].commanded} times each: of {share.text('.0%')} of "
-        f"them the 95 % interval of the deviation, by drawing repetitions anew, lies within ±{WELL_KNOWN:.0%} of it in "
-        f"all three outputs, and {ENOUGH_SEEN:.0%} of the repetitions gave a first window (such a push is given; "
-        f"windows alone: {np.sum(seen) / len(grid.cells):.0%}). Median over pushes and outputs: {typical}; of a "
-        f"Gaussian: ±{1.96 / np.sqrt(2.0 * grid.cells[0].commanded):.0%}. Holds if the whole interval of that share "
-        f"lies above {ENOUGH_SEEN:.0%}, does not hold if it ends below {HALF:.0%}, in part if it begins above that, "
-        "else not decided.",
+        f"{share.text('.0%')} of {len(grid.cells)} pushes on {grid.surface} are determined, by "
+        f"{grid.cells[0].commanded} repetitions each. Half-width of the interval of a standard deviation, median: "
+        f"{typical}; of a Gaussian: ±{1.96 / np.sqrt(2.0 * grid.cells[0].commanded):.0%}. Rule: a push is determined "
+        f"if that half-width is at most {WELL_KNOWN:.0%} in all three outputs (repetitions resampled), and "
+        f"{ENOUGH_SEEN:.0%} of the repetitions gave a first window ({np.sum(seen) / len(grid.cells):.0%} of the "
+        f"pushes). Holds if the interval of that share lies above {ENOUGH_SEEN:.0%}; in part if it begins above "
+        f"{HALF:.0%}; does not hold if it ends below {HALF:.0%}; else not decided.",
     )
 
 
 def _half_width(cell: Repetitions) -> Array:
-    """Half the interval (3,) of each deviation, as a share of it."""
+    """Half-width (3,) of the interval of each standard deviation, as a share of it."""
     return np.asarray((cell.intervals[1][1] - cell.intervals[1][0]) / 2.0 / cell.sd)
 
 
@@ -159,7 +159,7 @@ def _corpus_table(corpus: Corpus) -> Table:
     rows = [
         (f"{shape}, {surface}", *map(str, _counts(corpus, (shape, surface)).values())) for shape, surface in corpus.sets
     ]
-    return Table(f"Learning data. {corpus.title}.", ("set", "pushes", "windows"), tuple(rows))
+    return Table(f"Training data. {corpus.title}.", ("set", "pushes", "windows"), tuple(rows))
 
 
 def _counts(corpus: Corpus, pair: tuple[str, str]) -> dict[str, int]:
@@ -172,5 +172,11 @@ def _grid_table(study: Study) -> Table:
     for surface, grid in study.grids.items():
         seen = np.array([len(cell.outcomes) for cell in grid.cells])
         rows.append((surface, str(len(grid.cells)), str(grid.cells[0].commanded), f"{seen.sum()}", str(len(grid.seen))))
-    head = ("surface", "pushes of the grid", "repetitions asked", "first windows seen", "pushes seen 10 times or more")
+    head = (
+        "surface",
+        "pushes of the grid",
+        "repetitions of each",
+        "first windows",
+        "pushes with 10 first windows or more",
+    )
     return Table(f"Validation data: simulated repetitions, {grid.shape}, 1 cm at 20 mm/s.", head, tuple(rows))

@@ -1,4 +1,4 @@
-"""What the claims are computed from: simulated recordings, repeated pushes, measured pushes.
+"""The data of the claims: simulated recordings, repeated pushes, measured pushes.
 
-Import anything.
+Any module may be imported.
 """

@@ -1,4 +1,4 @@
-"""The learning data: pushes of several sliders on several surfaces, simulated or measured, never mixed."""
+"""The training data: pushes of several sliders on several surfaces, simulated or measured, never mixed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from push_predictor_paper.work import Work
 
 Pair = tuple[str, str]  # shape, surface
 WINDOWS_PER_PUSH = 4.3
-LONGEST = 0.05  # m, of a push whose windows are shorter than that
+LONGEST = 0.05  # m, unless one window is longer
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class PushSet:
 
 @dataclass(frozen=True, eq=False)
 class Corpus:
-    """Push sets by pair of shape and surface, all of one origin; reference: the pair shown where one is shown.
+    """Push sets by pair of shape and surface, all of one origin. reference: the pair of the single-pair results.
 
-    title: what a reader of a table must know about where the pushes come from. notes: what was left out, and why.
+    title: the origin of the pushes, for a reader of a table. notes: what was skipped, and why.
     """
 
     origin: Literal["simulated", "measured"]
@@ -48,17 +48,17 @@ class Corpus:
 
     @property
     def name(self) -> str:
-        """Short, for a sentence: "simulated", "measured: mit_square/pushes_a"."""
+        """Short name for a sentence: "simulated", "measured: mit_square/pushes_a"."""
         return self.origin if self.origin == "simulated" else self.title.partition(",")[0]
 
 
 def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus:
-    """Make the training recordings of a plan and cut their windows. keep: a folder that receives the recordings."""
+    """Simulate the training recordings of a plan and find their windows. keep: folder for the recordings."""
     calls = [(plan, shape, surface, keep) for shape, surface in plan.pairs]
     sets = work.run("training recordings", learning_set, calls)
     for call in calls:
         if keep is not None and not (keep / learning_spec(*call[:3]).name).exists():
-            learning_set(*call)  # its windows were read from disk, but the recording has gone since
+            learning_set(*call)  # the windows came from the cache, but the recording is gone
     speeds = f"{plan.speeds[0] * 1e3:.0f} to {plan.speeds[-1] * 1e3:.0f} mm/s"
     pushes = f"{plan.pushes} pushes ({plan.reference_pushes} of {' on '.join(plan.pairs[0])})"
     title = f"simulated: {len(calls)} recordings of {pushes} at {len(plan.speeds)} speeds, {speeds}"
@@ -66,7 +66,7 @@ def simulated_corpus(plan: Plan, work: Work, keep: Path | None = None) -> Corpus
 
 
 def learning_set(plan: Plan, shape: str, surface: str, keep: Path | None = None) -> PushSet:
-    """Simulate one training recording, find its windows."""
+    """Simulate one training recording and find its windows."""
     spec = learning_spec(plan, shape, surface)
     recording = simulate(spec)
     if keep is not None:
@@ -77,7 +77,7 @@ def learning_set(plan: Plan, shape: str, surface: str, keep: Path | None = None)
 
 
 def learning_spec(plan: Plan, shape: str, surface: str) -> SimulationSpec:
-    """The pushes of one training recording: as many at every speed, contact and angle uniform."""
+    """The pushes of one training recording: equally many at every speed, contact and angle uniform."""
     place = pair_number(shape, surface)
     rng = np.random.default_rng([plan.seed, place])
     count = plan.pushes_of((shape, surface))
@@ -88,7 +88,7 @@ def learning_spec(plan: Plan, shape: str, surface: str) -> SimulationSpec:
 
 
 def on_the_table(spec: SimulationSpec, seed: int, draw: int) -> SimulationSpec:
-    """The spec on its surface's own table, the same in every recording; draw numbers the recordings of a seed."""
+    """The spec on the table of its surface, the same in every recording; draw: number of the recording."""
     table = SURFACES.index(str(spec.surface))
     return replace(spec, seed=1000 * seed + draw, surface_seed=100 * seed + table, slider_seed=seed)
 
@@ -99,12 +99,12 @@ def pair_number(shape: str, surface: str) -> int:
 
 
 def travel_for(speed: Array) -> Array:
-    """Travel (n,) m at speeds (n,) m/s: for about four windows, for one and the robot's braking at the least."""
+    """Travel (n,) m at speeds (n,) m/s: about four windows, at least one and the robot's braking."""
     several = np.minimum(WINDOWS_PER_PUSH * WINDOW * speed, LONGEST)
     braking = speed**2 / (2.0 * SimulationSpec.acceleration)
     return np.minimum(np.maximum(several, 1.15 * WINDOW * speed) + braking + 0.002, 0.2)
 
 
 def bare(table: PushTable) -> PushTable:
-    """The table without covariates: what is passed from process to process."""
+    """The table without covariates, which processes pass to each other."""
     return replace(table, covariates={})

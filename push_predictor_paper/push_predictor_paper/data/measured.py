@@ -1,4 +1,4 @@
-"""Pushes measured by others: what of a user's folder the paper's tables can use (docs/results/measured.md)."""
+"""Pushes measured by others: the data in a user's folder that the paper's tables can use (docs/results/measured.md)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from push_predictor_paper.data.corpus import Corpus, Pair, PushSet, bare
 from push_predictor_paper.plan import REFERENCE
 from push_predictor_paper.work import Work
 
-FEWEST_WINDOWS, FEWEST_PUSHES = 60, 10  # of a set that can show a learning curve
+FEWEST_WINDOWS, FEWEST_PUSHES = 60, 10  # smallest set with a learning curve
 SQUARE = "mit_square"
-SQUARE_SUFFIXES = (".npz", ".csv.gz", ".csv")  # of several forms of one table the first is read
+SQUARE_SUFFIXES = (".npz", ".csv.gz", ".csv")  # of several formats of one table the first is read
 BATCH = 100  # files
-NAMED = 3  # sets left out that a title names
+NAMED = 3  # skipped sets that a note names
 ACCEPTED = (
     f"{SQUARE}/pushes_*.npz (.csv.gz, .csv), or files of the MIT push data set in folders or zip archives "
     "(motion_surface=..._shape=..._a=0_v=....h5, .hdf5, .json); of each shape on each surface at least "
@@ -36,7 +36,7 @@ ACCEPTED = (
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """The windows in some files of one pair. rig: None if none of the files could be read. notes: what was done."""
+    """The windows in some files of one pair. rig: None if no file could be read. notes: of the import."""
 
     table: PushTable
     rig: Rig | None
@@ -46,14 +46,14 @@ class Imported:
 
 @dataclass(eq=False)
 class Found:
-    """What a folder holds: corpora, and in words what was left out of them."""
+    """The corpora in a folder, and descriptions of what was skipped."""
 
     corpora: list[Corpus] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
 
 
 def measured_corpora(folder: Path, work: Work, scratch: Path) -> tuple[Corpus, ...]:
-    """`mit_square`, and the straight pushes at constant speed of a copy of the MIT push data set, if a folder has them.
+    """Corpora of `mit_square` and of the straight pushes at constant speed of the MIT push data set, if present.
 
     Of the MIT set scratch receives every pair as a push table with its rig, and what the import repaired and dropped;
     files that have not changed are not imported again (work). Sets with too few pushes for a learning curve are left
@@ -62,11 +62,13 @@ def measured_corpora(folder: Path, work: Work, scratch: Path) -> tuple[Corpus, .
     found = Found()
     _add_square(found, folder)
     _add_mit(found, folder, work, scratch)
-    left_out = _left_out(found.left_out)
+    skipped = _skipped(found.skipped)
     if not found.corpora:
-        raise ImportSourceError(f"{folder}: holds nothing that the paper's tables can use{left_out}; give {ACCEPTED}")
+        raise ImportSourceError(
+            f"{folder}: holds nothing that the paper's tables can use{skipped}; accepted: {ACCEPTED}"
+        )
     *others, last = found.corpora
-    return (*others, replace(last, notes=(f"{last.title}{left_out}.",))) if left_out else tuple(found.corpora)
+    return (*others, replace(last, notes=(f"{last.title}{skipped}.",))) if skipped else tuple(found.corpora)
 
 
 def square_tables(folder: Path) -> list[Path]:
@@ -77,7 +79,7 @@ def square_tables(folder: Path) -> list[Path]:
 
 
 def import_pushes(places: tuple[MitPlace, ...]) -> Imported:
-    """The windows in files of one shape on one surface. A file that cannot be read is told in the notes."""
+    """The windows in files of one shape on one surface. The notes name files that cannot be read."""
     notes = Notes()
     rig: Rig | None = None
     tables = [windows_to_table([])]
@@ -91,7 +93,7 @@ def import_pushes(places: tuple[MitPlace, ...]) -> Imported:
             rig = require_rig(recording)
             tables.append(windows_to_table(find_windows(recording, rig)))
     except (ImportSourceError, OSError) as error:
-        notes.dropped.append(f"{error}: the files after it in {places[0].path} are not read")
+        notes.dropped.append(f"{error}: the files after it in {places[0].path} were skipped")
     return Imported(bare(concatenate(tables)), rig, len(tables) - 1, notes)
 
 
@@ -101,22 +103,22 @@ def _add_square(found: Found, folder: Path) -> None:
         pushes = PushSet(bare(read_mit_square(path, rig.outline)), rig)
         name = path.name.split(".")[0]
         if not _enough(pushes):
-            found.left_out.append(f"{SQUARE}/{name} {_too_few(pushes)}")
+            found.skipped.append(f"{SQUARE}/{name} {_too_few(pushes)}")
             continue
         title = (
             f"measured: {SQUARE}/{name}, one side of a square, {len(pushes.table)} overlapping windows of "
-            f"{len(pushes.table.pushes)} pushes (which windows are of one push is an estimate) at 20 mm/s"
+            f"{len(pushes.table.pushes)} pushes (the grouping into pushes is an estimate) at 20 mm/s"
         )
         pair = (rig.shape, rig.surface)
         found.corpora.append(Corpus("measured", title, {pair: pushes}, pair))
 
 
 def _add_mit(found: Found, folder: Path, work: Work, scratch: Path) -> None:
-    pushes = straight_pushes(paths_in(folder), found.left_out)
+    pushes = straight_pushes(paths_in(folder), found.skipped)
     sets = _imported_sets(pushes, work, scratch)
     good = {pair: s for pair, s in sets.items() if _enough(s)}
     for pair in sorted({push.pair for push in pushes} - good.keys()):
-        found.left_out.append(f"{pair[0]} on {pair[1]} {_too_few(sets.get(pair))}")
+        found.skipped.append(f"{pair[0]} on {pair[1]} {_too_few(sets.get(pair))}")
     if good:
         reference = REFERENCE if REFERENCE in good else max(good, key=lambda pair: len(good[pair].table))
         ordered = dict(sorted(good.items(), key=lambda item: item[0] != reference))
@@ -124,7 +126,7 @@ def _add_mit(found: Found, folder: Path, work: Work, scratch: Path) -> None:
 
 
 def _imported_sets(pushes: Sequence[MitPush], work: Work, scratch: Path) -> dict[Pair, PushSet]:
-    """Import by batches of files, over all cores; keep each pair's table and the import's report in scratch."""
+    """Import in batches of files, on all cores; write each pair's table and the import's report to scratch."""
     calls, pairs = [], []
     for pair in sorted({push.pair for push in pushes}):
         places = sorted((p.place for p in pushes if p.pair == pair), key=lambda place: place.name)
@@ -149,10 +151,12 @@ def _keep(scratch: Path, sets: dict[Pair, PushSet], parts: Sequence[Imported]) -
         write_table(scratch / f"{'_'.join(pair)}.csv", pushes.table)
         save_rig(pushes.rig, scratch / f"{'_'.join(pair)}.rig.yaml")
     notes = [part.notes for part in parts]
-    told = [tuple(dict.fromkeys(s for n in notes for s in getattr(n, f))) for f in ("dropped", "repaired", "assumed")]
+    messages = [
+        tuple(dict.fromkeys(s for n in notes for s in getattr(n, f))) for f in ("dropped", "repaired", "assumed")
+    ]
     written = tuple(scratch / f"{'_'.join(pair)}.csv" for pair in sets)
     pushes_found = sum(len(pushes.table.pushes) for pushes in sets.values())
-    report = ImportReport("mit", written, sum(part.recordings for part in parts), pushes_found, *told)
+    report = ImportReport("mit", written, sum(part.recordings for part in parts), pushes_found, *messages)
     (scratch / "import.txt").write_text(f"{report}\n", encoding="utf-8")
 
 
@@ -180,8 +184,8 @@ def _span(values: Sequence[float]) -> str:
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
-def _left_out(what: Sequence[str]) -> str:
+def _skipped(what: Sequence[str]) -> str:
     if not what:
         return ""
     more = f" and {len(what) - NAMED} more" if len(what) > NAMED else ""
-    return f"; left out: {', '.join(what[:NAMED])}{more}"
+    return f"; skipped: {', '.join(what[:NAMED])}{more}"

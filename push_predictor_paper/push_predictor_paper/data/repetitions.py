@@ -1,4 +1,4 @@
-"""The validation data: a grid of pushes of one side, every push many times over, and what they did.
+"""The validation data: a grid of pushes of one side, each repeated many times, and their outcomes.
 
 The paper: 1 cm at 20 mm/s, 11 contacts on a side, angles from -1.5 to 1.5 rad by 0.1, 100 repetitions of each.
 """
@@ -27,7 +27,7 @@ from push_predictor_paper.data.corpus import on_the_table, pair_number
 from push_predictor_paper.plan import GRID_SPEED, GRID_TRAVEL, Plan
 from push_predictor_paper.work import Work
 
-FEWEST = 10  # repetitions of a push for which a mean and a deviation are shown
+FEWEST = 10  # repetitions of a push with a mean and a standard deviation
 DRAWS = 400  # bootstrap
 STEP = 20_000_000  # ns between the points of a path
 PATH_POINTS = round(GRID_TRAVEL / GRID_SPEED * 1e9 / STEP) + 1
@@ -35,7 +35,7 @@ PATH_POINTS = round(GRID_TRAVEL / GRID_SPEED * 1e9 / STEP) + 1
 
 @dataclass(frozen=True, eq=False)
 class Repetitions:
-    """What one push of the grid did, time after time, in the first window (0.2 s from the first touch).
+    """The outcomes of one push of the grid in its first window (0.2 s from the first contact).
 
     fraction: contact along the side, angle in rad, as commanded, and how often. inputs, outcomes (r, 3): the windows;
     r is below `commanded` where the tip slid off too early. paths (r, t, 3): the slider's pose (m, m, rad) every
@@ -51,22 +51,22 @@ class Repetitions:
 
     @property
     def enough(self) -> bool:
-        """Whether mean and deviation mean something."""
+        """Whether there are enough repetitions for mean and standard deviation."""
         return len(self.outcomes) >= FEWEST
 
     @property
     def mean(self) -> Array:
-        """Mean outcome (3,), NaN where too few were seen."""
+        """Mean outcome (3,), NaN with too few repetitions."""
         return self.outcomes.mean(axis=0) if self.enough else np.full(3, np.nan)
 
     @property
     def sd(self) -> Array:
-        """Standard deviation (3,) of the outcome, NaN where too few were seen."""
+        """Standard deviation (3,) of the outcome, NaN with too few repetitions."""
         return self.outcomes.std(axis=0, ddof=1) if self.enough else np.full(3, np.nan)
 
     @cached_property
     def intervals(self) -> tuple[Array, Array]:
-        """95 % intervals (2, 3) of mean and sd, by drawing repetitions anew; every repetition is a push of its own."""
+        """95 % intervals (2, 3) of mean and sd, from resampling repetitions; each is a separate push."""
         if not self.enough:
             return np.full((2, 3), np.nan), np.full((2, 3), np.nan)
         rows = np.random.default_rng(0).integers(0, len(self.outcomes), (DRAWS, len(self.outcomes)))
@@ -87,7 +87,7 @@ class RepeatedGrid:
 
     @property
     def mean(self) -> Array:
-        """Mean outcomes (A, C, 3) over angle and contact, NaN where too few repetitions were seen."""
+        """Mean outcomes (A, C, 3) over angle and contact, NaN with too few repetitions."""
         return self._map([cell.mean for cell in self.cells])
 
     @property
@@ -97,12 +97,12 @@ class RepeatedGrid:
 
     @property
     def seen(self) -> list[Repetitions]:
-        """The pushes of which enough repetitions were seen."""
+        """The pushes with enough repetitions."""
         return [cell for cell in self.cells if cell.enough]
 
     @property
     def typical_inputs(self) -> Array:
-        """Mean measured inputs (len(seen), 3) of these: where a model is asked."""
+        """Mean measured inputs (len(seen), 3) of these pushes, at which models are evaluated."""
         return np.array([cell.inputs.mean(axis=0) for cell in self.seen])
 
     def _map(self, values: list[Array]) -> Array:
@@ -113,7 +113,7 @@ class RepeatedGrid:
 def repeated_grid(
     plan: Plan, work: Work, surface: str, repetitions: int | None = None, keep: Path | None = None
 ) -> RepeatedGrid:
-    """Record every push of the grid on the square, over and over: one recording a push of the grid.
+    """Simulate the grid of repeated pushes of the square, one recording per push of the grid.
 
     repetitions: other than the plan's. keep: a folder that receives the recordings.
     """
@@ -123,7 +123,7 @@ def repeated_grid(
     cells = work.run(f"repeated pushes on {surface}", repeat_push, calls)
     for call in calls:
         if keep is not None and not (keep / grid_spec(*call[:-1]).name).exists():
-            repeat_push(*call)  # its windows were read from disk, but the recording has gone since
+            repeat_push(*call)  # the windows came from the cache, but the recording is gone
     rig = simulated_rig(grid_spec(plan, shape, surface, 0, 0.5, 0.0, 1))
     return RepeatedGrid(shape, surface, rig, plan.grid_fractions, plan.grid_angles, tuple(cells))
 
@@ -131,7 +131,7 @@ def repeated_grid(
 def repeat_push(
     plan: Plan, shape: str, surface: str, number: int, fraction: float, angle: float, again: int, keep: Path | None
 ) -> Repetitions:
-    """Record one push of the grid `again` times and cut the windows."""
+    """Simulate one push of the grid `again` times and find the windows."""
     spec = grid_spec(plan, shape, surface, number, fraction, angle, again)
     recording = simulate(spec)
     if keep is not None:

@@ -1,4 +1,4 @@
-"""The quasi-static study: pushes of equal travel at growing speed, and models that are not told how fast they were.
+"""The quasi-static claim: pushes of equal travel at growing speed, and models without the speed as an input.
 
 The paper, "Dependence with velocity": under the quasi-static assumption a push made twice as fast has the same outcome
 in half the time, so pushes of all speeds, scaled in time to 10 mm/s, may be learnt together.
@@ -29,7 +29,7 @@ from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import on_the_table, pair_number
 from push_predictor_paper.plan import Plan
 
-SCALED_SPEED = 0.01  # m/s, to which all is scaled
+SCALED_SPEED = 0.01  # m/s, to which all pushes are scaled
 TURN = (0.05, 0.08)  # m/s, the top speed at which the paper's models are best
 TRAVEL = 0.005  # m of the tip in a window, at every speed
 WINDOWS = 4  # of a push
@@ -40,7 +40,7 @@ MARGIN = 0.0005  # m
 
 @dataclass(frozen=True)
 class Bracket:
-    """A model of pushes at the slowest `speeds` speeds, `rows` windows of each; told: whether it knows the speed."""
+    """A model of pushes at the slowest `speeds` speeds, `rows` windows of each; told: with the speed as an input."""
 
     kind: str
     speeds: int
@@ -51,7 +51,7 @@ class Bracket:
 
 @dataclass(frozen=True, eq=False)
 class EqualTravel:
-    """What n pushes did while the tip went TRAVEL from the first touch.
+    """Outcomes of n pushes after the tip has travelled TRAVEL from the first contact.
 
     outcomes (n, 3), m, m, rad in the push frame; touching (n,), share of that way on which the tip touched.
     """
@@ -61,7 +61,7 @@ class EqualTravel:
 
 
 def speed_windows(plan: Plan, shape: str, surface: str, number: int) -> PushTable:
-    """Windows of the pushes at the number-th speed of the plan, none of them made at another speed.
+    """Windows of pushes at the number-th speed of the plan; each push is at one speed only.
 
     push_id: number of the speed, number of the push. The tip keeps its contact in 90 % of a window, or it is lost.
     """
@@ -73,7 +73,7 @@ def speed_windows(plan: Plan, shape: str, surface: str, number: int) -> PushTabl
 
 
 def equal_travel(plan: Plan, shape: str, surface: str, number: int) -> EqualTravel:
-    """The same pushes at the number-th speed: same contacts, angles, places and draws at every speed, kept or not."""
+    """The same pushes at the number-th speed, with the same contacts, angles, places and noise at every speed."""
     spec = _spec(plan, (shape, surface), plan.speeds[number], np.random.default_rng([plan.seed, 8]), 1, 99)
     start = start_poses(spec)
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, start, spec.acceleration)
@@ -82,7 +82,7 @@ def equal_travel(plan: Plan, shape: str, surface: str, number: int) -> EqualTrav
 
 
 def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> PushScores:
-    """Train on the bracket's windows outside a fold of pushes, judge on the fold's windows at all speeds.
+    """Train on the bracket's windows outside a fold of pushes, test on the fold's windows at all speeds.
 
     Push k at any speed is of fold k % 5: pushes of that number met the same places of the table.
     """
@@ -95,7 +95,7 @@ def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> P
 
 
 def training_rows(table: PushTable, bracket: Bracket) -> IntArray:
-    """The bracket's rows of one speed's windows, drawn by rng(fold): fewer rows lie within more."""
+    """The bracket's rows of one speed's windows, drawn by rng(fold); fewer rows are a subset of more."""
     others = np.flatnonzero(fold_of(table) != bracket.fold)
     return np.random.default_rng([bracket.fold, len(table)]).permutation(others)[: bracket.rows]
 
@@ -112,7 +112,7 @@ def number_of(push_id: str) -> tuple[int, int]:
 
 
 def _scaled(table: PushTable, told: bool) -> PushTable:
-    """Windows as if made at SCALED_SPEED; told: the speed stays among the inputs."""
+    """Windows scaled in time to SCALED_SPEED; told: the speed remains an input."""
     inputs = table.inputs.copy()
     if not told:
         inputs[:, 0] = SCALED_SPEED
@@ -123,7 +123,7 @@ def _spec(
     plan: Plan, pair: tuple[str, str], speed: float, rng: np.random.Generator, windows: int, draw: int
 ) -> SimulationSpec:
     n = plan.speed_pushes
-    travel = windows * TRAVEL + max(plan.speeds) ** 2 / (2.0 * PROMPT) + MARGIN  # the same way, so the same draws
+    travel = windows * TRAVEL + max(plan.speeds) ** 2 / (2.0 * PROMPT) + MARGIN  # the same travel, so the same noise
     pushes = PushPlan(rng.random(n), rng.uniform(-1.5, 1.5, n), np.full(n, speed), np.full(n, travel))
     number = 200_000 + 1000 * pair_number(*pair) + draw
     return on_the_table(SimulationSpec(*pair, pushes, acceleration=PROMPT), plan.seed, number)

@@ -1,4 +1,4 @@
-"""Learning curves: figures over the training size, one line a group, with bands."""
+"""Learning curves: scores by training size, one line per group, with bands."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ PALETTE = (*COLOURS, "#CC79A7")  # a fourth of Okabe and Ito
 DASHES = ("-", "--", "-.", (0, (1, 1.2)))
 MARKERS = ("o", "s", "^", "D")
 KIND_LOOKS = {"analytical": ("#4d4d4d", "--", ""), "gp": ("#D55E00", "-", "s"), "vhgp": ("#0072B2", "-", "o")}
-MOST_NLPD = 11.0  # nats shown above the lowest point: what tiny training sets give is beyond reason
+MOST_NLPD = 11.0  # nats shown above the lowest point; tiny training sets give far more
 MOST_NMSE = 6.0
 TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 
 @dataclass(frozen=True)
 class Line:
-    """A curve; thin ones are single members of a thick one's group, without interval and name.
+    """A curve; thin ones are single members of a group, without interval and name.
 
     banded: its intervals are a band, else whiskers.
     """
@@ -116,7 +116,7 @@ def _paint_line(ax: Axes, line: Line) -> None:
 
 
 def _paint_crossing(ax: Axes, colour: str, where: Crossing, height: float) -> None:
-    """The interval of a crossing, drawn at the foot of the axes."""
+    """Draw the interval of a crossing at the foot of the axes."""
     ends = np.clip([where.low, where.high], where.first, where.last)
     foot = ax.get_xaxis_transform()
     ax.plot(ends, [height] * 2, color=colour, linewidth=3.0, alpha=0.6, transform=foot, solid_capstyle="butt")
@@ -125,7 +125,7 @@ def _paint_crossing(ax: Axes, colour: str, where: Crossing, height: float) -> No
 
 
 def _limit(ax: Axes, panels: Sequence[Panel]) -> None:
-    """Keep about to what the values span, so that a wide band or a wild curve does not flatten the rest."""
+    """Limit the axis to about the range of the values, so that a wide band does not flatten the rest."""
     lines = [line for panel in panels for line in panel.lines]
     values = np.array([p.value for line in lines for p in line.points if np.isfinite(p.value)])
     if not values.size or panels[0].zero:
@@ -141,10 +141,10 @@ def _limit(ax: Axes, panels: Sequence[Panel]) -> None:
 
 
 def _mark_cut(ax: Axes, lines: Sequence[Line]) -> None:
-    """A triangle at the top where a thick line leaves the axes."""
+    """Draw a triangle at the top where a thick line leaves the axes."""
     top, foot = ax.get_ylim()[1], ax.get_xaxis_transform()
     for k, line in enumerate(line for line in lines if not line.thin):
         cut = [n for n, point in zip(line.sizes, line.points, strict=True) if point.value > top]
         if cut:
-            place = [1.0 - 0.045 * k] * len(cut)  # one beneath the other where several leave at one size
+            place = [1.0 - 0.045 * k] * len(cut)  # stacked, if several leave at one size
             ax.plot(cut, place, "^", color=line.look[0], markersize=5.0, transform=foot, clip_on=False)

@@ -1,4 +1,4 @@
-"""What there is to learn from and to judge by."""
+"""Picture of the training data and of the repetitions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SpeedCount:
 
 
 def paint_data(figure: Figure, counts: list[SpeedCount], pushes: PushSet, repeated: RepeatedGrid) -> None:
-    """Three panels: windows by speed, inputs of a set, repetitions seen."""
+    """Draw three panels: pushes with a window by speed, inputs of a set, repetitions found."""
     speeds, inputs, seen = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     _paint_speeds(speeds, counts)
     outline = pushes.rig.outline
@@ -52,7 +52,7 @@ def _paint_speeds(ax: Axes, counts: list[SpeedCount]) -> None:
     ax.set_ylim(0, 103)
     ax.set_xlabel("commanded speed (mm/s)")
     ax.set_ylabel("pushes with a window (%)")
-    ax.set_title("contact kept for 0.2 s")
+    ax.set_title("contact for at least 0.2 s")
 
 
 def _paint_seen(figure: Figure, ax: Axes, repeated: RepeatedGrid) -> None:
@@ -66,7 +66,7 @@ def _paint_seen(figure: Figure, ax: Axes, repeated: RepeatedGrid) -> None:
 
 
 def _frame_of_pushes(ax: Axes) -> None:
-    """Axes that hold every push of a side."""
+    """Axes that contain every push of a side."""
     ax.set(xlim=(0.0, 1.0), ylim=(-90.0, 90.0), yticks=range(-90, 91, 30))
     ax.set(xlabel="contact, fraction of the side", ylabel="push angle (deg)")
 

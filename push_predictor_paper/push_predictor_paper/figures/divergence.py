@@ -1,4 +1,4 @@
-"""KL of models from repeated pushes: where on the side, and over all pushes."""
+"""KL of models from repeated pushes: map over the side, and distribution over all pushes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KIND_COLOURS = {"analytical": NEARBY, "gp": COLOURS[1], "vhgp": COLOURS[0]}
 
 
 def paint_divergence(figure: Figure, repeated: RepeatedGrid, kl: Mapping[str, Array], floor: float) -> None:
-    """Maps of the KL (p,) of GP and VHGP of the pushes seen, on one log scale; the distribution of all of them."""
+    """Draw maps of the KL (p,) of GP and VHGP on one log scale, and the distribution for all models."""
     from matplotlib.colors import LogNorm
 
     first, second, curve = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
@@ -59,6 +59,6 @@ def _paint_curves(ax: Axes, kl: Mapping[str, Array], floor: float) -> None:
     ax.set_xscale("log")
     ax.set_ylim(0.0, 100.0)
     ax.set_xlabel("KL (nats, three outputs)")
-    ax.set_ylabel("pushes with no more (%)")
+    ax.set_ylabel("cumulative share of pushes (%)")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.2, ncols=2)
     ax.xaxis.set_major_formatter("{x:g}")

@@ -1,4 +1,4 @@
-"""Histograms of single pushes with the densities that a model gives them."""
+"""Histograms of single pushes with a model's densities."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS = 200
-BESIDE = 0.75  # of the range of the outcomes, to both sides of it
-WIDTHS = 2.0  # of the predicted sd to both sides of its mean, so that a model that is too wide is seen to be
+MARGIN = 0.75  # of the range of the outcomes, to both sides of it
+WIDTHS = 2.0  # predicted sds shown to both sides of the mean, so that a model that is too wide is visible
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Histogram:
 
 
 def paint_histograms(figure: Figure, rows: Sequence[Sequence[Histogram]]) -> None:
-    """A panel each; histograms of unit area."""
+    """Draw a panel for each histogram, with unit area."""
     panels = figure.subplots(len(rows), len(rows[0]), squeeze=False)
     for axes, histograms in zip(panels, rows, strict=True):
         for ax, histogram in zip(axes, histograms, strict=True):
@@ -43,9 +43,9 @@ def paint_histograms(figure: Figure, rows: Sequence[Sequence[Histogram]]) -> Non
 
 
 def shown_values(outcomes: Array) -> Array:
-    """Where densities are drawn: POINTS values (v, 3) over the outcomes (r, 3) and beside them."""
+    """POINTS values (v, 3) at which densities are drawn, over the outcomes (r, 3) and a margin."""
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
-    return np.linspace(low - BESIDE * (high - low), high + BESIDE * (high - low), POINTS)
+    return np.linspace(low - MARGIN * (high - low), high + MARGIN * (high - low), POINTS)
 
 
 def moments(values: Array, logs: Array) -> tuple[float, float]:

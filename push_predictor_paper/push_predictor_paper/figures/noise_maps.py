@@ -1,4 +1,4 @@
-"""Maps of the noise on several surfaces, and how large the noise is against the motion."""
+"""Maps of the noise on several surfaces, and the size of the noise relative to the motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MARKS = ("o", "s", "^")
 
 
 def paint_noise_maps(figure: Figure, grids: Mapping[str, RepeatedGrid]) -> None:
-    """A row per surface, a column per output: sd over that surface's median, one scale per column."""
+    """Draw a row per surface, a column per output: sd over the surface's median, one scale per column."""
     axes = figure.subplots(len(grids) + 1, 3, height_ratios=[1.0] * len(grids) + [0.07])
     maps = [g.sd / np.nanmedian(g.sd, axis=(0, 1)) for g in grids.values()]
     for k, column in enumerate(axes.T):
@@ -34,13 +34,15 @@ def paint_noise_maps(figure: Figure, grids: Mapping[str, RepeatedGrid]) -> None:
             ax.tick_params(labelbottom=ax is column[-2], labelleft=k == 0)
         column[0].set_title(f"sd of {SYMBOLS[k]}")
         column[-2].set_xlabel("contact, fraction of the side")
-        figure.colorbar(image, cax=column[-1], label="of its surface's median", extend="max", orientation="horizontal")
+        figure.colorbar(
+            image, cax=column[-1], label="sd / median of the surface", extend="max", orientation="horizontal"
+        )
     for row, surface in zip(axes[:-1], grids, strict=True):
         row[0].set_ylabel(f"{surface}\npush angle (deg)")
 
 
 def paint_scatter(figure: Figure, reference: RepeatedGrid, others: Mapping[str, RepeatedGrid]) -> None:
-    """A panel per output: sd of every push over its surface's median, on the reference surface and on the others."""
+    """Draw a panel per output: sd of every push over its surface's median, reference surface against others."""
     axes = figure.subplots(1, 3)
     for k, ax in enumerate(axes):
         grid(ax)
@@ -51,19 +53,19 @@ def paint_scatter(figure: Figure, reference: RepeatedGrid, others: Mapping[str, 
         every = np.concatenate([one, *(_standardised(other, k) for other in others.values())])
         ends = (np.nanmin(every) / 1.1, np.nanmax(every) * 1.1)
         ax.plot(ends, ends, color="0.2", linewidth=0.9)
-        ax.set(xscale="log", yscale="log", title=f"sd of {SYMBOLS[k]}", xlabel=f"{reference.surface} (of its median)")
+        ax.set(xscale="log", yscale="log", title=f"sd of {SYMBOLS[k]}", xlabel=f"{reference.surface} (sd / median)")
         ticks = [tick for tick in TICKS if ends[0] <= tick <= ends[1]]
         ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         ax.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
         ax.minorticks_off()
         ax.set(xlim=ends, ylim=ends, aspect="equal")
-    axes[0].set_ylabel("another surface (of its median)")
+    axes[0].set_ylabel("other surface (sd / median)")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), markerscale=2.0)
 
 
 def paint_ratios(figure: Figure, ratios: Sequence[tuple[str, Array]]) -> None:
-    """Share of the pushes whose sd is at most so much of their mean; the paper's 10 to 40 % shaded."""
+    """Draw the cumulative share of pushes by sd over |mean|, with the paper's 10 to 40 % shaded."""
     ax = figure.subplots()
     grid(ax)
     ax.axvspan(100 * LOW, 100 * HIGH, color="0.9", label="the paper's 10 to 40 %")
@@ -75,7 +77,7 @@ def paint_ratios(figure: Figure, ratios: Sequence[tuple[str, Array]]) -> None:
     ax.set(xscale="log", xlim=(1.0, 1000.0), ylim=(0.0, 100.0), xlabel="sd of the outcome, % of its |mean|")
     ax.set_xticks([1, 3, 10, 30, 100, 300, 1000], ["1", "3", "10", "30", "100", "300", "1000"])
     ax.minorticks_off()
-    ax.set_ylabel("pushes with so much or less (%)")
+    ax.set_ylabel("cumulative share of pushes (%)")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
 
 

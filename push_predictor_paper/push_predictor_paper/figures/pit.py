@@ -1,4 +1,4 @@
-"""Histograms of the probability integral transform, and coverage of slow, middle and fast pushes."""
+"""Histograms of the probability integral transform, and coverage of slow, medium and fast pushes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TALLEST = 6.0  # times flat
 
 
 def paint_pits(figure: Figure, rows: Mapping[str, tuple[Histogram, Histogram]]) -> None:
-    """A row per model, a column per output: bars by push with their intervals, outlined the random split."""
+    """Draw a row per model, a column per output: bars by push with intervals; the random split as an outline."""
     axes = figure.subplots(len(rows), 3, squeeze=False, sharex=True, sharey="row")
     for row, (model, (by_push, random)) in zip(axes, rows.items(), strict=True):
         top = min(TALLEST, 1.08 * BARS * float(np.nanmax([by_push.shares, by_push.high, random.shares])))
@@ -33,17 +33,17 @@ def paint_pits(figure: Figure, rows: Mapping[str, tuple[Histogram, Histogram]]) 
     for k, ax in enumerate(axes[0]):
         ax.set_title(f"PIT of {SYMBOLS[k]}")
     for ax in axes[-1]:
-        ax.set_xlabel("predicted probability of less")
+        ax.set_xlabel("predicted cumulative probability")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
 
 
 def paint_by_speed(figure: Figure, groups: Sequence[str], models: Mapping[str, Sequence[Sequence[Estimate]]]) -> None:
-    """A panel per output: coverage of the 95 % intervals by group of speeds; models hold [group][output]."""
+    """Draw a panel per output: coverage of the 95 % intervals by group of speeds; models: [group][output]."""
     axes = figure.subplots(1, 3, sharey=True)
     for k, ax in enumerate(axes):
         grid(ax)
-        ax.axhline(0.95, color="0.2", linewidth=1.0, linestyle="--", label="what was promised" if k == 0 else None)
+        ax.axhline(0.95, color="0.2", linewidth=1.0, linestyle="--", label="nominal" if k == 0 else None)
         for m, (model, estimates) in enumerate(models.items()):
             shares = [estimate[k] for estimate in estimates]
             place = np.arange(float(len(groups))) + 0.18 * (m - 0.5 * (len(models) - 1))
@@ -52,7 +52,7 @@ def paint_by_speed(figure: Figure, groups: Sequence[str], models: Mapping[str, S
             title=SYMBOLS[k], xticks=np.arange(len(groups)), xticklabels=list(groups), xlim=(-0.5, len(groups) - 0.5)
         )
         ax.set_xlabel("speed of the push (mm/s)")
-    axes[0].set_ylabel("share of outcomes in the 95 % interval")
+    axes[0].set_ylabel("coverage of the 95 % interval")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
@@ -68,7 +68,7 @@ def _paint_bars(ax: Axes, by_push: Histogram, random: Histogram, k: int) -> None
 
 
 def _tell_where_cut(ax: Axes, heights: Array, top: float) -> None:
-    """A number on every bar that leaves the picture."""
+    """Write the height on every bar that leaves the picture."""
     for b in np.flatnonzero(heights > top):
         side = {"ha": "left", "x": EDGES[b] + 0.11} if b < BARS / 2 else {"ha": "right", "x": EDGES[b] - 0.01}
         ax.text(y=0.97 * top, s=f"{heights[b]:.1f}", va="top", fontsize=8, **side)

@@ -1,4 +1,4 @@
-"""The quasi-static study: error against top speed, map of errors by speed, departure from the slowest pushes."""
+"""The quasi-static claim: error by top speed, map of errors by speed, departure from the slowest pushes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DODGE = 0.012  # of a decade, so that intervals do not cover each other
+DODGE = 0.012  # of a decade, so that intervals do not overlap
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A series of models, a point for each top speed."""
+    """A series of models with a point for each top speed."""
 
     label: str
     points: tuple[Estimate, ...]
@@ -39,7 +39,7 @@ def paint_quasi_static(
     departures: Sequence[Estimate],
     levels: Mapping[str, float],
 ) -> None:
-    """Four panels. tops, speeds in m/s; single (judged at, trained up to); levels: what departures are held against."""
+    """Draw four panels. tops, speeds: m/s; single: NMSE (tested at, trained up to); levels: lines for comparison."""
     (first, second), (third, fourth) = figure.subplots(2, 2)
     second.sharey(first)
     for ax, curves, title in (
@@ -63,7 +63,7 @@ def _paint_curves(ax: Axes, tops: Sequence[float], curves: Sequence[Curve]) -> N
         ax.vlines(at, low, high, color=colour, linewidth=0.9, alpha=0.7)
         ax.plot(at, value, color=colour, linestyle=dashes, marker=marker, markersize=4, label=curve.label)
     known = [(p.value, p.high) for curve in curves for p in curve.points if np.isfinite(p.high)]
-    if known:  # what an interval from few pushes spans must not flatten the rest
+    if known:  # wide intervals from few pushes must not flatten the rest
         top_value, top_end = np.max(known, axis=0)
         ax.set_ylim(0.0, min(1.7 * top_value, 1.05 * top_end))
 
@@ -83,7 +83,7 @@ def _paint_map(figure: Figure, ax: Axes, tops: Sequence[float], single: Array) -
     ticks, names = np.arange(len(tops)) + 0.5, [f"{1e3 * top:.0f}" for top in tops]
     ax.set_xticks(ticks, names)
     ax.set_yticks(ticks, names)
-    ax.set(title="VHGP, not told", xlabel="trained up to (mm/s)", ylabel="judged at (mm/s)")
+    ax.set(title="VHGP without the speed", xlabel="trained up to (mm/s)", ylabel="tested at (mm/s)")
     bar = figure.colorbar(image, ax=ax, label="NMSE, sum of 3")
     marks = [mark for mark in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0) if low <= mark <= high]
     bar.set_ticks(marks, labels=[f"{mark:g}" for mark in marks])

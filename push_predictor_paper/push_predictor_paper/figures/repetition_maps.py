@@ -1,4 +1,4 @@
-"""The paper's two big figures: maps over contact and angle, model above, repetitions below, pushes between."""
+"""The paper's two large figures: maps over contact and angle, model above, repetitions below, examples between."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def paint_map_figure(
     model: tuple[Array, Array, Array],
     examples: Sequence[tuple[Repetitions, Array]],
 ) -> None:
-    """A column per output. model: contacts (C,), angles (A,), map (A, C, 3) of the quantity, 'mean' or 'sd'.
+    """Draw a column per output. model: contacts (C,), angles (A,), map (A, C, 3) of the quantity, 'mean' or 'sd'.
 
     examples: for each column a push of the grid, and the model's mean (3,) for it.
     """
@@ -56,11 +56,13 @@ def paint_map_figure(
     for ax in axes[2]:
         ax.set_xlabel("contact, fraction of the side")
     marked = figure.axes[0].plot([], [], "o", markersize=9, markerfacecolor="none", markeredgecolor=OBSERVED)
-    figure.legend(marked, [f"{NAMED[quantity]} by repetitions: the push drawn between"], loc="outside upper center")
+    figure.legend(
+        marked, [f"{NAMED[quantity]} by repetitions: the push shown in the middle row"], loc="outside upper center"
+    )
 
 
 def paint_differences(figure: Figure, grid: RepeatedGrid, parts: Sequence[tuple[str, Array, Array]]) -> None:
-    """Two rows per quantity: its name, the model's less the repetitions' (A, C, 3) in SI, and in standard errors."""
+    """Draw two rows per quantity: model minus repetitions (A, C, 3) in SI, and in standard errors."""
     axes = figure.subplots(2 * len(parts), 3, sharex=True, sharey=True, squeeze=False)
     errors = ColourScale(-LIMIT, LIMIT, "PuOr", "both")
     for (plain, standard), (name, differences, of_error) in zip(axes.reshape(-1, 2, 3), parts, strict=True):
@@ -69,7 +71,7 @@ def paint_differences(figure: Figure, grid: RepeatedGrid, parts: Sequence[tuple[
             most = float(np.nanpercentile(np.abs(values), 98.0))
             image = paint_map(ax, grid.fractions, grid.angles, values, ColourScale(-most, most, "PuOr", "both"))
             figure.colorbar(image, ax=ax, extend="both", label=UNIT_NAMES[k]).ax.locator_params(nbins=5)
-            ax.set_title(f"{name} of {SYMBOLS[k]}: VHGP less repetitions")
+            ax.set_title(f"{name} of {SYMBOLS[k]}: VHGP minus repetitions")
         for k, ax in enumerate(standard):
             image = paint_map(ax, grid.fractions, grid.angles, of_error[..., k], errors)
             figure.colorbar(image, ax=ax, extend="both", label="standard errors")
@@ -81,7 +83,7 @@ def paint_differences(figure: Figure, grid: RepeatedGrid, parts: Sequence[tuple[
 
 
 def paint_map(ax: Axes, fractions: Array, angles: Array, values: Array, scale: ColourScale) -> ScalarMappable:
-    """One map (A, C) in shown units; pushes of which nothing is known are grey and hatched."""
+    """Draw one map (A, C) in shown units; unknown pushes are grey and hatched."""
     from matplotlib.colors import Normalize
 
     ax.set_facecolor(EMPTY)
@@ -96,14 +98,14 @@ def paint_map(ax: Axes, fractions: Array, angles: Array, values: Array, scale: C
 
 
 def _mark(ax: Axes, fraction: float, angle: float) -> None:
-    """Where the push lies that is drawn between the maps."""
+    """Mark the push that is drawn between the maps."""
     place = (fraction, np.degrees(angle))
     ax.plot(*place, "o", markersize=9, markerfacecolor="none", markeredgecolor="white", markeredgewidth=3.0)
     ax.plot(*place, "o", markersize=9, markerfacecolor="none", markeredgecolor=OBSERVED, markeredgewidth=1.5)
 
 
 def _paint_repetitions(ax: Axes, rig: Rig, push: Repetitions, predicted: Array) -> None:
-    """The slider where each repetition left it, where the model's mean puts it, and the pusher."""
+    """Draw the final slider of each repetition, of their mean and of the model's mean, and the pusher."""
     inputs, mean = push.inputs.mean(axis=0), push.mean
     enlarged = magnification(rig.outline, mean[None])
     pose, outline = start_pose(rig.outline, inputs), np.vstack([rig.outline.vertices, rig.outline.vertices[:1]])
@@ -111,8 +113,8 @@ def _paint_repetitions(ax: Axes, rig: Rig, push: Repetitions, predicted: Array) 
         moved = to_world(outline, pose + enlarged * outcome).T * 1e3
         ax.plot(*moved, color=OBSERVED, linewidth=0.5, alpha=0.3)
     paint_slider(ax, rig, inputs, predicted, mean, enlarged)
-    told_push = f"{told((push.fraction, push.angle))}, motion {enlarged:g}×"
-    ax.set_title(told_push, fontsize=8.0)
+    caption = f"{told((push.fraction, push.angle))}, motion {enlarged:g}×"
+    ax.set_title(caption, fontsize=8.0)
 
 
 def _edges(centres: Array) -> Array:

@@ -1,4 +1,4 @@
-"""NMSE and bias of the models over the pusher's speed."""
+"""NMSE and bias of the models by the pusher's speed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SpeedCurve:
 
 
 def paint_speed_error(figure: Figure, curves: Sequence[SpeedCurve], names: Mapping[str, str]) -> None:
-    """Three panels over speed: NMSE, bias along, bias across."""
+    """Draw three panels by speed: NMSE, bias along, bias across."""
     axes = figure.subplots(1, 3)
     for curve in curves:
         for ax, points, unit in zip(axes, (curve.nmse, curve.along, curve.across), (1.0, 100.0, 100.0), strict=True):
@@ -58,7 +58,7 @@ def _paint(ax: Axes, curve: SpeedCurve, points: Sequence[Estimate], unit: float,
 
 
 def speed_axis(ax: Axes, speeds: Sequence[float]) -> None:
-    """A logarithmic horizontal axis for speeds in m/s, shown in mm/s, that ends a little beyond them."""
+    """Make the horizontal axis logarithmic, in mm/s, for speeds in m/s."""
     low, high = 1e3 * min(speeds) / 1.15, 1e3 * max(speeds) * 1.15
     ticks = [tick for tick in (10, 20, 50, 100, 200, 500) if low <= tick <= high]
     ax.set_xscale("log")

@@ -1,4 +1,4 @@
-"""Repeated pushes: where the slider's centre went, time after time."""
+"""Trajectories of the slider's centre over repetitions of a push."""
 
 from __future__ import annotations
 
@@ -33,13 +33,15 @@ class Trajectories:
 
 
 def paint_trajectories(figure: Figure, rig: Rig, shown: Sequence[Trajectories]) -> None:
-    """A column a push: the slider and where it goes, the trajectories enlarged, their ends enlarged once more."""
+    """Draw a column per push: slider and trajectories, trajectories enlarged, final poses enlarged further."""
     rows = figure.subplots(3, len(shown), squeeze=False, height_ratios=(1.2, 1.0, 1.1))
-    for (scene, ways, ends), push in zip(rows.T, shown, strict=True):
+    for (scene, paths, ends), push in zip(rows.T, shown, strict=True):
         _paint_scene(scene, rig, push)
-        _paint_ways(ways, push)
+        _paint_paths(paths, push)
         _paint_ends(ends, push)
-    for row, name in zip(rows, ("across (mm)", "centre's way across (mm)", "end, across (mm)"), strict=True):
+    for row, name in zip(
+        rows, ("across (mm)", "path of the centre, across (mm)", "final pose, across (mm)"), strict=True
+    ):
         _alike(row)
         row[0].set_ylabel(name)
     marks = {n: mark for ax in rows[:, 0] for mark, n in zip(*ax.get_legend_handles_labels(), strict=True)}
@@ -47,7 +49,7 @@ def paint_trajectories(figure: Figure, rig: Rig, shown: Sequence[Trajectories]) 
 
 
 def _alike(axes: Sequence[Axes]) -> None:
-    """One scale for panels of one row, each about its own middle."""
+    """Give the panels of a row one scale, each about its own centre."""
     limits = np.array([[ax.get_xlim(), ax.get_ylim()] for ax in axes])
     half = 0.5 * np.ptp(limits, axis=2).max(axis=0)
     for ax, middle in zip(axes, limits.mean(axis=2), strict=True):
@@ -57,7 +59,7 @@ def _alike(axes: Sequence[Axes]) -> None:
 
 def _paint_scene(ax: Axes, rig: Rig, push: Trajectories) -> None:
     pose = start_pose(rig.outline, push.inputs)
-    contact, way = push.inputs[1:2], 1e3 * GRID_TRAVEL
+    contact, travel = push.inputs[1:2], 1e3 * GRID_TRAVEL
     corners = rig.outline.point(np.linspace(0.0, 1.0, 400, endpoint=False))
     ax.fill(*(to_world(corners, pose).T * 1e3), facecolor="0.95", edgecolor=START, label="slider at the start")
     tip = -1e3 * rig.pusher_radius * rotate(rig.outline.inward_normal(contact)[0], pose[2])
@@ -65,19 +67,19 @@ def _paint_scene(ax: Axes, rig: Rig, push: Trajectories) -> None:
     disc = tip + 1e3 * rig.pusher_radius * np.column_stack([np.cos(turn), np.sin(turn)])
     ax.fill(*disc.T, facecolor="0.8", edgecolor=TIP, linewidth=0.8)
     arrow = {"arrowstyle": "-|>", "color": TIP, "shrinkA": 0.0, "shrinkB": 0.0}
-    ax.annotate("", (way + tip[0], tip[1]), (tip[0], tip[1]), arrowprops=arrow)
-    ax.plot([], [], color=TIP, label="tip and its way")
+    ax.annotate("", (travel + tip[0], tip[1]), (tip[0], tip[1]), arrowprops=arrow)
+    ax.plot([], [], color=TIP, label="tip and its path")
     for path in push.paths:
         ax.plot(*(1e3 * (pose[:2] + path[:, :2]).T), color=GREEN, linewidth=0.5, alpha=0.5)
     ax.set(title=push.title, xlabel="along the push (mm)")
 
 
-def _paint_ways(ax: Axes, push: Trajectories) -> None:
+def _paint_paths(ax: Axes, push: Trajectories) -> None:
     grid(ax)
     for number, path in enumerate(push.paths):
         name = "slider's centre" if number == 0 else None
         ax.plot(*(1e3 * path[:, :2].T), color=GREEN, linewidth=0.5, alpha=0.5, label=name)
-    ax.set_xlabel("centre's way along (mm)")
+    ax.set_xlabel("path of the centre, along (mm)")
 
 
 def _paint_ends(ax: Axes, push: Trajectories) -> None:
@@ -85,4 +87,4 @@ def _paint_ends(ax: Axes, push: Trajectories) -> None:
     ends = 1e3 * (push.paths[:, -1, :2] - push.paths[:, -1, :2].mean(axis=0))
     ax.plot(*ends.T, ".", color="0.15", markersize=3.0, label="final pose")
     ax.plot(*ellipse(np.cov(ends.T)).T, color=RED, linewidth=1.3, label="95 % ellipse of final poses")
-    ax.set_xlabel("end, along, from the mean (mm)")
+    ax.set_xlabel("final pose, along, from the mean (mm)")

@@ -1,4 +1,4 @@
-"""What other kernels gain over the plain squared exponential, by size and split."""
+"""Scores of other kernels minus those of the plain squared exponential, by size and split."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Curves = Mapping[str, Sequence[Estimate]]  # by variant, one a size
 
 
 def paint_variants(figure: Figure, sizes: Sequence[int], panels: Mapping[tuple[str, str], Curves]) -> None:
-    """A panel per (quantity, split), two rows of two, given row by row; below zero is better than the plain kernel."""
+    """Draw a panel per (quantity, split), two rows of two; below zero is better than the plain kernel."""
     axes = figure.subplots(2, 2, sharex=True, sharey="row")
     for number, (ax, ((quantity, split), curves)) in enumerate(zip(axes.flat, panels.items(), strict=True)):
         grid(ax)
-        ax.axhline(0.0, color="0.2", linewidth=1.0, linestyle="--", label="as the plain kernel")
+        ax.axhline(0.0, color="0.2", linewidth=1.0, linestyle="--", label="plain kernel")
         for k, (variant, estimates) in enumerate(curves.items()):
             _paint_curve(ax, k, variant, estimates)
         if number % 2 == 0:
-            ax.set_ylabel(f"{quantity},\nless the plain kernel's")
+            ax.set_ylabel(f"{quantity},\nminus the plain kernel's")
         if number < 2:
             ax.set_title(split)
         else:

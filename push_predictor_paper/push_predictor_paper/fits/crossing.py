@@ -1,4 +1,4 @@
-"""The training size from which on a learning curve stays below another."""
+"""The training size from which a learning curve stays below another."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True)
 class Crossing:
-    """Training size with 95 % interval: `first` says "there or before", inf says "not up to the last size"."""
+    """Training size with 95 % interval; `first` means "there or before", inf means "beyond the last size"."""
 
     value: float
     low: float
@@ -24,11 +24,11 @@ class Crossing:
 
     def text(self) -> str:
         """For a sentence: 95 (70 to 130)."""
-        return f"{self._told(self.value)} ({self._told(self.low)} to {self._told(self.high)})"
+        return f"{self._size_text(self.value)} ({self._size_text(self.low)} to {self._size_text(self.high)})"
 
     def cell(self) -> str:
         """For a table: the interval beneath."""
-        return f"{self._told(self.value)}\n{self._told(self.low)} to {self._told(self.high)}"
+        return f"{self._size_text(self.value)}\n{self._size_text(self.low)} to {self._size_text(self.high)}"
 
     def json(self) -> dict[str, float | None]:
         """null: not up to the last size tried."""
@@ -36,7 +36,7 @@ class Crossing:
         told: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
         return {**told, "first_tried": self.first, "last_tried": self.last}
 
-    def _told(self, size: float) -> str:
+    def _size_text(self, size: float) -> str:
         if not np.isfinite(size):
             return f"beyond {self.last}"
         return f"at most {self.first}" if size <= self.first else f"{size:.3g}"
@@ -45,7 +45,7 @@ class Crossing:
 def crossing(
     sizes: Sequence[int], learnt: Sequence[Sequence[PushScores]], baseline: Sequence[Sequence[PushScores]]
 ) -> Crossing:
-    """From where on the learnt model's total NMSE stays below the baseline's, up to the last size.
+    """Training size from which the learned model's total NMSE stays below the baseline's.
 
     By size, by seed (fold) the scores of both on the same windows. The interval draws pushes anew, the same for both
     and for all sizes and seeds, and the seeds as well.
@@ -53,17 +53,19 @@ def crossing(
     gaps = [_gap(first, second) for first, second in zip(learnt, baseline, strict=True)]
     value = below_zero_from(sizes, np.array([[gap[0] for gap in gaps]]))[0]
     draws = below_zero_from(sizes, np.column_stack([gap[1:] for gap in gaps]))
-    low, high = np.quantile(draws, [0.025, 0.975], method="inverted_cdf")  # no mean of a size and infinity
+    low, high = np.quantile(draws, [0.025, 0.975], method="inverted_cdf")  # never the mean of a size and infinity
     return Crossing(float(value), float(low), float(high), sizes[0], sizes[-1])
 
 
 def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
-    """Sizes (d,) from which on gaps (d, sizes) stay below 0, by straight lines in log n.
+    """Sizes (d,) from which gaps (d, sizes) stay below 0, linear in log n.
 
     The first size where all gaps lie below 0, inf where the last does not.
     """
     place = np.log(np.asarray(sizes, dtype=np.float64))
-    after = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1).sum(axis=1)  # how many sizes, from the last back
+    after = np.logical_and.accumulate((gaps < 0.0)[:, ::-1], axis=1).sum(
+        axis=1
+    )  # number of sizes, counted from the last
     k = np.minimum(len(sizes) - after, len(sizes) - 1)
     rows, before = np.arange(len(gaps)), np.maximum(k - 1, 0)
     ahead, at = gaps[rows, before], gaps[rows, k]
@@ -73,13 +75,13 @@ def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
 
 
 def _gap(learnt: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
-    """Total NMSE of the first less that of the second, (1 + draws,): of all, then of each draw."""
+    """Total NMSE of the first minus that of the second, (1 + draws,): the value, then each draw."""
     weights = _weights(learnt)
     return _total(learnt, weights) - _total(baseline, weights)
 
 
 def _weights(scores: Sequence[PushScores]) -> list[Array]:
-    """By seed how often each of its pushes counts, (1 + draws, p)."""
+    """By seed, the weight of each of its pushes, (1 + draws, p)."""
     names = np.unique(np.concatenate([push_scores.push_id for push_scores in scores]))
     pushes = push_bootstrap(names)
     count = len(scores)

@@ -1,4 +1,4 @@
-"""Scores over the training size, cell by cell: which fits a set can hold, and their figures over seeds and pairs."""
+"""Scores by training size, cell by cell, and their means over seeds and pairs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def nlpd_of(score: Score) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """By cell the scores of all its seeds (folds, by push); a cell that a set is too small for is not there."""
+    """Scores of all seeds (folds, by push) by cell; cells that a set is too small for are missing."""
 
     cells: Mapping[Cell, tuple[Score, ...]]
 
@@ -41,7 +41,7 @@ class Curves:
         return tuple(sorted(set.intersection(*held))) if held else ()
 
     def values(self, pairs: Sequence[Pair], kind: str, split: SplitName, n: int, measure: Measure) -> list[float]:
-        """Seed by seed the mean over pairs of a measure."""
+        """Mean of a measure over pairs, seed by seed."""
         rows = [[measure(score) for score in self.cells[pair, kind, split, n]] for pair in pairs]
         return [float(np.mean(seed)) for seed in zip(*rows, strict=False)]  # the reference pair has more seeds
 
@@ -50,12 +50,12 @@ class Curves:
         return over_seeds(self.values(pairs, kind, split, n, measure))
 
     def push_scores(self, pair: Pair, kind: str, split: SplitName, n: int) -> PushScores:
-        """All seeds' pushes as one."""
+        """Scores of the pushes of all seeds together."""
         return pooled([score.push_scores for score in self.cells[pair, kind, split, n]])
 
 
 def curves(study: Study, corpus: Corpus, pairs: Sequence[Pair], kinds: Sequence[str]) -> Curves:
-    """Train and judge these kinds on these pairs at all sizes, on both splits."""
+    """Train and score these kinds on these pairs at all sizes, on both splits."""
     fits = [
         (pair, Fit(kind, n, split, seed))
         for pair in pairs
@@ -73,12 +73,12 @@ def sizes_tried(plan: Plan, reference: bool) -> tuple[int, ...]:
 
 
 def seeds_tried(plan: Plan, split: SplitName, reference: bool) -> int:
-    """Folds by push as many as the plan's seeds; draws of the random split fewer off the reference pair."""
+    """Number of folds or draws; the random split has fewer draws except on the reference pair."""
     return plan.seeds if reference or split == "push" else min(plan.seeds, OTHER_SEEDS)
 
 
 def gathered(fits: Sequence[tuple[Pair, Fit]], found: Mapping[tuple[Pair, Fit], Score]) -> Curves:
-    """The scores by cell; a cell of which a seed is missing is left out, lest small folds drop out of a curve's end."""
+    """Scores by cell; incomplete cells are dropped, so that a curve's end does not lose its small folds."""
     cells: dict[Cell, list[Score | None]] = {}
     for pair, fit in fits:
         cells.setdefault((pair, fit.kind, fit.split, fit.n), []).append(found.get((pair, fit)))

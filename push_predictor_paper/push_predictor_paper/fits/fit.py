@@ -1,4 +1,4 @@
-"""One model trained on a draw of rows and judged on rows of the same set that it has not seen."""
+"""One model trained on a draw of rows and scored on held-out rows of the same set."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from push_predictor_paper.work import Work
 SplitName = Literal["push", "random", "none"]
 SPLITS: tuple[SplitName, ...] = ("push", "random")
 SPLIT_WORDS = {
-    "push": "whole pushes left out (folds of 5)",
+    "push": "whole pushes held out (5 folds)",
     "random": "random split of windows",
-    "none": "trained on this set, judged on another",
+    "none": "trained on this set, scored on another",
 }
 KINDS = ("analytical", "gp", "vhgp")
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Which model: kind, training windows, split, and the seed of the draw (the fold that is left out, by push).
+    """Which model: kind, training windows, split, and the seed of the draw (the held-out fold, by push).
 
-    Split `none` holds nothing back: for models that are judged on other pushes, those of the grid.
+    Split `none` holds nothing back: for models that are scored on other pushes, those of the grid.
     """
 
     kind: str
@@ -44,7 +44,7 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """How a fit did on the windows that its split holds back; cpu: s to train it."""
+    """Scores of a fit on the held-out windows of its split; cpu: s to train it."""
 
     fit: Fit
     push_scores: PushScores
@@ -52,35 +52,35 @@ class Score:
 
     @property
     def nmse(self) -> Array:
-        """By output (3,)."""
+        """NMSE by output (3,)."""
         return np.asarray(self.push_scores.totals().nmse[0])
 
     @property
     def nlpd(self) -> Array:
-        """By output (3,), moment-matched Gaussian, SI units."""
+        """NLPD by output (3,), moment-matched Gaussian, SI units."""
         return np.asarray(self.push_scores.totals().nlpd[0])
 
     @property
     def exact_nlpd(self) -> Array:
-        """By output (3,), exact predictive density, SI units."""
+        """NLPD by output (3,), exact predictive density, SI units."""
         return np.asarray(self.push_scores.totals().exact_nlpd[0])
 
 
 def scores(work: Work, corpus: Corpus, fits: Sequence[tuple[Pair, Fit]]) -> dict[tuple[Pair, Fit], Score]:
-    """Train and judge all of these; a size beyond what a set holds for training is left out of the answer."""
+    """Train and score all fits; those with more windows than the set has are skipped."""
     possible = [(pair, fit) for pair, fit in fits if fit.n <= trainable(corpus.sets[pair], fit)]
     calls = [(corpus.sets[pair], fit) for pair, fit in possible]
     return dict(zip(possible, work.run("models", score, calls), strict=True))
 
 
 def score(pushes: PushSet, fit: Fit) -> Score:
-    """Train and judge one."""
+    """Train and score one fit."""
     comparison, cpu = compared(pushes, fit)
     return Score(fit, push_scores(comparison), cpu)
 
 
 def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:
-    """The predictions for all windows that the split holds back, and the CPU time of the training, s."""
+    """Predictions for the held-out windows, and the CPU time of the training, s."""
     start = time.process_time()
     model = trained(pushes, fit)
     cpu = time.process_time() - start
@@ -89,7 +89,7 @@ def compared(pushes: PushSet, fit: Fit) -> tuple[Comparison, float]:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a model says of m pushes: mean, sd of an outcome, sd of the process noise alone (m, 3); in_domain (m,)."""
+    """Predictions of m pushes: mean, sd of an outcome, sd of the process noise alone (m, 3); in_domain (m,)."""
 
     mean: Array
     sd: Array
@@ -98,7 +98,7 @@ class Answer:
 
 
 def ask(pushes: PushSet, fit: Fit, inputs: Array) -> Answer:
-    """Train a model and ask it for the pushes inputs (m, 3), each a window long."""
+    """Train a model and predict pushes with inputs (m, 3), each one window long."""
     prediction = trained(pushes, fit).predict_rows(inputs, np.full(len(inputs), WINDOW))
     sd, process_sd = (
         np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
@@ -108,7 +108,7 @@ def ask(pushes: PushSet, fit: Fit, inputs: Array) -> Answer:
 
 
 def trained(pushes: PushSet, fit: Fit) -> PushModel:
-    """The model itself."""
+    """Train the model of a fit."""
     rows = np.sort(split_of(pushes, fit).first(fit.n))
     table = pushes.table.take(rows)
     return train_model(
@@ -117,7 +117,7 @@ def trained(pushes: PushSet, fit: Fit) -> PushModel:
 
 
 def split_of(pushes: PushSet, fit: Fit) -> Split:
-    """Which rows the fit learns from and which it is judged on."""
+    """Training and test rows of the fit."""
     if fit.split == "none":
         rows = np.random.default_rng(fit.seed).permutation(len(pushes.table))
         return Split(rows, np.zeros(0, dtype=np.int64))
@@ -126,5 +126,5 @@ def split_of(pushes: PushSet, fit: Fit) -> Split:
 
 
 def trainable(pushes: PushSet, fit: Fit) -> int:
-    """How many rows its split leaves for training."""
+    """The number of training rows that the split of the fit allows."""
     return len(split_of(pushes, fit).training)

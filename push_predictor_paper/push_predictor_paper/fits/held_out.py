@@ -1,4 +1,4 @@
-"""Windows that a split by push holds back, with what every kind of model says of them, and how fast they were."""
+"""Held-out windows of a split by push, with the predictions of every kind of model and their speeds."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from push_predictor_paper.estimate import Estimate, of_draws
 from push_predictor_paper.fits.fit import KINDS, Fit, compared, split_of, trainable
 from push_predictor_paper.study import Study
 
-SAME_SPEED = 1.12  # pushes whose speeds lie closer than this ratio belong together
+SAME_SPEED = 1.12  # speeds within this ratio form a group
 WIDEST, EQUAL_GROUPS = 1.6, 6  # ratio of speeds within a group; groups of speeds without gaps
 FEWEST_PUSHES = 8  # at a speed, for an interval
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """n windows of the folds that were left out, of models with `size` training windows.
+    """n held-out windows of all folds, of models with `size` training windows.
 
     push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
     pusher; observed (n, 3); predicted by kind (n, 3); away (n, 3): observed less the training mean.
@@ -57,11 +57,11 @@ class HeldOut:
 
     @property
     def pushes(self) -> int:
-        """How many pushes the windows are of."""
+        """The number of pushes."""
         return len(np.unique(self.push_id))
 
     def levelled(self) -> HeldOut:
-        """Outcomes and predictions about the mean outcome of their speed, in units of its sd: every speed counts."""
+        """Outcomes and predictions standardised within each speed, so that every speed counts."""
         held = np.unique(self.group)
         rows = [self.observed[self.group == k] for k in held]
         at = np.searchsorted(held, self.group)
@@ -72,7 +72,7 @@ class HeldOut:
 
     @property
     def speed_range(self) -> str:
-        """How fast these pushes were, for a reader."""
+        """The speeds of these pushes, for a reader."""
         low, high = 1e3 * self.speed.min(), 1e3 * self.speed.max()
         return f"{1e3 * np.median(self.speed):.0f} mm/s" if high < SAME_SPEED * low else f"{low:.0f} to {high:.0f} mm/s"
 
@@ -144,7 +144,7 @@ def joined(group: IntArray, push_id: np.ndarray) -> IntArray:
 
 
 def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
-    """NMSE of a kind, or of the second kind less the first, over the spread of these very windows; interval by push."""
+    """NMSE of a kind, or of the second kind minus the first, over the variance of these windows; interval by push."""
 
     def figure(sums: list[Array]) -> Array:
         first, second, total, squares, count = sums
@@ -158,7 +158,7 @@ def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
 
 
 def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
-    """Mean of observed less predicted as a share of the pusher's travel; interval by push.
+    """Mean of observed minus predicted as a share of the pusher's travel; interval by push.
 
     Across (output 1) it counts towards the side to which the analytical model says the slider goes, lest left and
     right cancel.
@@ -170,7 +170,7 @@ def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
 
 
 def by_drawn_pushes(push_id: np.ndarray, columns: Sequence[Array], figure: Callable[[list[Array]], Array]) -> Estimate:
-    """A figure of sums over windows of columns (n, k), by drawing pushes anew; no interval for too few pushes."""
+    """A figure of sums over windows of columns (n, k), with interval by push; none for too few pushes."""
     pushes, push = np.unique(push_id, return_inverse=True)
     sums = [np.zeros((len(pushes), column.shape[1])) for column in columns]
     for total, column in zip(sums, columns, strict=True):

@@ -1,4 +1,4 @@
-"""Learnt models asked for whole maps over contact and angle, at the speed of the repeated pushes."""
+"""Learned models evaluated on whole maps over contact and angle, at the speed of the repeated pushes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from push_predictor_paper.work import Work
 
 FRACTIONS = np.linspace(0.0055, 0.9945, 41)
 ANGLES = np.linspace(-1.5, 1.5, 61)
-SAME_SPEED = 0.1  # a set that has windows within this part of the grid's speed can be asked for its maps
+SAME_SPEED = 0.1  # relative; a set needs windows this close to the grid's speed
 Question = tuple[Corpus, Pair, Fit, RepeatedGrid | None]
 
 
@@ -33,14 +33,14 @@ class ModelMap:
 
 
 def reference_maps(study: Study, kind: str, seeds: int = 1) -> list[ModelMap]:
-    """Of models of the reference pair, one for each draw of the plan's largest common training size."""
+    """Maps of models of the reference pair, one for each draw of training windows."""
     corpus, grid = study.simulated, study.reference_grid
     fits = [_all_rows(study, corpus, corpus.reference, kind, seed) for seed in range(seeds)]
     return model_maps(study.work, [(corpus, corpus.reference, fit, grid) for fit in fits])
 
 
 def surface_maps(study: Study, kind: str) -> dict[str, ModelMap]:
-    """Of one model for every surface that has a grid and a set of the grid's shape to learn from."""
+    """Maps of one model for every surface with a grid and a training set of the grid's shape."""
     corpus = study.simulated
     pairs = {s: ((grid.shape, s), grid) for s, grid in study.grids.items() if (grid.shape, s) in corpus.sets}
     asked: list[Question] = [(corpus, p, _all_rows(study, corpus, p, kind, 0), grid) for p, grid in pairs.values()]
@@ -48,7 +48,7 @@ def surface_maps(study: Study, kind: str) -> dict[str, ModelMap]:
 
 
 def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
-    """Of VHGPs of a corpus's reference set, a square pushed at about the grid's speed too; empty for any other set."""
+    """Maps of VHGPs of a corpus' reference set if it is a square pushed at about the grid's speed; else empty."""
     speed = corpus.sets[corpus.reference].table.inputs[:, 0]
     if corpus.reference[0] != "rect1" or not np.any(np.abs(speed - GRID_SPEED) <= SAME_SPEED * GRID_SPEED):
         return []
@@ -58,13 +58,13 @@ def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
 
 
 def model_maps(work: Work, questions: Sequence[Question]) -> list[ModelMap]:
-    """Train these models and ask them."""
+    """Train these models and evaluate them."""
     calls = [(c.sets[pair], fit, _inputs(c.sets[pair], grid)) for c, pair, fit, grid in questions]
     return [_map(answer) for answer in work.run("models asked for maps", ask, calls)]
 
 
 def averaged(models: Sequence[ModelMap]) -> ModelMap:
-    """The mean of the maps of models of several draws of training windows; known where all of them are."""
+    """Mean map of models of several draws of training windows; known where all of them are."""
     mean, sd, process_sd = (
         np.mean([getattr(m, what) for m in models], axis=0) for what in ("mean", "sd", "process_sd")
     )
@@ -72,7 +72,7 @@ def averaged(models: Sequence[ModelMap]) -> ModelMap:
 
 
 def together(answers: Sequence[Answer]) -> Answer:
-    """The mean of the answers of such models to the same questions."""
+    """Mean of the predictions of such models for the same pushes."""
     mean, sd, process_sd = (
         np.mean([getattr(a, what) for a in answers], axis=0) for what in ("mean", "sd", "process_sd")
     )
@@ -85,7 +85,7 @@ def _all_rows(study: Study, corpus: Corpus, pair: Pair, kind: str, seed: int) ->
 
 
 def _inputs(pushes: PushSet, grid: RepeatedGrid | None) -> Array:
-    """The map's inputs, and behind them those of the grid's pushes."""
+    """The inputs of the map, followed by those of the grid's pushes."""
     angle, fraction = (part.ravel() for part in np.meshgrid(ANGLES, FRACTIONS, indexing="ij"))
     contact = contact_on_first_side(pushes.rig.outline, fraction)
     speed = np.clip(GRID_SPEED, pushes.table.inputs[:, 0].min(), pushes.table.inputs[:, 0].max())

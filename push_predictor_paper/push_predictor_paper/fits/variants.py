@@ -1,4 +1,4 @@
-"""Other kernels than the plain squared exponential for the VHGP, each judged like every other fit."""
+"""Other kernels than the plain squared exponential for the VHGP, scored like every other fit."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ LARGE, SEEDS_OF_LARGE = 1000, 3  # a fit of 1000 rows takes long
 
 
 def variant_scores(plan: Plan, work: Work, corpus: Corpus) -> dict[tuple[str, Fit], Score]:
-    """Train and judge every choice on the reference set, the same rows for each."""
+    """Train and score every choice of kernels on the same rows of the reference set."""
     fits, pushes = variant_fits(plan, corpus), corpus.sets[corpus.reference]
     found: dict[tuple[str, Fit], Score] = {}
     for name, choice in CHOICES.items():
-        if choice == DEFAULT_CHOICE:  # the learning curves have made most of these
+        if choice == DEFAULT_CHOICE:  # the learning curves have computed most of these
             made = list(scores(work, corpus, [(corpus.reference, fit) for fit in fits]).values())
         else:
             made = work.run(f"models, {name}", score_variant, [(pushes, fit, choice) for fit in fits])
@@ -51,7 +51,7 @@ def variant_fits(plan: Plan, corpus: Corpus) -> list[Fit]:
 
 
 def score_variant(pushes: PushSet, fit: Fit, choice: KernelChoice) -> Score:
-    """Train a VHGP of other kernels and judge it, as fits.score does the default one."""
+    """Train and score a VHGP with other kernels."""
     split = split_of(pushes, fit)
     table = pushes.table.take(np.sort(split.first(fit.n)))
     start = time.process_time()

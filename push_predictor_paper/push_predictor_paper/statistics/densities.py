@@ -1,4 +1,4 @@
-"""What repetitions of a push look like: how many modes, to one Gaussian and to two, to a model."""
+"""The shape of the outcomes of repeated pushes: modes, densities of one and two Gaussians, and of a model."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Shape:
 
     @property
     def own(self) -> Array:
-        """Mean log density (p, 3) of the better of the two descriptions that a push gives of itself."""
+        """Mean log density (p, 3) of the better of the push's own two fits."""
         return np.maximum(self.one, self.two)
 
 
@@ -52,7 +52,7 @@ def shape(outcomes: Array, sizes: IntArray) -> Shape:
 
 
 def found_at(separation: float, n: int, tests: int, level: float) -> tuple[float, float]:
-    """How often two equal modes, separation in their sd, are found in n outcomes: as one of `tests`, and by itself."""
+    """Power to find two equal modes in n outcomes, separation in their sd: among `tests` tests, and alone."""
     null = uniform_dips(n, RESOLUTION * tests)
     corrected, single = (float(np.quantile(null, 1.0 - p, method="higher")) for p in (level / tests, level))
     return power(n, separation, corrected), power(n, separation, single)
@@ -67,10 +67,10 @@ class LogDensities:
 
 
 def log_densities(pushes: PushSet, fit: Fit, inputs: Array, outcomes: Array) -> LogDensities:
-    """Train a learnt model and ask it for the densities of outcomes (v, 3) of pushes inputs (v, 3)."""
+    """Train a learned model and evaluate the densities of outcomes (v, 3) for inputs (v, 3)."""
     predictor = trained(pushes, fit).predictor
     if not isinstance(predictor, GaussianProcessPredictor):
-        raise TypeError(f"{fit.kind}: only learnt models have latent predictions")
+        raise TypeError(f"{fit.kind}: only learned models have latent predictions")
     scaled, latent = predictor.scaling.outcomes(outcomes), predictor.latent(inputs)
     gaussian, exact = (
         np.column_stack([density(p, scaled[:, k]) for k, p in enumerate(latent)]) - np.log(predictor.scaling.outcome_sd)

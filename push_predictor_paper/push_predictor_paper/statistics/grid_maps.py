@@ -1,4 +1,4 @@
-"""Arithmetic of maps over (contact, angle): maps drawn anew, and how alike two maps are."""
+"""Arithmetic of maps over (contact, angle): resampling, interpolation, agreement of two maps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate, of_draws
 
-BLOCK = (0.2, 0.4)  # of the side, rad: pushes of one block are drawn together, neighbours being alike
+BLOCK = (0.2, 0.4)  # of the side, rad: neighbouring pushes are alike and are resampled as a block
 DRAWS = 400
 ROUNDING = 1e-9
 Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
@@ -20,17 +20,17 @@ Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m)
 
 
 def told(place: Place) -> str:
-    """A push, for the reader: contact as a fraction of the side, angle in degrees."""
+    """A push in words: contact as a fraction of the side, angle in degrees."""
     return f"c = {place[0]:.2f}, {in_degrees(place[1])}"
 
 
 def in_degrees(angle: float) -> str:
-    """An angle (rad), for the reader."""
+    """An angle (rad) in degrees, in words."""
     return f"{np.round(np.degrees(angle)) + 0.0:.0f}°".replace("-", "−")
 
 
 def redrawn(cells: Sequence[Repetitions], seed: int = 0) -> tuple[Array, Array]:
-    """Means and sds (DRAWS, len(cells), 3) of pushes whose repetitions are drawn anew."""
+    """Means and sds (DRAWS, len(cells), 3) of pushes with resampled repetitions."""
     rng, drawn = np.random.default_rng(seed), []
     for cell in cells:
         again = cell.outcomes[rng.integers(0, len(cell.outcomes), (DRAWS, len(cell.outcomes)))]
@@ -48,13 +48,13 @@ def on_grid(grid: RepeatedGrid, values: Array) -> Array:
 
 
 def at_places(fractions: Array, angles: Array, maps: Array, places: Sequence[Place]) -> Array:
-    """Maps (d, A, C) between their points: (d, len(places)), NaN beside a push that was not seen."""
+    """Maps (d, A, C) between their points: (d, len(places)), NaN next to an unknown push."""
     between = RegularGridInterpolator((angles, fractions), np.moveaxis(maps, 0, -1))
     return np.asarray(between([(angle, fraction) for fraction, angle in places])).T
 
 
 def block_weights(cells: Sequence[Repetitions]) -> Array:
-    """Weights (draws, len(cells)): blocks of neighbouring pushes drawn with replacement, the whole block each time."""
+    """Weights (draws, len(cells)): blocks of neighbouring pushes drawn with replacement."""
     contact = [np.floor(cell.fraction / BLOCK[0] + ROUNDING) for cell in cells]
     angle = [np.floor(cell.angle / BLOCK[1] + ROUNDING) for cell in cells]
     return push_bootstrap(np.array([f"{c:.0f}/{a:.0f}" for c, a in zip(contact, angle, strict=True)]))
@@ -67,12 +67,12 @@ def by_blocks(figure: Callable[[Array], Array], weights: Array) -> Estimate:
 
 
 def mean_of(values: Array, weights: Array) -> Array:
-    """Means (d,) of values (m,), each as often as a row of weights (d, m) says."""
+    """Means (d,) of values (m,), weighted by rows of weights (d, m)."""
     return np.asarray(weights @ values / weights.sum(axis=1))
 
 
 def median_of(values: Array, weights: Array) -> Array:
-    """Medians (d,) of values (m,), each as often as a row of whole weights (d, m) says."""
+    """Medians (d,) of values (m,), weighted by rows of integer weights (d, m)."""
     order = np.argsort(values)
     held = np.cumsum(weights[:, order], axis=1)
     half = 0.5 * held[:, -1:]
@@ -82,7 +82,7 @@ def median_of(values: Array, weights: Array) -> Array:
 
 
 def unbiased(value: float, draws: Array) -> Estimate:
-    """A figure of noisy maps that noise pushes one way (a maximum, a span): what draws (d,) add to it is taken off."""
+    """Remove the bias of a figure of noisy maps (a maximum, a range) by a basic bootstrap with draws (d,)."""
     low, high = np.quantile(draws, [0.025, 0.975])
     return Estimate(2.0 * value - float(draws.mean()), 2.0 * value - float(high), 2.0 * value - float(low))
 

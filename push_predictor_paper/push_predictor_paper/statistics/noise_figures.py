@@ -1,4 +1,4 @@
-"""How large the noise of repeated pushes is: against what is expected of them, and over the inputs."""
+"""The size of the noise of repeated pushes relative to the mean outcome, and its range over the inputs."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Ratios:
 
 @dataclass(frozen=True)
 class Span:
-    """How much larger the sd is at one push than at another: 95th over 5th percentile, largest over smallest."""
+    """Range of the sd over pushes: 95th over 5th percentile, largest over smallest."""
 
     most: Estimate
     extreme: Estimate
 
 
 def noise_ratios(cells: list[Repetitions], arm: float) -> tuple[Ratios, ...]:
-    """Of dx, dy, dtheta, and of the whole motion: rotations count as the way (m) of a point `arm` m from the centre."""
+    """Ratios of dx, dy, dtheta and the whole motion; rotations count as the arc (m) at radius `arm` (m)."""
     mean, sd = np.array([cell.mean for cell in cells]), np.array([cell.sd for cell in cells])
     weights, metres = block_weights(cells), np.array([1.0, 1.0, arm])
     whole = [np.sqrt(np.sum((part * metres) ** 2, axis=1)) for part in (mean, sd)]
@@ -47,7 +47,7 @@ def noise_ratios(cells: list[Repetitions], arm: float) -> tuple[Ratios, ...]:
 
 
 def spans(cells: list[Repetitions]) -> tuple[Span, ...]:
-    """Of dx, dy, dtheta; intervals by drawing repetitions anew, the pushes being those of the grid."""
+    """Ranges of the sds of dx, dy, dtheta; intervals resample repetitions, not pushes."""
     sd, drawn = np.array([cell.sd for cell in cells]), redrawn(cells)[1]
     return tuple(
         Span(*(_corrected(figure(sd[None, :, k]), figure(drawn[..., k])) for figure in (_most, _extreme)))
@@ -61,7 +61,7 @@ def span_of(values: Array) -> float:
 
 
 def radius_of_gyration(grid: RepeatedGrid) -> float:
-    """Of a plate of the slider's outline about its centroid, m."""
+    """Radius of gyration of a plate with the slider's outline about its centroid, m."""
     corners = grid.rig.outline.vertices
     after = np.roll(corners, -1, axis=0)
     cross = corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]

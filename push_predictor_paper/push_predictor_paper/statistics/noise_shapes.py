@@ -1,4 +1,4 @@
-"""How alike the noise of one slider is on different surfaces: correlation of the maps of log sd."""
+"""Agreement of the noise of one slider on different surfaces: correlation of the maps of log sd."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FEWEST_PUSHES = 8
 
 @dataclass(frozen=True)
 class Shape:
-    """Of two surfaces (or two halves of one's repetitions): how many pushes, correlations of log sd by output."""
+    """Correlations of log sd by output between two surfaces, or two halves of one surface's repetitions."""
 
     first: str
     second: str
@@ -31,7 +31,7 @@ class Shape:
 
 
 def shapes(grids: Mapping[str, RepeatedGrid], widest: float = np.inf) -> list[Shape]:
-    """Of all pairs of surfaces, over the pushes seen on both whose |angle| (rad) is not beyond the widest."""
+    """Correlations for all pairs of surfaces, over pushes known on both with |angle| (rad) up to `widest`."""
     pairs = [(a, b, _shared(grids[a], grids[b], widest)) for a, b in combinations(grids, 2)]
     return [
         _shape((a, b), [one for one, _ in cells], _sd([one for one, _ in cells]), _sd([other for _, other in cells]))
@@ -41,7 +41,7 @@ def shapes(grids: Mapping[str, RepeatedGrid], widest: float = np.inf) -> list[Sh
 
 
 def ceiling(grid: RepeatedGrid, widest: float = np.inf) -> Shape | None:
-    """Of the two halves of one surface's repetitions: what noise in the sds leaves of a correlation of one."""
+    """Correlation between two halves of one surface's repetitions: the largest that is possible."""
     cells = [cell for cell in grid.seen if abs(cell.angle) <= widest]
     if len(cells) < FEWEST_PUSHES:
         return None
@@ -50,7 +50,7 @@ def ceiling(grid: RepeatedGrid, widest: float = np.inf) -> Shape | None:
 
 
 def learnt_shapes(grids: Mapping[str, RepeatedGrid], models: Mapping[str, ModelMap]) -> list[Shape]:
-    """Of the process noise of the surfaces' models, at the pushes that were seen on both."""
+    """Correlations of the process noise of the surfaces' models, at pushes known on both."""
     sds: dict[str, dict[tuple[float, float], Array]] = {}
     for surface, model in models.items():
         if model.at_pushes is not None:

@@ -1,4 +1,4 @@
-"""Where a map over contact and angle is largest, and how sure that is."""
+"""The maximum of a map over contact and angle, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Peak:
     reach: Estimate
 
     def near(self, named: Sequence[Place], step: Place) -> list[bool]:
-        """Of each place of those draws whether it lies within one step (of the side, rad) of a named one."""
+        """Whether each of the places lies within one step (of the side, rad) of a named one."""
         return [
             any(
                 abs(c - contact) <= step[0] + ROUNDING and abs(a - angle) <= step[1] + ROUNDING
@@ -45,7 +45,7 @@ def peak(
     named: Sequence[Place],
     interval: Callable[[float, Array], Estimate],
 ) -> Peak:
-    """Of the map shown (A, C) and its draws (d, A, C), NaN where nothing is known; named: places of interest."""
+    """The peak of a map (A, C) with draws (d, A, C), NaN where unknown; named: places of interest."""
     maps = np.concatenate([shown[None], drawn])
     flat = np.where(np.isfinite(maps), maps, -np.inf).reshape(len(maps), -1)
     top, where = flat.max(axis=1), flat.argmax(axis=1)
@@ -55,7 +55,7 @@ def peak(
 
 
 def _commonest(places: Sequence[Place]) -> tuple[Place, ...]:
-    """As few places as hold 95 % of all, the commonest first."""
+    """The fewest places with 95 % of all, the most frequent first."""
     counts = {place: places.count(place) for place in dict.fromkeys(places)}
     ordered = sorted(counts, key=lambda place: -counts[place])
     held = np.cumsum([counts[place] for place in ordered])

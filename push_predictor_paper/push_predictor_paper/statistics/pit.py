@@ -1,4 +1,4 @@
-"""Where outcomes fall in what was predicted: coverage of intervals, probability integral transforms, both by push."""
+"""Coverage of intervals and probability integral transforms (PIT), both by push."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EDGES = np.linspace(0.0, 1.0, BARS + 1)
 
 @dataclass(frozen=True, eq=False)
 class Pits:
-    """What a fit said of m windows that its split holds back.
+    """PIT values of a fit for m held-out windows.
 
     push_id (m,); speed (m,) m/s; gaussian, exact (m, 3): the predicted probability of an outcome below the observed
     one, under the moment-matched Gaussian and under the exact predictive (the same where that is Gaussian).
@@ -54,7 +54,7 @@ class Histogram:
 
 
 def pits(pushes: PushSet, fit: Fit) -> Pits:
-    """Train a model and find where the outcomes fall that it has not seen."""
+    """Train a model and compute the PIT of the held-out outcomes."""
     model = trained(pushes, fit)
     table = pushes.table.take(split_of(pushes, fit).test)
     comparison = compare(model, table)
@@ -71,7 +71,7 @@ def exact_pit(model: PushModel, table: PushTable) -> Array:
 
 
 def together(several: Sequence[Pits]) -> Pits:
-    """The windows of several folds or seeds as one."""
+    """The windows of several folds or seeds together."""
     return Pits(
         np.concatenate([p.push_id for p in several]),
         np.concatenate([p.speed for p in several]),
@@ -82,7 +82,7 @@ def together(several: Sequence[Pits]) -> Pits:
 
 
 def coverage(push_id: np.ndarray, probabilities: Array, level: float) -> list[Estimate]:
-    """By output, the share of the windows inside the central interval that should hold `level` of them.
+    """Coverage by output of the central intervals of probability `level`.
 
     push_id (m,), probabilities (m, 3). NaN where there are fewer than two pushes.
     """
@@ -93,7 +93,7 @@ def coverage(push_id: np.ndarray, probabilities: Array, level: float) -> list[Es
 
 
 def histogram(push_id: np.ndarray, probabilities: Array) -> Histogram:
-    """The bars of probabilities (m, 3) and how far they are from flat; NaN where that takes two pushes."""
+    """Histogram of probabilities (m, 3) and its distance from flat; NaN with fewer than two pushes."""
     bar = np.clip((probabilities * BARS).astype(np.int64), 0, BARS - 1)
     shares, draws = _means(push_id, bar[:, None, :] == np.arange(BARS)[None, :, None])
     misplaced = _distance(shares - 1.0 / BARS)

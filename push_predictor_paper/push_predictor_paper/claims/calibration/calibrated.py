@@ -1,4 +1,4 @@
-"""The models of one corpus, judged on where the outcomes fall in what they predict."""
+"""Coverage, PIT histograms and density gains of the models of one corpus."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ Key = tuple[str, SplitName]  # one of MODELS
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """judged: the windows of all seeds and folds together, by kind and split. coverages: [level][output].
+    """The calibration of one corpus' models.
 
-    gains: exact NLPD less the Gaussian's of the VHGP, sum of the outputs.
+    judged: the windows of all seeds and folds together, by kind and split. coverages: [level][output]. gains: exact
+    minus Gaussian NLPD of the VHGP, sum of the outputs.
     """
 
     corpus: Corpus
@@ -37,13 +38,13 @@ class Calibrated:
         return f"{self.corpus.name}, {' on '.join(self.corpus.reference)}"
 
     def windows(self, split: SplitName) -> str:
-        """How much was judged, in words."""
+        """The numbers of test windows and pushes, in words."""
         judged = self.judged["vhgp", split]
         return f"{len(judged.push_id)} windows of {len(judged.push_scores.push_id)} pushes"
 
 
 def calibrated(study: Study, corpus: Corpus) -> Calibrated | None:
-    """Train and judge the models of the reference set; None if it is too small for any size of the plan."""
+    """Train and score the models of the reference set; None if it is too small for every size of the plan."""
     size = fitting_size(study, corpus)
     if size is None:
         return None
@@ -67,7 +68,7 @@ def fitting_size(study: Study, corpus: Corpus) -> int | None:
 
 
 def density_gain(judged: Pits) -> Estimate:
-    """Exact NLPD less the Gaussian's, sum of the outputs, of the same windows."""
+    """Exact minus Gaussian NLPD, sum of the outputs, of the same windows."""
     return by_push(judged.push_scores, lambda totals: total_exact_nlpd(totals) - total_nlpd(totals))
 
 

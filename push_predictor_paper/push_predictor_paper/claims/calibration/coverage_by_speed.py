@@ -1,4 +1,4 @@
-"""Coverage of slow, middle and fast pushes: one noise level for all speeds must be wrong somewhere."""
+"""Coverage of slow, medium and fast pushes: can one noise level fit all speeds?"""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from push_predictor_paper.statistics.pit import Pits, coverage
 
 LEVEL = 0.95
 TOO_WIDE = 0.1
-GROUPS = ("slow", "middle", "fast")
+GROUPS = ("slow", "medium", "fast")
 
 
 @dataclass(frozen=True)
 class GroupCoverage:
-    """Coverage of the 95 % intervals at some speeds: name, their span, windows, pushes, by model and output."""
+    """Coverage of the 95 % intervals in a group of speeds, by model and output."""
 
     name: str
     span: str
@@ -30,25 +30,25 @@ class GroupCoverage:
 
 
 def coverage_by_speed(speeds: Sequence[float], gp: Pits, vhgp: Pits) -> tuple[GroupCoverage, ...]:
-    """Three groups of a plan's speeds (m/s), as many in each as can be; gp and vhgp judged on the same windows."""
+    """Coverage in three groups of a plan's speeds (m/s); gp and vhgp are of the same windows."""
     thirds = np.array_split(np.sort(speeds), len(GROUPS))
     bounds = [0.0, *(float(np.sqrt(a[-1] * b[0])) for a, b in pairwise(thirds)), np.inf]
     return tuple(_group(n, third, bounds[n], bounds[n + 1], gp, vhgp) for n, third in enumerate(thirds))
 
 
 def speed_finding(groups: Sequence[GroupCoverage]) -> Finding:
-    """Whether the GP misses its promise in some group, and the VHGP does not."""
+    """Does the GP miss its coverage in some group, and the VHGP not?"""
     gp, vhgp = (missed(groups, model) for model in ("GP", "VHGP, exact"))
     return Finding(
-        "One noise level for all speeds is wrong somewhere, and noise that depends on the input mends it (simulated)",
+        "One noise level cannot fit all speeds; noise that depends on the input can (simulated)",
         _verdict(groups, len(gp), len(vhgp)),
-        f"Of {len(groups) * len(OUTPUTS)} cells (three groups of speeds, three outputs), the interval of the coverage "
-        f"at 95 % misses 0.95 in {len(gp)} for the GP{_listed(gp)} and in {len(vhgp)} for the VHGP with its exact "
-        f"predictive{_listed(vhgp)}; {groups[0].windows} slow, {groups[1].windows} middle, {groups[2].windows} fast "
-        f"windows, whole pushes left out. Mean distance from 0.95: {_distance(groups, 'GP'):.3f} for the GP, "
-        f"{_distance(groups, 'VHGP, exact'):.3f} for the VHGP. About 0.5 cells would miss by chance. The claim holds "
-        "if the GP misses in two or more and the VHGP in one at most, in part if the VHGP misses in more than that "
-        "but fewer than the GP.",
+        f"Coverage of the 95 % intervals in {len(groups) * len(OUTPUTS)} cells (three groups of speeds, three "
+        f"outputs). The GP misses 0.95 in {len(gp)} cells{_listed(gp)}, the VHGP with its exact predictive density in "
+        f"{len(vhgp)}{_listed(vhgp)}. Mean distance from 0.95: GP {_distance(groups, 'GP'):.3f}, VHGP "
+        f"{_distance(groups, 'VHGP, exact'):.3f}. {groups[0].windows} slow, {groups[1].windows} medium and "
+        f"{groups[2].windows} fast windows, whole pushes held out. About 0.5 cells would miss by chance. Rule: a cell "
+        "misses if the interval of its coverage does not contain 0.95. Holds if the GP misses in two cells or more and "
+        "the VHGP in one at most; in part if the VHGP misses in more than one but fewer than the GP.",
         "beyond the paper",
     )
 
@@ -61,8 +61,8 @@ def speed_table(groups: Sequence[GroupCoverage], size: int) -> Table:
         for model, estimates in group.models.items()
     )
     return Table(
-        f"Share of outcomes in the 95 % interval by speed of the push; simulated reference set, {size} training "
-        "windows, whole pushes left out; 95 % intervals by push.",
+        f"Coverage of the 95 % intervals by speed of the push. Simulated reference set, {size} training windows, "
+        "whole pushes held out, 95 % intervals by push.",
         ("speed: model", *OUTPUTS, "windows"),
         rows,
     )
@@ -79,12 +79,12 @@ def missed(groups: Sequence[GroupCoverage], model: str) -> list[str]:
 
 
 def _distance(groups: Sequence[GroupCoverage], model: str) -> float:
-    """How far coverage is from its level, mean over the cells."""
+    """Mean distance of the coverage from its level over the cells."""
     return float(np.nanmean([abs(estimate.value - LEVEL) for group in groups for estimate in group.models[model]]))
 
 
 def _verdict(groups: Sequence[GroupCoverage], gp: int, vhgp: int) -> Verdict:
-    """By the numbers of cells missed; nothing is decided where the GP misses nothing but could not be seen to."""
+    """Verdict by the numbers of missed cells; not decided if the GP's intervals are too wide to show a miss."""
     if gp >= 2 and vhgp < gp:
         return "holds" if vhgp <= 1 else "holds in part"
     widths = [e.high - e.low for group in groups for e in group.models["GP"]]

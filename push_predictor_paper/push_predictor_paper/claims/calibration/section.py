@@ -1,4 +1,4 @@
-"""Beyond the paper: whether the predicted intervals and distributions hold what they promise."""
+"""Beyond the paper: are the predicted intervals and distributions calibrated?"""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from push_predictor_paper.study import Study
 
 
 def section(study: Study) -> Section:
-    """Coverage and PIT of every model, exact against Gaussian density of the VHGP, coverage by speed."""
+    """Coverage and PIT of every model, exact and Gaussian density of the VHGP, coverage by speed."""
     parts = [_part(study, number, corpus) for number, corpus in enumerate(study.corpora)]
     return Section(
         key="calibration",
-        title="Do the predicted distributions hold what they promise?",
+        title="Calibration of the predicted distributions",
         findings=tuple(finding for part in parts for finding in part.findings),
         tables=tuple(table for part in parts for table in part.tables),
         pictures=tuple(picture for part in parts for picture in part.pictures),
@@ -44,18 +44,19 @@ def section(study: Study) -> Section:
 
 
 NOTES = (
-    "The paper shows no calibration. Its densities are moment-matched Gaussians; the VHGP's own predictive density, a "
-    "Gaussian whose variance is log-normal, has heavier tails and is integrated by Gauss-Hermite quadrature.",
-    "All intervals here come of drawing whole test pushes anew. They leave out what another draw of training windows "
-    "would change. On the random split, windows of a tested push may be among the training windows, and all seeds test "
-    "the same windows, which count once each time.",
-    "On simulated pushes the noise is what our simulator makes of its friction and pressure: calibration there shows "
-    "that the method works, not that real noise has that shape.",
+    "The paper shows no calibration. Its densities are moment-matched Gaussians.",
+    "The VHGP's exact predictive density is a Gaussian whose variance is log-normal. It has heavier tails; "
+    "Gauss-Hermite quadrature integrates it.",
+    "Intervals resample whole test pushes. They do not include the effect of other training windows.",
+    "On the random split, training windows and test windows may come from the same push. All seeds share the test "
+    "windows, and each seed counts them once.",
+    "The noise of simulated pushes follows from the simulator's friction and pressure. Calibration on them shows that "
+    "the method works, not that real noise has that shape.",
 )
 
 
 def _part(study: Study, number: int, corpus: Corpus) -> Section:
-    """All of one corpus; title names it in the JSON."""
+    """The part of one corpus; its title is the key in the JSON."""
     found, title = calibrated(study, corpus), f"{number}: {corpus.title}"
     if found is None:
         note = f"{corpus.name}: the reference set has too few windows for any size of the plan; no calibration."
@@ -85,7 +86,7 @@ def _coverage_table(found: Calibrated) -> Table:
         for split in SPLITS
     )
     return Table(
-        f"Share of outcomes inside the central predicted intervals. {_what(found)} 95 % intervals by push.",
+        f"Coverage of the central predicted intervals. {_what(found)} 95 % intervals by push.",
         ("model, split", *(f"{level:.0%}: {name}" for level in COVERAGE_LEVELS for name in OUTPUTS)),
         rows,
     )
@@ -96,8 +97,8 @@ def _shape_table(found: Calibrated) -> Table:
         return [f"{m:.1%}\np = {p:.3f}" for m, p in zip(shape.misplaced, shape.p, strict=True)]
 
     return Table(
-        f"Share of the windows that lies in the wrong one of {BARS} bars of the PIT histogram; beneath, how often "
-        f"drawing pushes alone gives that much from a flat one (p). {_what(found)}",
+        f"Share of windows in the wrong one of {BARS} bars of the PIT histogram. Beneath, p: the probability of that "
+        f"much or more if the true histogram is flat and pushes are resampled. {_what(found)}",
         ("model, split", *OUTPUTS),
         tuple((f"{m}, {s}", *cells(found.shapes[m, s])) for m in MODELS for s in SPLITS),
     )
@@ -111,8 +112,8 @@ def _density_table(found: Calibrated) -> Table:
         columns = [by_push(push_scores, total_nlpd), by_push(push_scores, total_exact_nlpd), found.gains[split]]
         rows.append((split, *(e.cell("+.3f") for e in (*columns, *single))))
     return Table(
-        f"NLPD of the VHGP (nats, SI units): moment-matched Gaussian, exact predictive, and the paired difference "
-        f"exact less Gaussian, sum and by output; below zero the exact one is better. {_what(found)} 95 % intervals by "
+        f"NLPD of the VHGP (nats, SI units): moment-matched Gaussian, exact predictive density, and their paired "
+        f"difference, exact minus Gaussian. Below zero the exact density is better. {_what(found)} 95 % intervals by "
         "push.",
         ("split", "Gaussian", "exact", "difference", *(f"difference {name}" for name in OUTPUTS)),
         tuple(rows),
@@ -124,7 +125,7 @@ def _gain_of(output: int, totals: PooledScores) -> Array:
 
 
 def _what(found: Calibrated) -> str:
-    """What every caption tells: set, size, splits, how much was judged."""
+    """The end of every caption: set, size, splits, number of windows."""
     splits = "; ".join(f"{s}: {SPLIT_WORDS[s]}, {found.windows(s)}" for s in SPLITS)
     where = " on ".join(found.corpus.reference)
     return f"Pushes: {found.corpus.name}; reference set {where}, {found.size} training windows. {splits}."
@@ -136,9 +137,9 @@ def _pit_picture(study: Study, number: int, found: Calibrated) -> Picture:
     return Picture(
         path,
         f"PIT histograms of four predictive distributions, three outputs each ({found.name})",
-        f"Where outcomes fall in what was predicted; dashed: flat, a perfect forecast. A hump says that the "
-        f"intervals are too wide, a trough that they are too narrow, a slope that the mean is off. Whiskers: 95 % by "
-        f"push. A number at the top tells the height of a bar that is cut off. {_what(found)}",
+        f"PIT histograms: where outcomes fall in the predicted distribution. Dashed: flat, a perfect forecast. A hump "
+        "means that the intervals are too wide; a trough, that they are too narrow; a slope, that the mean is biased. "
+        f"Whiskers: 95 % by push. A number at the top is the height of a bar that is cut off. {_what(found)}",
     )
 
 
@@ -149,9 +150,9 @@ def _speed_picture(study: Study, found: Calibrated, groups: tuple[GroupCoverage,
     counts = ", ".join(f"{group.windows} {group.name} windows of {group.pushes} pushes" for group in groups)
     return Picture(
         path,
-        "Coverage of the 95 % intervals of slow, middle and fast pushes, GP and VHGP",
-        f"Share of outcomes in the 95 % interval by speed: one noise level (GP) and noise that depends on the input "
-        f"(VHGP). Simulated reference set, {found.size} training windows, {SPLIT_WORDS['push']}; {counts}. "
+        "Coverage of the 95 % intervals of slow, medium and fast pushes, GP and VHGP",
+        "Coverage of the 95 % intervals by speed. The GP has one noise level, the VHGP's noise depends on the input. "
+        f"Simulated reference set, {found.size} training windows, {SPLIT_WORDS['push']}; {counts}. "
         "Whiskers: 95 % by push.",
     )
 

@@ -1,4 +1,4 @@
-"""What the comparison of models says: who beats whom, from how many windows on, in what."""
+"""Verdicts of the comparison of analytical model, GP and VHGP, and their rules."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ from push_predictor_paper.fits.fit import SPLIT_WORDS, SPLITS, SplitName
 from push_predictor_paper.section import Finding, Verdict
 
 Crossings = Mapping[str, Crossing]  # by kind
-PAPER_SIZE = 100  # training windows from about which on the paper sees both learnt models ahead
-ABOUT = 150  # what "about" may mean
+PAPER_SIZE = 100  # training windows from about which both learned models lead in the paper
+ABOUT = 150  # the largest size that still counts as about 100
 SIMILAR = 0.10  # of the GP's NMSE
 SI_TO_MM = float(2.0 * np.log(1000.0))  # NLPD of two lengths in mm less that in m
-LEARNT = {"gp": "GP", "vhgp": "VHGP"}
+LEARNED = {"gp": "GP", "vhgp": "VHGP"}
 
 
 def crossings_of(
     corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ...]]
 ) -> Mapping[SplitName, Crossings]:
-    """From where on GP and VHGP beat the analytical model, on each split."""
+    """Training size from which GP and VHGP beat the analytical model, by split and kind."""
 
     def scores(kind: str, split: SplitName) -> list[list[PushScores]]:
         cells = [found.cells[corpus.reference, kind, split, n] for n in sizes[split]]
         return [[score.push_scores for score in cell] for cell in cells]
 
     return {
-        split: {kind: crossing(sizes[split], scores(kind, split), scores("analytical", split)) for kind in LEARNT}
+        split: {kind: crossing(sizes[split], scores(kind, split), scores("analytical", split)) for kind in LEARNED}
         for split in SPLITS
     }
 
 
 def early(corpus: Corpus, where: Crossings) -> Finding:
-    """Both learnt models beat the analytical one from about 100 windows."""
-    told = "; ".join(f"{LEARNT[kind]} {at.text()}" for kind, at in where.items())
+    """Do both learned models beat the analytical one from about 100 windows?"""
+    told = "; ".join(f"{LEARNED[kind]} {at.text()}" for kind, at in where.items())
     sentence = (
-        f"Training windows from which on the NMSE stays below the analytical model's: {told}; {SPLIT_WORDS['push']}, "
-        f"{_set(corpus)}, interval by drawing pushes and folds anew. About {PAPER_SIZE} means up to {ABOUT}: holds if "
-        "both intervals end there or before, does not hold if both begin after it, in part if one of the two ends in "
-        "time."
+        f"The NMSE stays below the analytical model's from this number of training windows on: {told}. "
+        f"{SPLIT_WORDS['push'].capitalize()}, {_set(corpus)}, interval by resampling pushes and folds. Rule: about "
+        f"{PAPER_SIZE} means up to {ABOUT}. Holds if both intervals end by then, in part if one does, does not hold if "
+        "both begin later."
     )
     return Finding(
         f"GP and VHGP beat the analytical model from about 100 samples ({corpus.name})", _in_time(where), sentence
@@ -59,37 +59,38 @@ def early(corpus: Corpus, where: Crossings) -> Finding:
 
 
 def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
-    """Both learnt models have the smaller NMSE at the plan's size."""
-    gaps = {kind: _gap(corpus, found, "analytical", kind, n) for kind in LEARNT}
-    told = "; ".join(f"{LEARNT[kind]} {gap.text('.3f')}" for kind, gap in gaps.items())
+    """Do both learned models have the smaller NMSE at the plan's size?"""
+    gaps = {kind: _gap(corpus, found, "analytical", kind, n) for kind in LEARNED}
+    told = "; ".join(f"{LEARNED[kind]} {gap.text('.3f')}" for kind, gap in gaps.items())
     sentence = (
-        f"NMSE less the analytical model's at n = {n}: {told} (paper: −0.34; −0.35); {_how(corpus, found, n)}. Holds "
-        "if both intervals lie below 0, does not hold if both lie above, in part if one lies below."
+        f"NMSE minus that of the analytical model at n = {n}: {told} (paper: −0.34; −0.35). "
+        f"{_how(corpus, found, n)}. Rule: holds if both intervals lie below 0, in part if one does, does not hold if "
+        "both lie above."
     )
-    return Finding(f"The learnt models predict better than the analytical one ({corpus.name})", _below(gaps), sentence)
+    return Finding(f"The learned models predict better than the analytical one ({corpus.name})", _below(gaps), sentence)
 
 
 def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
-    """GP and VHGP show a similar NMSE."""
-    scores = [found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNT]
+    """Do GP and VHGP have a similar NMSE?"""
+    scores = [found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNED]
     value = total_nmse(scores[1].totals())[0] / total_nmse(scores[0].totals())[0]
     ratio = of_draws(value, total_nmse(scores[1].resampled()) / total_nmse(scores[0].resampled()))
     sentence = (
-        f"NMSE of the VHGP over that of the GP at n = {n}: {ratio.text()} (paper: 0.97); {_how(corpus, found, n)}. "
-        f"Similar means within {SIMILAR:.0%}: holds if the interval lies there, in part if only the figure does, does "
-        "not hold if the interval lies outside."
+        f"NMSE of the VHGP over that of the GP at n = {n}: {ratio.text()} (paper: 0.97). {_how(corpus, found, n)}. "
+        f"Rule: similar means within {SIMILAR:.0%}. Holds if the interval lies within, in part if only the value does, "
+        "does not hold if the interval lies outside."
     )
     return Finding(f"GP and VHGP have a similar NMSE ({corpus.name})", _alike(ratio), sentence)
 
 
 def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
-    """The VHGP has the smaller NLPD."""
-    gp, vhgp = (found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNT)
+    """Does the VHGP have the smaller NLPD?"""
+    gp, vhgp = (found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNED)
     gaussian, exact = (difference_by_push(gp, vhgp, figure) for figure in (total_nlpd, total_exact_nlpd))
     sentence = (
-        f"NLPD of the VHGP less that of the GP at n = {n}: {gaussian.text()} nats, by its exact density {exact.text()} "
-        f"(paper: −0.91); {_how(corpus, found, n)}. Holds if the first interval lies below 0, does not hold if it lies "
-        "above, in part if only the exact density's lies below."
+        f"NLPD of the VHGP minus that of the GP at n = {n}: {gaussian.text()} nats; with its exact density "
+        f"{exact.text()} (paper: −0.91). {_how(corpus, found, n)}. Rule: holds if the first interval lies below 0, in "
+        "part if only that of the exact density does, does not hold if the first lies above."
     )
     return Finding(f"The VHGP beats the GP in NLPD ({corpus.name})", _denser(gaussian, exact), sentence)
 
@@ -101,7 +102,7 @@ def _gap(corpus: Corpus, found: Curves, first: str, second: str, n: int) -> Esti
 
 def _how(corpus: Corpus, found: Curves, n: int) -> str:
     pushes = len(found.push_scores(corpus.reference, "gp", "push", n).windows)
-    return f"{SPLIT_WORDS['push']}, {pushes} pushes, {_set(corpus)}, interval by push"
+    return f"{SPLIT_WORDS['push'].capitalize()}, {pushes} pushes, {_set(corpus)}, interval by push"
 
 
 def _set(corpus: Corpus) -> str:

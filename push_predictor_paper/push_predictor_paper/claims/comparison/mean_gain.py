@@ -1,4 +1,4 @@
-"""Does input-dependent noise improve the mean too: NMSE of the VHGP less that of the GP (paper, section III)."""
+"""Does input-dependent noise improve the mean too? NMSE of the VHGP minus that of the GP (paper, section III)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLUMNS = ("total", *OUTPUTS)
 
 
 def section(study: Study) -> Section:
-    """The difference at every size on both splits, and speed by speed at the plan's size."""
+    """The difference in NMSE at every size on both splits, and by speed at the plan's size."""
     parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
     return joined("mean_gain", "Does input-dependent noise improve the mean?", parts)
 
@@ -47,36 +47,37 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
 
 
 def improves(corpus: Corpus, gains: Mapping[int, Sequence[Estimate]], pushes: int) -> Finding:
-    """The claim itself, by push, at the last size; what the others say is told."""
+    """The paper's claim, by push, at the largest size."""
     better = [n for n, gain in gains.items() if gain[0].high < 0.0]
     worse = [n for n, gain in gains.items() if gain[0].low > 0.0]
     last = max(gains)
     sentence = (
-        f"NMSE of the VHGP less that of the GP at n = {last}: {gains[last][0].text('.3f')} (paper: −0.01, without "
-        f"interval); {SPLIT_WORDS['push']}, {pushes} pushes, {_set(corpus)}, interval by push. Better with the whole "
-        f"interval at {_listed(better)}, worse at {_listed(worse)} (of {len(gains)} sizes, not corrected for their "
-        f"number). n = {last}, the largest, decides alone: holds if its interval lies below 0, does not hold if above."
+        f"NMSE of the VHGP minus that of the GP at n = {last}: {gains[last][0].text('.3f')} (paper: −0.01, without "
+        f"interval). {SPLIT_WORDS['push'].capitalize()}, {pushes} pushes, {_set(corpus)}, interval by push. Better "
+        f"with the whole interval at {_listed(better)}, worse at {_listed(worse)} (of {len(gains)} sizes, not "
+        "corrected for their number). Rule: the largest size decides. Holds if its interval lies below 0, does not "
+        "hold if above."
     )
     return Finding(f"Input-dependent noise improves the mean too ({corpus.name})", _verdict(gains[last][0]), sentence)
 
 
 def where_it_counts(corpus: Corpus, windows: HeldOut, groups: Sequence[int], improvement: Verdict) -> Finding:
-    """Where a gain lies: if less noisy observations count for more, quiet (slow) pushes should have it."""
-    claim = f"What gain there is lies with the slower, less noisy pushes ({corpus.name})"
+    """Does the gain lie with slow pushes, as it should if less noisy observations weigh more?"""
+    claim = f"The gain lies with the slower, less noisy pushes ({corpus.name})"
     if len(groups) < 2:
-        sentence = f"{corpus.name}: one speed only, so no slow and fast pushes to tell apart."
+        sentence = f"{corpus.name}: one speed only, so slow and fast pushes cannot be compared."
         return Finding(claim, "not decided", sentence, "beyond the paper")
     half = len(groups) // 2
     slow, fast = (_gain_within(windows, part) for part in (groups[:half], groups[-half:]))
     share = _share(windows, groups[-half:])
     sentence = (
-        f"VHGP less GP within the slower half of the speeds: {slow.text('.3f')}; within the faster half: "
-        f"{fast.text('.3f')} (NMSE, every speed in units of its own spread, n = {windows.size}, {SPLIT_WORDS['push']}, "
-        f"{windows.pushes} pushes, {_set(corpus)}, interval by push). The faster half makes up {share:.0%} of the "
-        "spread by which the NMSE of all windows is measured: that share of the total is theirs. This tells where a "
-        "gain lies and not why: that less noisy observations weigh more is the paper's reason, not tested here. Holds "
-        "if the slower half's interval lies below 0 and the faster half's does not, in part if both do, does not hold "
-        "if only the faster half's does or the slower half's lies above 0; not decided unless there is a gain (above)."
+        f"NMSE of the VHGP minus that of the GP: {slow.text('.3f')} in the slower half of the speeds, "
+        f"{fast.text('.3f')} in the faster half. Each speed is in units of its own variance; n = {windows.size}, "
+        f"{SPLIT_WORDS['push']}, {windows.pushes} pushes, {_set(corpus)}, interval by push. The faster half makes up "
+        f"{share:.0%} of the variance in the NMSE of all windows. The paper's reason for a gain (less noisy "
+        "observations weigh more) is not tested here. Rule: holds if the slower half's interval lies below 0 and the "
+        "faster half's does not; in part if both do; does not hold if only the faster half's does, or the slower "
+        "half's lies above 0; not decided unless the claim above holds."
     )
     gained = improvement in ("holds", "holds in part")
     return Finding(claim, _slow_verdict(slow, fast) if gained else "not decided", sentence, "beyond the paper")
@@ -96,7 +97,7 @@ def _among(windows: HeldOut, groups: Sequence[int]) -> np.ndarray:
 
 
 def _share(windows: HeldOut, groups: Sequence[int]) -> float:
-    """Mean over outputs of the share of these pushes in the squared distance from the training mean."""
+    """Share of these pushes in the squared distance from the training mean, averaged over the outputs."""
     spread = windows.away**2
     return float((spread[_among(windows, groups)].sum(axis=0) / spread.sum(axis=0)).mean())
 
@@ -120,8 +121,8 @@ def _table(corpus: Corpus, gains: Gains) -> Table:
         for n in gains[split]
     )
     caption = (
-        f"NMSE of the VHGP less that of the GP (below 0: the VHGP's mean is better), {_set(corpus)}. By push: "
-        f"{SPLIT_WORDS['push']}; interval by push, of the same pushes. The paper: 0.37 less 0.38, total."
+        f"NMSE of the VHGP minus that of the GP; below 0 the VHGP's mean is better. {_set(corpus)}. By push: "
+        f"{SPLIT_WORDS['push']}. Intervals by push, paired. The paper: 0.37 minus 0.38, total."
     )
     return Table(caption, ("n", *COLUMNS), rows)
 
@@ -133,19 +134,19 @@ def _speed_table(corpus: Corpus, windows: HeldOut, groups: Sequence[int]) -> Tab
         cells = [within_nmse(at, kinds).cell(".3f") for kinds in (("gp",), ("vhgp",), ("gp", "vhgp"))]
         rows.append((at.speed_range, str(at.pushes), *cells, f"{_share(windows, [k]):.1%}"))
     caption = (
-        f"The same by speed, n = {windows.size}, {SPLIT_WORDS['push']}, {_set(corpus)}: NMSE (sum of 3) over the "
-        "spread within the speed, interval by push. Last column: the speed's share of the spread by which the NMSE of "
-        "all windows is measured, mean over outputs."
+        f"The same by speed, n = {windows.size}, {SPLIT_WORDS['push']}, {_set(corpus)}. NMSE (sum of 3) over the "
+        "variance within the speed, interval by push. Last column: the speed's share of the variance in the NMSE of "
+        "all windows, averaged over the outputs."
     )
-    return Table(caption, ("speed", "pushes", "GP", "VHGP", "VHGP less GP", "share of spread"), tuple(rows))
+    return Table(caption, ("speed", "pushes", "GP", "VHGP", "VHGP minus GP", "share of variance"), tuple(rows))
 
 
 def _picture(study: Study, corpus: Corpus, gains: Gains, number: int) -> Picture:
-    rows = [[Panel(SPLIT_WORDS[s], "NMSE, VHGP less GP", _lines(gains[s]), zero=True) for s in SPLITS]]
+    rows = [[Panel(SPLIT_WORDS[s], "NMSE, VHGP minus GP", _lines(gains[s]), zero=True) for s in SPLITS]]
     path = study.out / f"mean_gain_{corpus.origin}_{number}.png"
     draw(path, (7.4, 3.4), lambda figure: paint_panels(figure, rows))
     caption = (
-        f"NMSE of the VHGP less that of the GP over the training size; below 0 the VHGP's mean is better. Bands: 95 % "
+        f"NMSE of the VHGP minus that of the GP by training size. Below 0 the VHGP's mean is better. Bands: 95 % "
         f"intervals by push. {_set(corpus)}."
     )
     return Picture(path, "Difference in NMSE between VHGP and GP over training size, total and per output", caption)

@@ -1,4 +1,4 @@
-"""Analytical model, GP and VHGP on the reference pair: table, curves, crossing point (paper, section V-B)."""
+"""Analytical model, GP and VHGP on the reference pair: scores, curves, crossing (paper, section V-B)."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ MEASURES = (("NMSE", "nmse", ".3f"), ("NLPD", "nlpd", ".2f"), ("exact NLPD", "ex
 PAIRS_OF_KINDS = (("analytical", "gp"), ("analytical", "vhgp"), ("gp", "vhgp"))
 PAPER = {"NMSE": ("0.72", "0.38", "0.37"), "NLPD": ("–", "−2.82", "−3.73")}
 SIMULATOR = (
-    "Our simulator has rigid bodies, Coulomb friction and a slider whose outline the analytical model knows exactly: "
-    "it obeys that model's assumptions, but for inertia and scatter, more than a real rig need do. Where the learnt "
-    "models overtake it is therefore a property of the simulated rig and of the speeds in the set."
+    "The simulator has rigid bodies, Coulomb friction and a slider whose outline the analytical model knows exactly. "
+    "Except for inertia and noise it meets that model's assumptions, more than a real rig does. The size at which the "
+    "learned models overtake it is therefore a property of the simulated rig and its speeds."
 )
 
 
 def section(study: Study) -> Section:
-    """The three kinds of model on the reference pair of every corpus."""
+    """Compare the three kinds of model on the reference pair of every corpus."""
     parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
     return joined("comparison", "Analytical model, GP and VHGP", parts)
 
 
 def common_sizes(found: Curves, corpus: Corpus, split: SplitName) -> tuple[int, ...]:
-    """Sizes at which all three kinds were judged."""
+    """Training sizes at which all three kinds were scored."""
     held = [set(found.sizes([corpus.reference], kind, split)) for kind in KINDS]
     return tuple(sorted(set.intersection(*held)))
 
@@ -69,14 +69,14 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
         (split, n) for split in SPLITS for n in sorted({last[split], PAPER_SIZE} & set(sizes[split]), reverse=True)
     ]
     tables = [_table(corpus, found, split, n) for split, n in shown]
-    tables += [_beside_paper(corpus, found, last["push"]), _crossing_table(corpus, where), _cost(corpus, found, sizes)]
+    tables += [_paper_table(corpus, found, last["push"]), _crossing_table(corpus, where), _cost(corpus, found, sizes)]
     data = {"crossing": _crossing_data(where), "scores": _data(corpus, found, sizes)}
     pictures = (_picture(study, corpus, found, sizes, where, number),)
     return Section("", "", findings, tuple(tables), pictures, _notes(study, corpus, sizes), data)
 
 
 def output_figure(measure: str, output: int | None) -> Figure:
-    """The figure of one output, or summed over them."""
+    """The measure of one output, or its sum over the outputs."""
 
     def figure(totals: PooledScores) -> Array:
         values: Array = getattr(totals, measure)
@@ -95,26 +95,26 @@ def _table(corpus: Corpus, found: Curves, split: SplitName, n: int) -> Table:
             gaps = [difference_by_push(scores[a], scores[b], figure).cell(form) for a, b in PAIRS_OF_KINDS]
             rows.append((f"{label}, {name}", *cells, *gaps))
     caption = (
-        f"{_pair(corpus)}, n = {n}, {SPLIT_WORDS[split]}. Pushes: {corpus.name}; {len(scores['gp'].windows)} judged, "
-        "interval by drawing whole pushes anew, differences of the same pushes. NLPD in SI units; the analytical "
-        "model's is that of a Gaussian with the covariance of its training residuals."
+        f"Scores at n = {n}, {SPLIT_WORDS[split]}. {_pair(corpus)}, pushes: {corpus.name}, {len(scores['gp'].windows)} "
+        "scored. Intervals resample whole pushes; differences are paired. NLPD in SI units; for the analytical model, "
+        "of a Gaussian with the covariance of its training residuals."
     )
-    head = ("", *(NAMES[kind] for kind in KINDS), *(f"{NAMES[b]} less {NAMES[a]}" for a, b in PAIRS_OF_KINDS))
+    head = ("", *(NAMES[kind] for kind in KINDS), *(f"{NAMES[b]} minus {NAMES[a]}" for a, b in PAIRS_OF_KINDS))
     return Table(caption, head, tuple(rows))
 
 
-def _beside_paper(corpus: Corpus, found: Curves, n: int) -> Table:
-    """The paper's table, and ours in its units."""
+def _paper_table(corpus: Corpus, found: Curves, n: int) -> Table:
+    """The paper's table next to ours, in the paper's units."""
     scores = {kind: found.push_scores(corpus.reference, kind, "push", n) for kind in KINDS}
     rows = []
     for label, measure, shift in (("NMSE", "nmse", 0.0), ("NLPD (mm, rad)", "nlpd", SI_TO_MM)):
         ours = [_shifted(by_push(scores[kind], output_figure(measure, None)), shift).cell() for kind in KINDS]
         rows.append((label, *PAPER[label[:4]], *ours))
     caption = (
-        f"The paper's table, and the same from: {corpus.name}; {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
-        f"{len(scores['gp'].windows)} pushes, interval by push. What differs: the paper learns from the MIT push data "
-        "set, and names neither test set, split, size nor units of its table; its NLPD are in the range that mm and "
-        "rad give, so ours are told in these here (SI + 13.8155)."
+        f"The paper's table next to ours: {corpus.name}, {_pair(corpus)}, n = {n}, {SPLIT_WORDS['push']}, "
+        f"{len(scores['gp'].windows)} pushes, interval by push. The paper learns from the MIT push data set. It names "
+        "neither test set, split, size nor units of its table. Its NLPD are in the range of mm and rad, so ours are in "
+        "these units here (SI + 13.8155)."
     )
     head = ("", *(f"{NAMES[kind]}, paper" for kind in KINDS), *(f"{NAMES[kind]}, here" for kind in KINDS))
     return Table(caption, head, tuple(rows))
@@ -127,8 +127,8 @@ def _shifted(estimate: Estimate, shift: float) -> Estimate:
 def _crossing_table(corpus: Corpus, where: Mapping[SplitName, Crossings]) -> Table:
     rows = tuple((NAMES[kind], *(where[split][kind].cell() for split in SPLITS)) for kind in KINDS[1:])
     caption = (
-        f"Training windows from which on the total NMSE stays below the analytical model's, linear in log n; "
-        f"interval by drawing pushes and seeds anew. Pushes: {corpus.name}, {_pair(corpus)}. The paper: about 100."
+        f"Training windows from which the total NMSE stays below the analytical model's, linear in log n. Interval by "
+        f"resampling pushes and seeds. Pushes: {corpus.name}, {_pair(corpus)}. The paper: about 100."
     )
     return Table(caption, ("", *(SPLIT_WORDS[split] for split in SPLITS)), rows)
 
@@ -140,8 +140,8 @@ def _cost(corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ..
         ratio = np.median(cpu[2]) / max(np.median(cpu[1]), 1e-9)
         rows.append((str(n), *(_median_and_range(seconds) for seconds in cpu), f"{ratio:.1f}"))
     caption = (
-        f"CPU time of one training, three outputs, s: median over folds, beneath it the range. Pushes: {corpus.name}. "
-        "Other fits ran beside these; the VHGP starts from a GP, whose fit is counted."
+        f"CPU time to train one model of three outputs, s: median over folds, beneath it the range. Pushes: "
+        f"{corpus.name}. Other fits ran at the same time. The VHGP starts from a GP, whose fit is included."
     )
     return Table(caption, ("n", *(NAMES[kind] for kind in KINDS), "VHGP / GP"), tuple(rows))
 
@@ -169,9 +169,9 @@ def _picture(
     path = study.out / f"comparison_{corpus.origin}_{number}.png"
     draw(path, (7.4, 6.4), lambda figure: paint_panels(figure, rows))
     caption = (
-        f"Three models over the training size, {_pair(corpus)}. Bands: 95 % intervals by push. Marks at the foot: "
-        "from where on GP and VHGP beat the analytical model, with interval (pointing right: beyond the last size); a "
-        "triangle at the top marks a value beyond the axis. Above: whole pushes left out; below: random split. "
+        f"Three models by training size, {_pair(corpus)}. Above: whole pushes held out; below: random split. Bands: "
+        "95 % intervals by push. Marks at the foot: size from which GP and VHGP beat the analytical model, with "
+        "interval (pointing right: beyond the last size). A triangle at the top marks a value beyond the axis. "
         f"Pushes: {corpus.name}."
     )
     return Picture(path, "NMSE and NLPD of analytical model, GP and VHGP over training size", caption)
@@ -199,7 +199,8 @@ def _pair(corpus: Corpus) -> str:
 def _notes(study: Study, corpus: Corpus, sizes: Mapping[SplitName, tuple[int, ...]]) -> tuple[str, ...]:
     planned = {*study.plan.sizes, *((study.plan.largest,) if study.plan.largest else ())}
     notes = [
-        f"{corpus.name}, {SPLIT_WORDS[split]}: n = {', '.join(map(str, missing))} is more than {_pair(corpus)} holds."
+        f"{corpus.name}, {SPLIT_WORDS[split]}: n = {', '.join(map(str, missing))} exceeds the windows of "
+        f"{_pair(corpus)}."
         for split in SPLITS
         if (missing := sorted(planned - set(sizes[split])))
     ]

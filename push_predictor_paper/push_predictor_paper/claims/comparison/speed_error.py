@@ -19,20 +19,18 @@ from push_predictor_paper.section import Finding, Section, Table, Verdict, joine
 from push_predictor_paper.study import Study
 
 NAMES = {"analytical": "analytical", "gp": "GP", "vhgp": "VHGP"}
-LEARNT = {"gp": "GP", "vhgp": "VHGP"}
-NOTABLE = 0.1  # rank correlation below which a dependence is not worth the name
+NOTABLE = 0.1  # a smaller rank correlation does not count as a dependence
 FAST = 0.1  # m/s, from which on a push counts as fast
 SIMULATOR = (
-    "Our simulator has inertia, and friction that does not depend on speed: that quasi-static prediction fails at high "
-    "speed is built into its dynamics and no discovery about the world; from which speed on is what the masses and "
-    "frictions of the rig give. Fast pushes are of few windows each, and only those in which the tip keeps contact for "
-    "the whole window. "
-    "Slow pushes move the slider by 2 mm in a window: scatter and the noise of the cameras weigh more there."
+    "The simulator has inertia, and friction that does not depend on speed. Quasi-static prediction therefore fails at "
+    "high speed by construction. The speed at which it fails follows from the rig's masses and friction.",
+    "Fast pushes have few windows each, and only those in which the tip stays in contact for the whole window.",
+    "Slow pushes move the slider by 2 mm in a window. Friction noise and camera noise weigh more there.",
 )
 
 
 def section(study: Study) -> Section:
-    """NMSE within each speed and the bias along and across, all kinds, pushes left out."""
+    """NMSE within each speed and bias along and across, all kinds of model, whole pushes held out."""
     parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
     return joined("speed_error", "Error against speed", parts)
 
@@ -43,48 +41,48 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
         return Section("", "", (), notes=(f"{corpus.name}: too few windows to train a model.",))
     groups = list(range(len(windows.speeds)))
     if len(groups) < 2:
-        note = f"{corpus.name}: one speed only ({_speed(windows.speeds[0])}), so nothing about the error against speed."
+        note = f"{corpus.name}: one speed only ({_speed(windows.speeds[0])}), so the error cannot be compared by speed."
         return Section("", "", (), notes=(note,))
     found = {kind: _curve(windows, groups, kind) for kind in KINDS}
     findings = (unreliable(corpus, windows, found["analytical"]), captured(corpus, windows, groups))
-    notes = (SIMULATOR,) if corpus.origin == "simulated" else ()
+    notes = SIMULATOR if corpus.origin == "simulated" else ()
     picture = _picture(study, corpus, windows, found, number)
     data = {kind: _curve_data(curve) for kind, curve in found.items()}
     return Section("", "", findings, (_table(corpus, windows, groups, found),), (picture,), notes, data)
 
 
 def unreliable(corpus: Corpus, windows: HeldOut, curve: SpeedCurve) -> Finding:
-    """Does the analytical model's error grow with speed: rank correlation over pushes."""
+    """Does the analytical model's error grow with speed? By rank correlation over pushes."""
     fast = windows.speeds[windows.group] >= 0.99 * FAST
     ranks = [rank_correlation(part, "analytical") for part in (windows, windows.take(fast))]
     sentence = (
-        f"Spearman correlation of a push's squared error, in units of the variance of outcomes at its speed, with its "
-        f"speed: {ranks[0].text()}; from {_speed(FAST)} on: {ranks[1].text()}; {windows.pushes} pushes, "
-        f"{_set(corpus)}, interval by push. Its NMSE within a speed goes from {curve.nmse[0].text()} at "
-        f"{_speed(curve.speeds[0])} to {curve.nmse[-1].text()} at {_speed(curve.speeds[-1])}. Holds if both intervals "
-        f"lie above {NOTABLE}, in part if one does, does not hold if both end below {NOTABLE}."
+        f"Spearman correlation of speed and squared error: {ranks[0].text()}; from {_speed(FAST)} on "
+        f"{ranks[1].text()}. The error is in units of the variance at its speed; {windows.pushes} pushes, "
+        f"{_set(corpus)}, interval by push. The NMSE within a speed goes from {curve.nmse[0].text()} at "
+        f"{_speed(curve.speeds[0])} to {curve.nmse[-1].text()} at {_speed(curve.speeds[-1])}. Rule: holds if both "
+        f"intervals lie above {NOTABLE}, in part if one does, does not hold if both end below {NOTABLE}."
     )
-    return Finding(f"The analytical model is more unreliable at high speed ({corpus.name})", _grows(ranks), sentence)
+    return Finding(f"The analytical model is less reliable at high speed ({corpus.name})", _grows(ranks), sentence)
 
 
 def captured(corpus: Corpus, windows: HeldOut, groups: list[int]) -> Finding:
-    """Do the learnt models, told the speed, do better where it is high: speed by speed from FAST on."""
-    claim = f"Models that are told the speed capture the dynamic effects ({corpus.name})"
+    """Do the learned models, whose input is the speed, lead at each speed from FAST on?"""
+    claim = f"Models with the speed as an input capture the dynamic effects ({corpus.name})"
     fast = [k for k in groups if windows.speeds[k] >= 0.99 * FAST]
     if not fast:
         return Finding(claim, "not decided", f"{corpus.name}: no pushes of {_speed(FAST)} or faster.")
     gaps = {k: within_nmse(windows.at(k), ("analytical", "vhgp")) for k in fast}
     told = "; ".join(f"{_speed(windows.speeds[k])} {gap.text()}" for k, gap in gaps.items())
     sentence = (
-        f"NMSE of the VHGP less that of the analytical model within each speed: {told}; n = {windows.size}, "
-        f"{SPLIT_WORDS['push']}, {_set(corpus)}, interval by push. Holds if at all of these speeds the interval lies "
-        "below 0, in part if at some, does not hold if at some it lies above 0 and at none below."
+        f"NMSE of the VHGP minus that of the analytical model within each speed: {told}. n = {windows.size}, "
+        f"{SPLIT_WORDS['push']}, {_set(corpus)}, interval by push. Rule: holds if the interval lies below 0 at all of "
+        "these speeds, in part if at some, does not hold if it lies above 0 at some and below at none."
     )
     return Finding(claim, _ahead(list(gaps.values())), sentence)
 
 
 def rank_correlation(windows: HeldOut, kind: str) -> Estimate:
-    """Spearman's, over pushes, of mean squared error in units of the variance at that speed with speed.
+    """Spearman correlation over pushes of speed and mean squared error in units of the variance at that speed.
 
     NaN where the windows are of one speed.
     """
@@ -139,11 +137,10 @@ def _table(corpus: Corpus, windows: HeldOut, groups: list[int], found: dict[str,
         along, across = (_percent(e) for e in (found["analytical"].along[i], found["analytical"].across[i]))
         rows.append((at.speed_range, f"{at.pushes}", f"{len(at.push_id)}", *nmse, along, across))
     caption = (
-        f"By speed (neighbouring speeds of fewer than {FEWEST_PUSHES} pushes joined), {corpus.reference[0]} on "
-        f"{corpus.reference[1]}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}. NMSE "
-        "(sum of 3) over the spread of outcomes at that speed; bias, of the analytical model: mean of observed less "
-        "predicted, per cent of the pusher's travel; across: towards the side to which the model says the slider goes. "
-        "Interval by push. The paper tells this without numbers."
+        f"NMSE (sum of 3) over the variance at each speed, and bias of the analytical model. {corpus.reference[0]} on "
+        f"{corpus.reference[1]}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}; neighbouring speeds "
+        f"with fewer than {FEWEST_PUSHES} pushes are joined. Bias: mean of observed minus predicted, per cent of the "
+        "pusher's travel; across: towards the predicted side. Interval by push. The paper gives no numbers."
     )
     head = ("speed", "pushes", "windows", *(f"NMSE, {NAMES[kind]}" for kind in KINDS), "bias along", "bias across")
     return Table(caption, head, tuple(rows))
@@ -153,9 +150,9 @@ def _picture(study: Study, corpus: Corpus, windows: HeldOut, found: dict[str, Sp
     path = study.out / f"speed_error_{corpus.origin}_{number}.png"
     draw(path, (7.4, 3.2), lambda figure: paint_speed_error(figure, [found[kind] for kind in KINDS], NAMES))
     caption = (
-        f"NMSE within each speed, and mean of observed less predicted along and across the push as a share of the "
+        f"NMSE within each speed, and mean of observed minus predicted along and across the push, as a share of the "
         f"pusher's travel. {corpus.reference[0]} on {corpus.reference[1]}, {windows.pushes} pushes, n = "
-        f"{windows.size}, {SPLIT_WORDS['push']}, bands: 95 % by push. Pushes: {corpus.name}."
+        f"{windows.size}, {SPLIT_WORDS['push']}. Bands: 95 % by push. Pushes: {corpus.name}."
     )
     return Picture(path, "Error of analytical model, GP and VHGP against the pusher's speed", caption)
 

@@ -1,4 +1,4 @@
-"""The models whose KL divergence from repeated pushes is taken: what they learn from, and what they answer."""
+"""The models compared with repeated pushes: their training windows and their predictions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DRAWN = 0.8  # of these, so that seeds differ
 
 @dataclass(frozen=True, eq=False)
 class Training:
-    """Windows that models learn from: the first n of a draw."""
+    """Training windows: the first n of a draw."""
 
     name: str
     pushes: PushSet
@@ -33,7 +33,7 @@ Found = tuple[Training, Mapping[str, Divergences]]  # by kind of model
 
 
 def trainings(study: Study) -> list[Training]:
-    """All speeds at the plan's size; and, where there are enough, windows at the grid's speed, and as many at all."""
+    """Training sets: all speeds at the plan's size; if there are enough, the grid's speed only, and as few of all."""
     pushes, slow = study.simulated.sets[study.simulated.reference], slow_windows(study)
     every = Training("all speeds", pushes, min(study.plan.size, len(pushes.table)))
     if len(slow) < FEWEST_WINDOWS:
@@ -44,13 +44,13 @@ def trainings(study: Study) -> list[Training]:
 
 
 def slow_windows(study: Study) -> IntArray:
-    """Rows of the reference set at about the grid's speed."""
+    """Rows of the reference set near the grid's speed."""
     speed = study.simulated.sets[study.simulated.reference].table.inputs[:, 0]
     return np.flatnonzero(np.abs(speed / GRID_SPEED - 1.0) <= SPEED_TOLERANCE)
 
 
 def all_divergences(study: Study, grid: RepeatedGrid) -> list[Found]:
-    """Train, ask, compare."""
+    """Train all models, predict the pushes of the grid, and compute the divergences."""
     sets, seeds = trainings(study), range(study.plan.seeds)
     asked = [(t, kind) for t in sets for kind in KINDS]
     calls = [(t.pushes, Fit(kind, t.n, "none", seed), grid.typical_inputs) for t, kind in asked for seed in seeds]

@@ -1,4 +1,4 @@
-"""KL divergence of models from repeated pushes: figures, their intervals, and by which rule a claim holds or not."""
+"""KL divergence of models from repeated pushes: values, intervals and the rules of the verdicts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.section import Verdict
 from push_predictor_paper.statistics.grid_maps import Statistic, block_weights, mean_of, median_of
 
-TOO_WIDE, TOO_NARROW = 0.95, 2.42  # three outputs with exact means and sds twice, or half, what they should be
+TOO_WIDE, TOO_NARROW = 0.95, 2.42  # KL of three outputs with exact means and sds twice, or half, the true ones
 STATISTICS: dict[str, Statistic] = {"mean": mean_of, "median": median_of}
 
 
@@ -34,12 +34,12 @@ class Divergences:
 
     @property
     def of_sd(self) -> Array:
-        """What is left of the divergence (s, p) if the means were right."""
+        """The part of the divergence (s, p) that remains with exact means."""
         return np.asarray(self.correct - self.of_mean)
 
 
 def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:
-    """Of the pushes seen, from the models that gave the answers, one a seed."""
+    """Divergences of the models' answers, one a seed, from the pushes of the grid."""
     mean, sd = (np.array([getattr(cell, what) for cell in grid.seen]) for what in ("mean", "sd"))
     model_mean, model_sd = (np.array([getattr(answer, what) for answer in answers]) for what in ("mean", "sd"))
     correct, printed = (kl(mean, sd, model_mean, model_sd).sum(axis=2) for kl in (gaussian_kl, printed_kl))
@@ -48,7 +48,7 @@ def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:
 
 
 def estimate(values: Array, statistic: Statistic, weights: Array, less: Array | None = None) -> Estimate:
-    """A statistic over the pushes of values (s, p), mean over seeds, of weights (d, p); `less` that of others."""
+    """Mean over seeds of a statistic of values (s, p), with interval from weights (d, p); minus that of `less`."""
     value, draws = by_seed(values, statistic).mean(), np.mean([statistic(seed, weights) for seed in values], axis=0)
     if less is None:
         return of_draws(float(value), draws)
@@ -62,14 +62,14 @@ def by_seed(values: Array, statistic: Statistic) -> Array:
 
 
 def lower(difference: Estimate, below: int, seeds: int) -> Verdict:
-    """Whether a difference is below 0: over pushes, and in how many of the seeds."""
+    """Verdict on whether a difference lies below 0, over pushes and in every seed."""
     if difference.high < 0.0:
         return "holds" if below == seeds else "holds in part"
     return "does not hold" if difference.low > 0.0 else "not decided"
 
 
 def good(median: Estimate) -> Verdict:
-    """What a median KL says of a model."""
+    """Verdict on the median KL of a model."""
     if median.high < TOO_WIDE:
         return "holds"
     if median.high < TOO_NARROW:

@@ -1,4 +1,4 @@
-"""KL divergence of models from repeated pushes, with the right formula and with the one the paper prints."""
+"""KL divergence of models from repeated pushes, by the correct formula and by the one the paper prints."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from push_predictor_paper.study import Study
 
 
 def section(study: Study) -> Section:
-    """The paper's table, what training at other speeds does to it, where the divergence lies."""
+    """The paper's table, the effect of the training speeds, and maps of the divergence."""
     grid = study.reference_grid
     if not grid.seen:
-        note = "No push of the grid was seen often enough for a mean and a deviation: nothing to compare with."
+        note = "No push of the grid has enough repetitions for a mean and a standard deviation."
         return Section("divergence", TITLE, (Finding(CLAIM_MEAN, "not decided", note),), notes=(note,))
     found = all_divergences(study, grid)
     main = found[0][1]
@@ -59,19 +59,17 @@ TITLE = "KL divergence between repeated pushes and models"
 CLAIM_MEAN = "The VHGP is closer to the distributions of repeated pushes than the GP, in mean KL"
 CLAIM_MEDIAN = "The VHGP is closer to the distributions of repeated pushes than the GP, in median KL"
 NOTES = (
-    "KL(repetitions || model): the repetitions of a push, by mean and sd, and the model are taken for Gaussians, the "
-    "three outputs for independent, as in the paper. The unit of the outputs drops out. "
-    "The model's sd is that of an outcome, its own uncertainty included.",
-    "The formula printed in the paper has log(sd2/sd1) where log(sd2^2/sd1^2) must stand. It is no divergence: it is "
-    "negative, −0.077 an output at the least, for a model that is right but 1.4 times as wide. Which of the two the "
-    "paper's figures were computed with is not known.",
-    "The paper's figures are of the measured square: repeated on the robot, models learnt from the MIT set. Ours are "
-    "of pushes on the simulator's plywood, over their first 0.2 s; how its scatter grows with the speed is our guess. "
-    "The paper's maps show 0.2 s; whether its KL does is not told.",
-    f"Neighbouring pushes of the grid share the error of a model, so they are drawn in blocks ({BLOCK[0]:g} of the "
-    "side "
-    f"× {in_degrees(BLOCK[1])}); the spread over seeds beside the intervals tells what other training windows would "
-    "have given.",
+    "KL(repetitions || model). As in the paper, both are taken as Gaussian with independent outputs. The model's sd is "
+    "that of an outcome, its own uncertainty included. KL does not depend on the units of the outputs.",
+    "The formula printed in the paper has log(sd2/sd1) in place of log(sd2^2/sd1^2). It is not a divergence: it is "
+    "negative, down to −0.077 per output, for a model that is right but 1.4 times as wide. The paper does not state "
+    "which formula its figures come from.",
+    "The paper's figures are of the measured square: repetitions on the robot, models learned from the MIT set. "
+    "Ours are of pushes on the simulator's plywood, over their first 0.2 s. How its noise grows with speed is an "
+    "assumption.",
+    f"Neighbouring pushes of the grid share the error of a model. Intervals therefore resample blocks of pushes "
+    f"({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}). The range over seeds shows the effect of other training "
+    "windows.",
 )
 
 
@@ -83,12 +81,11 @@ def _lower(name: str, claim: str, of: Mapping[str, Divergences]) -> Finding:
     return Finding(
         claim,
         lower(difference, below, len(gp)),
-        f"{name.capitalize()} KL {estimate(vhgp, statistic, weights).text()} of the VHGP, "
-        f"{estimate(gp, statistic, weights).text()} of the GP; VHGP less GP {difference.text()}, the same "
-        f"{gp.shape[1]} pushes of the grid drawn for both, in blocks of neighbours; below in {below} of {len(gp)} "
-        "seeds of training windows. Rule: holds if the interval of the difference lies below 0 and so does every "
-        f"seed, in part though not every seed; does not hold if above 0. Difference by the formula as printed: "
-        f"{printed.text()}.",
+        f"{name.capitalize()} KL of the VHGP {estimate(vhgp, statistic, weights).text()}, of the GP "
+        f"{estimate(gp, statistic, weights).text()}. VHGP minus GP: {difference.text()}, paired over {gp.shape[1]} "
+        f"pushes of the grid, in blocks of neighbours; lower in {below} of {len(gp)} seeds of training windows. "
+        f"Difference by the formula as printed: {printed.text()}. Rule: holds if the interval of the difference and "
+        "every seed lie below 0, in part if only the interval does, does not hold if the interval lies above 0.",
     )
 
 
@@ -97,9 +94,10 @@ def _good(vhgp: Divergences, pushes: int) -> Finding:
     return Finding(
         "The VHGP predicts the distribution of a push reasonably well",
         good(median),
-        f"Median KL of the VHGP {median.text()}, mean {mean.text()}, {pushes} pushes. A model with exact means and "
-        f"deviations all twice as wide has {TOO_WIDE}, all half as wide {TOO_NARROW}. Asked of the median's interval: "
-        f"below {TOO_WIDE} (in part: below {TOO_NARROW}; does not hold: above it). The paper's own 5.34 is above.",
+        f"Median KL of the VHGP {median.text()}, mean {mean.text()}, {pushes} pushes (paper: median 5.34). A model "
+        f"with exact means has {TOO_WIDE} if its sds are twice too wide, {TOO_NARROW} if they are half as wide. "
+        f"Rule: holds if the median's interval lies below {TOO_WIDE}, in part if below {TOO_NARROW}, does not hold "
+        "if above it.",
     )
 
 
@@ -109,9 +107,9 @@ def _picture(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences], fl
     return Picture(
         path,
         "Maps of the KL divergence over contact and angle for GP and VHGP, and its distribution over pushes",
-        f"Simulated: KL of {len(grid.seen)} pushes on {grid.surface}, mean of {study.plan.seeds} seeds. Left, middle: "
-        "by contact and angle, one log scale; grey: too few repetitions seen. Right: share of the pushes with no more "
-        "than that, dots at the median push; dotted: what a perfect model is expected to have.",
+        f"KL of {len(grid.seen)} simulated pushes on {grid.surface}, mean of {study.plan.seeds} seeds. Left, middle: "
+        "by contact and angle, one log scale; grey: too few repetitions. Right: cumulative share of the pushes, "
+        "dots at the median; dotted: expected value of a perfect model.",
     )
 
 
@@ -121,12 +119,12 @@ def _floor_note(grid: RepeatedGrid, floor: float) -> str:
         one, two = cell.outcomes[::2], cell.outcomes[1::2]
         moments = (one.mean(axis=0), one.std(axis=0, ddof=1), two.mean(axis=0), two.std(axis=0, ddof=1))
         halves.append(float(gaussian_kl(*moments).sum()))
-    told = estimate(np.array([halves]), mean_of, block_weights(grid.seen)).text(".3f")
+    measured = estimate(np.array([halves]), mean_of, block_weights(grid.seen)).text(".3f")
     expected = np.mean([3.0 * expected_kl((n + 1) // 2, n // 2) for n in (len(cell.outcomes) for cell in grid.seen)])
     return (
-        f"The floor: a perfect model is expected to have a mean KL of {floor:.3f}, by theory for Gaussians. Checked on "
-        f"the repetitions: one half of them from the other has {told}; theory says {expected:.3f} for halves. More "
-        "than that means tails heavier than Gaussian ones, and a floor that lies higher in the same proportion."
+        f"The floor: a perfect model has an expected mean KL of {floor:.3f}, by theory for Gaussians. Check on the "
+        f"repetitions: one half of them from the other has {measured}; theory gives {expected:.3f} for halves. A "
+        "larger value means tails heavier than Gaussian, and a proportionally higher floor."
     )
 
 
@@ -136,10 +134,9 @@ def _speed_note(found: Sequence[Found]) -> tuple[str, ...]:
     (_, every), (alone, slow) = found[1:]
     changes = "; ".join(f"{NAMES[k]} {_change(slow[k], every[k])}" for k in KINDS)
     return (
-        f"Mean KL of models of {alone.n} windows of {alone.name} less that of models of as many windows of all speeds: "
-        f"{changes}. That is not the noise level alone: with the speeds it changes too where training inputs lie, "
-        "how near to the pushes that are judged; this acts on the means above all, one noise level over all speeds on "
-        "the sds.",
+        f"Mean KL of models of {alone.n} windows of {alone.name} minus that of as many windows of all speeds: "
+        f"{changes}. The difference is not the noise level alone. Other speeds also move the training inputs closer to "
+        "the pushes of the grid, which acts mainly on the means; one noise level for all speeds acts on the sds.",
     )
 
 
@@ -155,9 +152,11 @@ def _lacking(study: Study, found: Sequence[object]) -> tuple[str, ...]:
     few = (
         ""
         if len(found) > 1
-        else f"{len(slow_windows(study))} windows at the grid's speed: too few to learn from alone."
+        else f"Only {len(slow_windows(study))} windows are at the grid's speed: too few to train on them alone."
     )
-    measured = "" if not study.measured else "The measured sets hold no grid of repeated pushes: no KL of them here."
+    measured = (
+        "" if not study.measured else "The measured sets have no grid of repeated pushes, so there is no KL of them."
+    )
     return tuple(note for note in (few, measured) if note)
 
 

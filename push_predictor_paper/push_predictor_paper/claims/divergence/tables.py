@@ -37,7 +37,7 @@ HEAD = (
 
 
 def main_table(study: Study, training: Training, of: Mapping[str, Divergences], floor: float) -> Table:
-    """The paper's table, its figures beside ours."""
+    """The paper's table, its figures next to ours."""
     pushes, again = len(study.reference_grid.seen), study.plan.repetitions
     rows = []
     for kind in KINDS:
@@ -48,11 +48,10 @@ def main_table(study: Study, training: Training, of: Mapping[str, Divergences], 
         rows.append((NAMES[kind], *cells, *_seed_range(d.correct), *PAPER.get(kind, ("–", "–"))))
     rows.append(("a perfect model", f"{floor:.3f}", *("–",) * 7))
     caption = (
-        f"Simulated: KL (nats, three outputs) of {pushes} pushes of the grid, {again} repetitions each, from models "
-        f"learnt from {training.n} windows of all speeds of {' on '.join(study.simulated.reference)}, none of the "
-        f"grid; mean of {study.plan.seeds} seeds. Beneath: 95 % interval, blocks of neighbouring pushes of the grid "
-        "drawn anew. Over seeds: "
-        "least to largest. A perfect model: its expected KL, as so many repetitions know mean and sd only so well."
+        f"KL (nats, three outputs) of models from {pushes} simulated pushes of the grid, {again} repetitions each. "
+        f"Models of {training.n} windows of all speeds of {' on '.join(study.simulated.reference)}, none of the grid; "
+        f"mean of {study.plan.seeds} seeds. Beneath: 95 % interval from resampling blocks of neighbouring pushes. Over "
+        "seeds: least to largest. A perfect model: the expected KL with so many repetitions."
     )
     return Table(caption, HEAD, tuple(rows))
 
@@ -64,7 +63,7 @@ def _seed_range(values: Array) -> tuple[str, str]:
 
 
 def training_table(study: Study, found: Sequence[Found]) -> Table:
-    """What other training windows do, in all and by means and sds."""
+    """The effect of other training windows, in total and by means and sds."""
     rows = []
     for training, of in found:
         for kind in KINDS:
@@ -74,7 +73,7 @@ def training_table(study: Study, found: Sequence[Found]) -> Table:
             figures = (estimate(values, statistic, d.weights).cell() for values, statistic in parts)
             rows.append((f"{training.name}, {training.n} windows: {NAMES[kind]}", *figures, ratios))
     head = (
-        "learnt from",
+        "trained on",
         "mean KL",
         "median KL",
         "mean KL of wrong means",
@@ -82,8 +81,8 @@ def training_table(study: Study, found: Sequence[Found]) -> Table:
         "sd predicted / seen, median (dx / dy / rotation)",
     )
     caption = (
-        "Simulated: what training at other speeds changes. The same pushes and intervals as above, models learnt "
-        f"from windows of all speeds, {_slow_words(study)}, and from as few of all speeds to compare with."
+        "The effect of the training speeds. Simulated; pushes and intervals as above. Models of windows of all speeds, "
+        f"{_slow_words(study)}, and of as few windows of all speeds."
     )
     return Table(caption, head, tuple(rows))
 

@@ -1,4 +1,4 @@
-"""What learning curves say: is the circle easiest, does the surface matter, is performance flat before 1000."""
+"""Verdicts on learning curves: is the circle easiest, does the surface matter, does performance saturate?"""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ def word(shape: str) -> str:
 
 
 def pushes_of(corpus: Corpus, pairs: Sequence[Pair]) -> int:
-    """How many pushes these sets hold."""
+    """The number of pushes in these sets."""
     return sum(len(corpus.sets[pair].table.pushes) for pair in pairs)
 
 
 def judged(found: Curves, pairs: Sequence[Pair], n: int) -> int:
-    """How many pushes of these sets were judged, split by push."""
+    """The number of test pushes of these sets, split by push."""
     return sum(len(found.push_scores(pair, KIND, "push", n).windows) for pair in pairs)
 
 
 def circle(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
-    """Is the circle easier than each other shape: differences paired by surface, mean over folds, split by push."""
+    """Is the circle easier than each other shape? Differences paired by surface, mean over folds, split by push."""
     claim = f"The circle is easier to learn than the other shapes ({corpus.name})"
     others = sorted({shape for shape, _ in pairs} - {CIRCLE})
     sizes = found.sizes(pairs, KIND, "push")
     if not sizes or not others or CIRCLE not in {shape for shape, _ in pairs}:
-        return Finding(claim, "not decided", f"{corpus.name}: needs the circle and another shape at a common size.")
+        return Finding(claim, "not decided", f"{corpus.name}: no circle and other shape with a common training size.")
     told, wins, losses = [], 0, 0
     for shape in others:
         for name, measure, form in MEASURES:
@@ -53,48 +53,49 @@ def circle(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
             told.append(f"{word(shape)} {name} {gap.text(form)}")
     verdict = _counted(wins, losses, 2 * len(others))
     sentence = (
-        f"The other shape's figure less the circle's at n = {sizes[-1]}, mean over folds, {SPLIT_WORDS['push']}, "
-        f"{judged(found, pairs, sizes[-1])} pushes; mean over surfaces with its interval, each surface one difference "
-        f"(Student; one surface gives none): {'; '.join(told)}. Holds if all of these lie above 0, in part if half of "
-        "them do, does not hold if some lie below and fewer above; the intervals are not corrected for their number."
+        f"Score of the other shape minus that of the circle at n = {sizes[-1]}: {'; '.join(told)}. Mean over folds, "
+        f"{SPLIT_WORDS['push']}, {judged(found, pairs, sizes[-1])} pushes; interval over surfaces, each one difference "
+        "(Student; one surface gives none). Rule: holds if all of these lie above 0, in part if half of them do, does "
+        "not hold if some lie below and fewer above. The intervals are not corrected for their number."
     )
     return Finding(claim, verdict, sentence)
 
 
 def surface(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
-    """Does the surface matter little: spread over surfaces against spread over shapes, split by push."""
+    """Does the surface matter little? Spread over surfaces against spread over shapes, split by push."""
     claim = f"The model is not very sensitive to the surface ({corpus.name})"
     sizes, whole = found.sizes(pairs, KIND, "push"), _complete(pairs)
     if not sizes or not whole:
-        return Finding(claim, "not decided", f"{corpus.name}: needs every shape on every one of several surfaces.")
+        return Finding(claim, "not decided", f"{corpus.name}: not every shape is there on each of several surfaces.")
     ratios, spreads = [], []
     for name, figure in FIGURES:
         ratio, spread = _spreads(found, whole, sizes[-1], figure)
         ratios.append(ratio)
-        spreads.append(f"{name}: surfaces {spread[0]:.3g}, shapes {spread[1]:.3g}, drawing pushes {spread[2]:.3g}")
+        spreads.append(f"{name}: surfaces {spread[0]:.3g}, shapes {spread[1]:.3g}, resampling pushes {spread[2]:.3g}")
     sentence = (
-        f"At n = {sizes[-1]}, {SPLIT_WORDS['push']}, {judged(found, pairs, sizes[-1])} pushes, standard deviation of "
-        f"the means by group: {'; '.join(spreads)}. Surfaces over shapes: NMSE {ratios[0].text()}, NLPD "
-        f"{ratios[1].text()} (interval by drawing the pushes of each set anew: for these very surfaces and shapes, not "
-        f"for others). Holds if both intervals end below {LITTLE}, does not hold if both begin above {AS_MUCH:g}, in "
-        f"part if only one ends below {LITTLE}, or both below {AS_MUCH:g}."
+        f"Spread over surfaces divided by spread over shapes: NMSE {ratios[0].text()}, NLPD {ratios[1].text()}. "
+        f"Standard deviations of the means at n = {sizes[-1]}: {'; '.join(spreads)}. "
+        f"{SPLIT_WORDS['push'].capitalize()}, {judged(found, pairs, sizes[-1])} pushes; intervals resample the "
+        "pushes of each set and hold for these surfaces and shapes only. Rule: holds if both intervals end below "
+        f"{LITTLE}; does not hold if both begin above {AS_MUCH:g}; in part if one ends below {LITTLE} or both below "
+        f"{AS_MUCH:g}."
     )
     return Finding(claim, _little(ratios), sentence)
 
 
 def saturation(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
-    """Is performance flat before 1000 windows: gain of the last doubling up to there, split by push."""
-    claim = f"Performance saturates with less than {ENOUGH} samples ({corpus.name})"
+    """Is performance flat before 1000 windows? Gain of the last doubling up to there, split by push."""
+    claim = f"Performance saturates below {ENOUGH} samples ({corpus.name})"
     sizes = [n for n in found.sizes(pairs, KIND, "push") if n <= ENOUGH]
     if len(sizes) < 2:
         return Finding(claim, "not decided", f"{corpus.name}: fewer than two training sizes.")
     nmse, nats = _last_gains(found, pairs, sizes[-2], sizes[-1])
     sentence = (
-        f"From n = {sizes[-2]} to {sizes[-1]} a doubling lowers the NMSE by {_percent(nmse)}, the NLPD by "
-        f"{nats.text()} nats; {_over(pairs)}, {SPLIT_WORDS['push']}, "
-        f"{judged(found, pairs, sizes[-1])} pushes. {_beyond(corpus, found)}Saturated means: a doubling gains less "
-        f"than {SATURATED:.0%} of the NMSE and less than {SATURATED_NATS:g} nats with the whole interval; in part if "
-        f"one of the two is; does not hold if neither is and one surely falls up to n = {ENOUGH}; else not decided."
+        f"From n = {sizes[-2]} to {sizes[-1]} a doubling lowers the NMSE by {_percent(nmse)} and the NLPD by "
+        f"{nats.text()} nats; {_over(pairs)}, {SPLIT_WORDS['push']}, {judged(found, pairs, sizes[-1])} pushes. "
+        f"{_beyond(corpus, found)}Rule: a score is flat if the whole interval of its gain lies below {SATURATED:.0%} "
+        f"(NMSE) or {SATURATED_NATS:g} nats (NLPD). Holds if both are flat, in part if one is; does not hold if "
+        f"neither is and one clearly still falls at n = {ENOUGH}; else not decided."
     )
     return Finding(claim, _flat(nmse, nats, sizes[-1] >= ENOUGH), sentence)
 
@@ -188,14 +189,14 @@ def _gains_by_push(found: Curves, pair: Pair, n: int, more: int) -> tuple[Estima
 
 
 def _over(pairs: Sequence[Pair]) -> str:
-    """What the interval of a gain is over."""
+    """The kind of interval of a gain, in words."""
     if len(pairs) == 1:
         return "one set, all folds, interval by push"
     return f"mean over {len(pairs)} sets, each the mean of its folds, with its interval (Student)"
 
 
 def _beyond(corpus: Corpus, found: Curves) -> str:
-    """What a still larger size adds, on the reference pair."""
+    """The gain from a still larger size, on the reference pair."""
     sizes = found.sizes([corpus.reference], KIND, "push")
     if len(sizes) < 2 or sizes[-1] <= ENOUGH:
         return ""

@@ -26,24 +26,24 @@ from push_predictor_paper.section import Section, Table, joined
 from push_predictor_paper.study import Study
 
 FEWEST_FOR_BAND = 3  # folds
-AXES = (("surface", 1), ("shape", 0))  # what a figure tells apart, and its place in a pair
+AXES = (("surface", 1), ("shape", 0))  # what a figure compares, and its place in a pair
 
 
-LEFT_OUT = (
-    "Folds share training windows, and all draws of the random split are judged on one set of test windows: what "
-    "another recording, or other test windows, would change is not in the interval."
+NOT_INCLUDED = (
+    "Folds share training windows, and all draws of the random split share one test set. The intervals do not include "
+    "the effect of another recording or other test windows."
 )
 AXIS_NAMES = {"NMSE": "NMSE, sum of 3", "NLPD": "NLPD, sum of 3 (SI)"}
 SIMULATOR = (
-    "The simulated surfaces differ in the level of their friction, in how it scatters over the table and in how badly "
-    "slider and table fit (push_predictor/simulation/surface.py). A slow push does not feel the level; the scatter is "
-    "representative, not measured. How much the surface matters here is therefore what we put in, and says nothing "
-    "about real materials. A circle's contact point is redundant here as on the rig, up to its uneven pressure."
+    "The simulated surfaces differ in the level of their friction, in its variation over the table, and in the fit of "
+    "slider and table (push_predictor/simulation/surface.py). A slow push does not depend on the level; the variation "
+    "is representative, not measured. How much the surface matters here is an assumption and says nothing about real "
+    "materials. As on the rig, the contact point of a circle is redundant up to uneven pressure."
 )
 
 
 def section(study: Study) -> Section:
-    """The VHGP's learning curves on every pair of shape and surface of every corpus."""
+    """Learning curves of the VHGP on every pair of shape and surface of every corpus."""
     parts = [(corpus.title, _of_corpus(study, corpus, k)) for k, corpus in enumerate(study.corpora)]
     return joined("learning_curves", "Learning curves: surfaces and shapes", parts)
 
@@ -62,7 +62,7 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
 def _picture(
     study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair], number: int, axis: tuple[str, int]
 ) -> Picture:
-    """NMSE and NLPD over n, a row for each split: a thick line a group, thin lines its members."""
+    """NMSE and NLPD by training size, one row per split: a thick line per group, thin lines for its members."""
     name, place = axis
     rows = [
         [
@@ -80,11 +80,10 @@ def _picture(
     draw(path, (7.4, 6.4), lambda figure: paint_panels(figure, rows))
     other = "shape" if name == "surface" else "surface"
     caption = (
-        f"VHGP against training size, per {name} (thick: mean over {other}s, band: 95 % interval over folds or draws, "
-        f"of fewer than {FEWEST_FOR_BAND} whiskers from the least to the largest; thin: each {other}). Above: "
-        f"{SPLIT_WORDS['push']}; below: {SPLIT_WORDS['random']}. Sums over the three outputs, NLPD in SI units; a "
-        f"triangle at the top marks a mean beyond the axis. {LEFT_OUT} Pushes: {corpus.name}, "
-        f"{pushes_of(corpus, pairs)} in all."
+        f"VHGP by training size, per {name}. Thick: mean over {other}s, with 95 % interval over folds or draws (with "
+        f"fewer than {FEWEST_FOR_BAND}, whiskers show their range); thin: each {other}. Above: {SPLIT_WORDS['push']}; "
+        f"below: {SPLIT_WORDS['random']}. Sums over the three outputs, NLPD in SI units. A triangle at the top marks a "
+        f"mean beyond the axis. {NOT_INCLUDED} Pushes: {corpus.name}, {pushes_of(corpus, pairs)} in all."
     )
     return Picture(path, f"Learning curves of the VHGP per {name}: NMSE and NLPD over training size", caption)
 
@@ -105,20 +104,20 @@ def _lines(found: Curves, pairs: Sequence[Pair], split: SplitName, measure: Meas
 
 
 def band_or_range(values: Sequence[float]) -> Estimate:
-    """The mean over folds with Student's interval; of few folds the least and the largest."""
+    """The mean over folds with Student's interval; with few folds, their range."""
     if len(values) >= FEWEST_FOR_BAND:
         return over_seeds(values)
     return Estimate(float(np.mean(values)), min(values), max(values))
 
 
 def _table(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Table:
-    """Every pair at the last size that all of them have."""
+    """A row per pair, at the largest size that all pairs have."""
     rows = [(f"{word(shape)}, {material}", [(shape, material)]) for shape, material in pairs]
     return _scores_table(corpus, found, pairs, rows, "VHGP by pair of shape and surface at the last common size")
 
 
 def _group_table(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Table:
-    """The means by surface and by shape."""
+    """A row per surface and per shape: means over their pairs."""
     rows = [
         (f"{word(name)} (mean of {len(group)})", group)
         for _, place in AXES
@@ -139,9 +138,9 @@ def _scores_table(
         for name, group in groups
     )
     caption = (
-        f"{what}. Pushes: {corpus.name}, {pushes_of(corpus, pairs)} in all. By push: {SPLIT_WORDS['push']}. Interval "
-        f"of the mean over folds (by push) or draws of the training windows (random), Student. {LEFT_OUT} The paper "
-        "gives these curves as figures, without numbers."
+        f"{what}. Pushes: {corpus.name}, {pushes_of(corpus, pairs)} in all. By push: {SPLIT_WORDS['push']}. Student's "
+        f"interval of the mean over folds (by push) or draws of training windows (random). {NOT_INCLUDED} The paper "
+        "shows these curves without numbers."
     )
     return Table(caption, ("", *head), rows)
 
@@ -152,8 +151,8 @@ def _short(split: SplitName) -> str:
 
 def _notes(study: Study, corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> tuple[str, ...]:
     notes = [
-        f"{corpus.name}: {_short(split)}, n = {', '.join(map(str, missing))} was planned and is not shown in the "
-        "means: a set is too small for it."
+        f"{corpus.name}: {_short(split)}, the means do not show n = {', '.join(map(str, missing))}, because a set is "
+        "too small for it."
         for split in SPLITS
         if (missing := sorted(set(sizes_tried(study.plan, False)) - set(found.sizes(pairs, KIND, split))))
     ]

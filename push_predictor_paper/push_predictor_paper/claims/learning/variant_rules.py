@@ -1,4 +1,4 @@
-"""Which variant of the kernels would become the default, and by which rule."""
+"""The rule by which a variant of the kernels would become the default, and the findings."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ OTHERS = tuple(name for name in CHOICES if name != PLAIN)
 REPORTED = "Matérn-5/2 + nugget"
 Cell = tuple[int, SplitName, str]  # training windows, split, variant
 RULE = (
-    "A variant is accepted if on both splits its exact NLPD at the largest size is lower with the whole 95 % interval, "
-    "at no size higher with the whole interval, and its NMSE at the largest size not higher with the whole interval; "
-    f"the interval of the gain is widened for the {len(OTHERS)} variants that try (Bonferroni), those of the losses "
-    "are not."
+    "Rule for a variant, on both splits: its exact NLPD at the largest size is lower with the whole 95 % interval, at "
+    "no size higher with the whole interval, and its NMSE at the largest size is not higher with the whole interval. "
+    f"The interval of the gain is widened for {len(OTHERS)} variants (Bonferroni), those of the losses are not."
 )
 
 
@@ -67,7 +66,7 @@ class Variants:
 
     @cached_property
     def differences(self) -> dict[tuple[str, int, SplitName, str], Estimate]:
-        """By quantity and cell: the variant's less the plain kernel's, of the same pushes."""
+        """By quantity and cell: the variant's score minus the plain kernel's, of the same pushes."""
         return {
             (quantity, n, split, name): difference_by_push(self.scores[n, split, PLAIN], push_scores, figure)
             for quantity, figure in QUANTITIES.items()
@@ -76,7 +75,7 @@ class Variants:
         }
 
     def gain(self, n: int, split: SplitName, name: str) -> Estimate:
-        """The difference in exact NLPD."""
+        """The variant's exact NLPD minus the plain kernel's."""
         return self.differences["exact NLPD", n, split, name]
 
 
@@ -95,41 +94,41 @@ def accepts(variants: Variants, split: SplitName, name: str) -> bool:
 
 
 def gain_finding(variants: Variants) -> Finding:
-    """Whether the gain that others report is there, and survives."""
+    """Is the reported gain there, and does it survive holding out whole pushes?"""
     gains = {split: [variants.gain(n, split, REPORTED) for n in variants.sizes] for split in SPLITS}
-    told = "; ".join(
+    gains_text = "; ".join(
         f"{n} windows: {push.text('+.3f')} by push, {random.text('+.3f')} random"
         for n, push, random in zip(variants.sizes, gains["push"], gains["random"], strict=True)
     )
     return Finding(
-        "Matérn-5/2 with a nugget gains over the squared exponential (others: 0.05 to 0.07 nats), also when "
-        f"whole pushes are left out ({variants.name})",
+        "Matérn-5/2 with a nugget beats the squared exponential, also when whole pushes are held out "
+        f"({variants.name})",
         _survives(gains["push"]),
-        f"Exact NLPD less the plain kernel's, sum of the outputs, nats: {told}; {_pushes(variants)}. The claim holds "
-        "if the interval by push is below zero at every size, in part if at some, and not if at none and above zero at "
-        "one.",
+        f"Exact NLPD minus that of the plain kernel, sum of the outputs, nats: {gains_text} (others report −0.05 to "
+        f"−0.07). {_pushes(variants)}. Rule: holds if the interval by push lies below zero at every size, in part if "
+        "at some, does not hold if at none and above zero at one.",
         "beyond the paper",
     )
 
 
 def rule_finding(variants: Variants) -> Finding:
-    """Which variant would become the default on these pushes."""
+    """Which variant would become the default on these pushes?"""
     chosen = accepted(variants)
     tempting = [name for name in OTHERS if accepts(variants, "random", name) and name not in chosen]
     return Finding(
-        f"Another kernel than the plain squared exponential earns its place as the default ({variants.name})",
+        f"A kernel other than the plain squared exponential should be the default ({variants.name})",
         _rule_verdict(variants, chosen, tempting),
-        f"{RULE} Accepted: {', '.join(chosen) or 'none'}. The random split alone would accept "
-        f"{_more(tempting, chosen)}. By push at {variants.sizes[-1]} windows: "
-        f"{_told(variants, 'push')} nats; {_pushes(variants)}. The claim holds if a variant is accepted, in part if "
-        "the random split alone accepts one, and not if every variant is worse with its whole interval by push.",
+        f"Accepted: {', '.join(chosen) or 'none'}. The random split alone would accept {_more(tempting, chosen)}. "
+        f"Difference by push at {variants.sizes[-1]} windows, nats: {_differences(variants, 'push')}. "
+        f"{_pushes(variants)}. {RULE} The claim holds if a variant is accepted, in part if the random split alone "
+        "accepts one, and does not hold if every variant is worse with its whole interval by push.",
         "beyond the paper",
     )
 
 
 def _more(tempting: Sequence[str], chosen: Sequence[str]) -> str:
     if not tempting:
-        return "no other" if chosen else "none either"
+        return "no other" if chosen else "none"
     return f"{', '.join(tempting)} {'too' if chosen else 'instead'}"
 
 
@@ -147,7 +146,7 @@ def _survives(by_push: Sequence[Estimate]) -> Verdict:
     return "does not hold" if any(e.low > 0.0 for e in by_push) else "not decided"
 
 
-def _told(variants: Variants, split: SplitName) -> str:
+def _differences(variants: Variants, split: SplitName) -> str:
     gains = ((name, variants.gain(variants.sizes[-1], split, name)) for name in OTHERS)
     return ", ".join(f"{name} {gain.text('+.3f')}" for name, gain in gains)
 
@@ -157,7 +156,5 @@ def _pushes(variants: Variants) -> str:
     push_scores, fits = variants.scores[largest, "push", PLAIN], variants.fits[largest, "push", PLAIN]
     most = max(variants.fits[n, "push", PLAIN] for n in variants.sizes)
     fewer = f" (of {most} at smaller sizes)" if fits < most else ""
-    tested = (
-        f"{len(push_scores.push_id)} tested pushes of {fits} {'fold' if fits == 1 else 'folds'} at {largest} windows"
-    )
+    tested = f"{len(push_scores.push_id)} test pushes of {fits} {'fold' if fits == 1 else 'folds'} at {largest} windows"
     return f"{tested}{fewer}, {SPLIT_WORDS['push']}"

@@ -1,4 +1,4 @@
-"""How alike the maps of the models and of the repetitions are."""
+"""Agreement between the maps of models and of repetitions."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ NAMES = ("dx", "dy", "rotation")
 
 @dataclass(frozen=True)
 class Likeness:
-    """Of one map of a model with that of the repetitions: correlation, squared error over the map's variance, and the
-    model's root mean square over the repetitions'."""
+    """Agreement of one map of a model with that of the repetitions.
+
+    error: squared error over the map's variance. size: root mean square of the model over that of the repetitions.
+    """
 
     correlation: Estimate
     error: Estimate
@@ -34,8 +36,10 @@ QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the
 
 
 def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]) -> Likenesses:
-    """For mean, sd of an outcome, sd of the noise alone, of each model, asked at these pushes; answers: one for each
-    draw of its training windows, over which figures are averaged."""
+    """Agreement in mean, sd of an outcome and sd of the noise alone, for each model at these pushes.
+
+    answers: by model, one for each draw of its training windows; the results are averaged over them.
+    """
     truth = {"mean": np.array([cell.mean for cell in cells]), "sd": np.array([cell.sd for cell in cells])}
     truth["process_sd"], weights = truth["sd"], block_weights(cells)
     return {
@@ -48,26 +52,26 @@ def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]
 
 
 def agreement_findings(found: Likenesses, pushes: int) -> tuple[Finding, Finding]:
-    """Is the mean map alike, is the map of the deviation."""
+    """Do the maps of mean and of standard deviation agree?"""
     mean, sd, plain = found["mean", "VHGP"], found["sd", "VHGP"], found["sd", "GP"]
     first = Finding(
-        "The model's map of the mean is much like that of the repetitions",
+        "The model's map of the mean agrees well with that of the repetitions",
         _verdict(mean, MEAN_ALIKE),
-        f"Correlation over {pushes} pushes, VHGP with repetitions, mean over draws of training windows: {_told(mean)}; "
-        f"{_errors(mean)}. {_rule(MEAN_ALIKE)}",
+        f"Correlation of VHGP and repetitions over {pushes} pushes, mean over draws of training windows: "
+        f"{_correlations(mean)}; {_errors(mean)}. {_rule(MEAN_ALIKE)}",
     )
     second = Finding(
-        "The model's map of the standard deviation is to a certain degree that of the repetitions",
+        "The model's map of the standard deviation agrees to a certain degree with that of the repetitions",
         _verdict(sd, SD_ALIKE),
-        f"Correlation over {pushes} pushes, VHGP with repetitions, mean over draws of training windows: {_told(sd)}; "
-        f"{_errors(sd)}. The GP, whose noise is "
-        f"one for all pushes: {_told(plain)}. {_rule(SD_ALIKE)}",
+        f"Correlation of VHGP and repetitions over {pushes} pushes, mean over draws of training windows: "
+        f"{_correlations(sd)}; {_errors(sd)}. The GP has one noise level for all pushes: {_correlations(plain)}. "
+        f"{_rule(SD_ALIKE)}",
     )
     return first, second
 
 
 def agreement_table(found: Likenesses, caption: str) -> Table:
-    """A row per quantity and output, correlation and NMSE of every model."""
+    """A row per quantity and output: correlation, NMSE and RMS ratio of every model."""
     models = list(dict.fromkeys(model for _, model in found))
     head = ("", *(f"{model}: {what}" for model in models for what in ("correlation", "NMSE", "RMS ratio")))
     rows = [
@@ -97,7 +101,7 @@ def _likeness(models: Sequence[Array], truth: Array, weights: Array) -> Likeness
 
 
 def _verdict(outputs: tuple[Likeness, ...], asked: float) -> Verdict:
-    """Of the lower and the upper ends of the correlations."""
+    """Verdict by the ends of the correlations' intervals."""
     if any(not np.isfinite(like.correlation.low) for like in outputs):
         return "not decided"
     if all(like.correlation.low > asked for like in outputs):
@@ -109,18 +113,18 @@ def _verdict(outputs: tuple[Likeness, ...], asked: float) -> Verdict:
 
 def _rule(asked: float) -> str:
     return (
-        f"Rule: holds if the intervals of all three lie above {asked:g}, does not hold if all lie below, in part if "
-        "one of them lies above."
+        f"Rule: holds if the intervals of all three outputs lie above {asked:g}, in part if one does, does not hold if "
+        "all lie below."
     )
 
 
-def _told(outputs: tuple[Likeness, ...]) -> str:
+def _correlations(outputs: tuple[Likeness, ...]) -> str:
     return ", ".join(f"{name} {like.correlation.text()}" for name, like in zip(NAMES, outputs, strict=True))
 
 
 def _errors(outputs: tuple[Likeness, ...]) -> str:
     parts = ", ".join(f"{name} {like.error.value:.2f}" for name, like in zip(NAMES, outputs, strict=True))
-    return f"NMSE (1: as bad as one number for all pushes) {parts}"
+    return f"NMSE (1: as bad as a constant) {parts}"
 
 
 def _cells(like: Likeness) -> tuple[str, str, str]:

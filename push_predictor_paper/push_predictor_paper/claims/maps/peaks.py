@@ -1,4 +1,4 @@
-"""Where each output is largest: by repetitions, by the model, and where the paper says it is."""
+"""Where each output is largest: by repetitions, by the model, and in the paper."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ NAMED: dict[str, tuple[Place, ...]] = {
 }
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 STEP: Place = (0.1, 0.1)  # of the side, rad: the paper's grid
-ENOUGH = (np.inf, 0.9, np.inf)  # of the largest: where the paper says only that it is far
+ENOUGH = (np.inf, 0.9, np.inf)  # of the largest; for dy the paper says only that the slider moves far
 NEARLY = (0.9, 0.75, 0.9)  # of the largest: holds in part
 PART = ".1%"
-FEW = 2  # places that are told one by one
+FEW = 2  # places that are listed one by one
 SCALES = (1e3, 1e3, 180.0 / np.pi)
 NAMES = ("dx", "dy", "rotation")
 UNITS = ("mm", "mm", "deg")
 CLAIMS = (
-    "The slider moves farthest ahead when it is pushed at the middle of a side, square to it",
-    "The slider moves far sideways when it is pushed at c = 0.7, β = 40° (the paper's signs)",
-    "The slider turns most when it is pushed between middle and corner, at c = 0.75, β = +30° or c = 0.25, β = −30° "
+    "The slider moves farthest forward when pushed at the middle of a side, along its normal",
+    "The slider moves far sideways when pushed at c = 0.7, β = 40° (the paper's signs)",
+    "The slider turns most when pushed between middle and corner, at c = 0.75, β = +30° or c = 0.25, β = −30° "
     "(the paper's signs)",
 )
 
 
 @dataclass(frozen=True)
 class Peaks:
-    """Of dx, dy, dtheta in absolute value: by repetitions, and by models of several draws of training rows.
+    """Largest |dx|, |dy|, |dtheta|: by repetitions, and by models of several draws of training rows.
 
-    handedness: rotation (deg) of the paper's push less that of the push mirrored, by repetitions and by the models.
+    handedness: rotation (deg) of the paper's push minus that of its mirror image, by repetitions and by the models.
     """
 
     repeated: tuple[Peak, ...]
@@ -54,7 +54,7 @@ class Peaks:
 
 
 def peaks_of(grid: RepeatedGrid, models: Sequence[ModelMap]) -> Peaks:
-    """All of them; models of several draws of training rows."""
+    """Find all peaks; models: one per draw of training rows."""
     drawn = np.abs(on_grid(grid, redrawn(grid.seen)[0]))
     shown = np.abs(grid.mean)
     repeated = [
@@ -71,7 +71,7 @@ def peaks_of(grid: RepeatedGrid, models: Sequence[ModelMap]) -> Peaks:
 
 
 def model_peaks(models: Sequence[ModelMap]) -> tuple[Peak, ...]:
-    """Of the mean of the maps of models of several draws of training rows; values are means over the draws."""
+    """Peaks of the mean map of models of several draws of training rows; values are means over the draws."""
     seeds = np.abs(np.array([model.mean for model in models]))
 
     together = np.abs(np.mean([model.mean for model in models], axis=0))
@@ -85,13 +85,13 @@ def model_peaks(models: Sequence[ModelMap]) -> tuple[Peak, ...]:
 
 
 def peak_findings(peaks: Peaks, pushes: int) -> tuple[Finding, ...]:
-    """One for each output, and one for the handedness of the rotation."""
+    """A finding for each output, and one for the handedness of the rotation."""
     return (*(_finding(peaks, k, pushes) for k in range(len(OUTPUTS))), _handedness_finding(peaks))
 
 
 def peak_table(peaks: Peaks, caption: str) -> Table:
-    """Values, places and what the paper's push reaches."""
-    head = ("", "largest", "where", "falls in 95 % of the draws at", "the paper's push (our signs)", "it reaches")
+    """A row per output and source: value, place, and the value at the paper's push."""
+    head = ("", "largest", "where", "where, in 95 % of the draws", "the paper's push (our signs)", "it reaches")
     rows = []
     for k, name in enumerate(NAMES):
         for source, found in (("repetitions", peaks.repeated[k]), ("VHGP", peaks.learnt[k])):
@@ -118,7 +118,7 @@ def peak_json(found: Peak) -> dict[str, Any]:
 
 
 def region(places: Sequence[Place]) -> str:
-    """A few pushes one by one, of more the box about them, mirrored onto one half of the side."""
+    """A few places one by one; of more, their range, mirrored onto one half of the side."""
     if len(places) <= FEW:
         return " or ".join(map(told, places))
     contacts, angles = np.array([place if place[0] >= 0.5 else (1.0 - place[0], -place[1]) for place in places]).T
@@ -132,12 +132,12 @@ def _span(ends: Sequence[str]) -> str:
 
 
 def scaled(estimate: Estimate, factor: float) -> Estimate:
-    """In other units."""
+    """The estimate in other units."""
     return Estimate(estimate.value * factor, estimate.low * factor, estimate.high * factor)
 
 
 def agreed(one: Verdict, other: Verdict) -> Verdict:
-    """Of repetitions and model: what both say; in part if the claim holds by one of them only."""
+    """Joint verdict of repetitions and model; in part if the claim holds by one of them only."""
     if one == other:
         return one
     return "holds in part" if {one, other} & {"holds", "holds in part"} else "not decided"
@@ -148,10 +148,10 @@ def _finding(peaks: Peaks, k: int, pushes: int) -> Finding:
     verdict = agreed(_verdict(repeated, k), _verdict(learnt, k))
     sentence = (
         f"Largest |{NAMES[k]}| of {pushes} repeated pushes: {scaled(repeated.value, SCALES[k]).text()} {UNITS[k]} at "
-        f"{told(repeated.place)}; in 95 % of the draws at {region(repeated.places)}. VHGP: at {told(learnt.place)}, "
-        f"over draws of training windows {region(learnt.places)}. The paper's push, {' or '.join(map(told, named))} in "
-        "our signs, reaches "
-        f"{repeated.reach.text(PART)} of the largest by repetitions, {learnt.reach.text(PART)} by the VHGP. {_rule(k)}"
+        f"{told(repeated.place)}; in 95 % of the draws at {region(repeated.places)}. VHGP: at {told(learnt.place)}; "
+        f"over draws of training windows at {region(learnt.places)}. The paper's push "
+        f"({' or '.join(map(told, named))} in our signs) reaches {repeated.reach.text(PART)} of the largest by "
+        f"repetitions, {learnt.reach.text(PART)} by the VHGP. {_rule(k)}"
     )
     return Finding(CLAIMS[k], verdict, sentence)
 
@@ -168,12 +168,12 @@ def _verdict(found: Peak, k: int) -> Verdict:
 
 
 def _rule(k: int) -> str:
-    reached = f" or that push surely reaches {ENOUGH[k]:.0%} of it" if np.isfinite(ENOUGH[k]) else ""
+    reached = f", or if that push reaches {ENOUGH[k]:.0%} of it" if np.isfinite(ENOUGH[k]) else ""
     return (
         f"Rule: holds if in all of those draws the largest lies within {STEP[0]:g} of the side and "
-        f"{in_degrees(STEP[1])} of the paper's push{reached}; in part if in some of them, or if that push surely "
-        f"reaches {NEARLY[k]:.0%}; does not hold if none of this and it surely reaches less (surely: by the whole "
-        "interval); by repetitions and by the VHGP, in part if by one of them only."
+        f"{in_degrees(STEP[1])} of the paper's push{reached}; in part if in some of them, or if that push reaches "
+        f"{NEARLY[k]:.0%}; does not hold if it reaches less. Reaching is by the whole interval. By repetitions and by "
+        "the VHGP; in part if by one of them only."
     )
 
 
@@ -186,14 +186,13 @@ def _handedness_finding(peaks: Peaks) -> Finding:
     verdicts = [_sign(estimate) for estimate in peaks.handedness]
     repeated, learnt = (estimate.text() for estimate in peaks.handedness)
     return Finding(
-        "Of a push between middle and corner the slider turns more if it leads away from the middle (the paper's "
+        "Between middle and corner, a push that leads away from the middle turns the slider more (the paper's "
         "handedness)",
         agreed(verdicts[0], verdicts[1]),
-        f"|rotation| at c = 0.75, −30° less that at +30° (our signs; mean with c = 0.25 mirrored): {repeated} deg by "
-        f"repetitions, {learnt} deg by the VHGP over draws of training windows. Rule: holds if both intervals lie "
-        "above zero, does not hold "
-        "if both below, in part if one of them lies above. Geometry asks for it: the force's lever about the centre is "
-        "longer.",
+        f"|rotation| at c = 0.75, −30° minus that at +30° (our signs; mean with c = 0.25 mirrored): {repeated} deg "
+        f"by repetitions, {learnt} deg by the VHGP over draws of training windows. Rule: holds if both intervals lie "
+        "above zero, in part if one does, does not hold if both lie below. Geometry suggests it: the force has a "
+        "longer lever about the centre.",
     )
 
 

@@ -1,4 +1,4 @@
-"""The paper's maps of mean and standard deviation over contact and angle, model against repetitions."""
+"""The paper's maps of mean and standard deviation over contact and angle, of model and repetitions."""
 
 from __future__ import annotations
 
@@ -48,11 +48,13 @@ CLOSE = 2.0  # standard errors
 
 
 def section(study: Study) -> Section:
-    """Both figures, where each output is largest, how alike the maps are."""
+    """Maps, the places of their maxima, and the agreement of model and repetitions."""
     grid = study.reference_grid
     if len(grid.seen) < FEWEST_PUSHES:
-        few = f"{len(grid.seen)} pushes of the grid were seen often enough; {FEWEST_PUSHES} are asked for."
-        return Section("maps", TITLE, (Finding("The model's maps are those of the repetitions", "not decided", few),))
+        few = f"Only {len(grid.seen)} pushes of the grid have enough repetitions; {FEWEST_PUSHES} are required."
+        return Section(
+            "maps", TITLE, (Finding("The model's maps agree with those of the repetitions", "not decided", few),)
+        )
     models = reference_maps(study, "vhgp", study.plan.seeds)
     plain = reference_maps(study, "gp", study.plan.seeds)
     answers = {
@@ -81,27 +83,26 @@ def section(study: Study) -> Section:
 
 
 NOTES = (
-    "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. "
-    "In the paper the two are mirrored against each other, so its (0.75, +30°) is our (0.75, −30°). The paper names "
-    "two places for the rotation: its text (0.75, ±30°), its figure's example (1.0, 0).",
-    "Friction in the simulator is a guess of ours. Where a push sticks or slips follows from it, and with it "
-    "where dy and the rotation are largest; that dx is largest where the push goes through the middle and sticks "
-    "is geometry.",
-    "The ridge of dx runs through all pushes that aim at the slider's centre and stick: differences along it are "
+    "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
+    "paper mirrors one of the two, so its (0.75, +30°) is our (0.75, −30°). For the rotation the paper names two "
+    "places: (0.75, ±30°) in its text, (1.0, 0) in the example of its figure.",
+    "Friction in the simulator is an assumption. It determines where a push sticks or slips, and so where dy and the "
+    "rotation are largest. That dx is largest where the push goes through the middle and sticks is geometry.",
+    "The ridge of dx runs through all pushes that aim at the slider's centre and stick. Differences along it are "
     "fractions of a per cent.",
-    "The sd of an outcome, the VHGP's and the GP's, holds the noise and what the model is unsure of in the mean, as "
-    "the paper's maps do; repetitions hold the noise alone. The table tells both.",
+    "The sd of an outcome, of VHGP and GP, includes noise and the uncertainty of the mean, as in the paper's maps. "
+    "Repetitions show the noise alone. The table lists both.",
 )
 
 
 def examples(grid: RepeatedGrid, answer: Answer, quantity: str) -> list[tuple[Repetitions, Array]]:
-    """Per output the push of the largest |mean| or sd, and what the model says of its mean."""
+    """Per output the push with the largest |mean| or sd, and the model's mean for it."""
     known = np.abs([getattr(cell, quantity) for cell in grid.seen])
     return [(grid.seen[k], answer.mean[k]) for k in known.argmax(axis=0)]
 
 
 def _differences(grid: RepeatedGrid, answer: Answer) -> list[tuple[str, Array, Array]]:
-    """Of mean and sd: model less repetitions, as maps, SI; the same in standard errors of the repetitions."""
+    """Maps of model minus repetitions for mean and sd, in SI and in standard errors of the repetitions."""
     means, sds = redrawn(grid.seen)
     found = []
     for name, model, drawn in (("mean", answer.mean, means), ("sd", answer.sd, sds)):
@@ -111,14 +112,14 @@ def _differences(grid: RepeatedGrid, answer: Answer) -> list[tuple[str, Array, A
 
 
 def _other_sign(grid: RepeatedGrid) -> str:
-    """What the paper's push for dy would reach if its angle were ours."""
+    """A note on the paper's push for dy with the opposite sign of its angle."""
     places = [(contact, -angle) for contact, angle in NAMED["dy"]]
     reach = at_places(grid.fractions, grid.angles, np.abs(grid.mean[None, ..., 1]), places).mean() / np.nanmax(
         np.abs(grid.mean[..., 1])
     )
     return (
-        "The paper's place for dy stands in a caption only, so its handedness is uncertain: with the angle's sign as "
-        f"printed that push would reach {reach:.0%} of the largest |dy| by repetitions."
+        "The paper gives the place for dy in a caption only, so its handedness is uncertain. With the sign of the "
+        f"angle as printed, that push would reach {reach:.0%} of the largest |dy| by repetitions."
     )
 
 
@@ -133,14 +134,13 @@ def _map_picture(study: Study, model: ModelMap, answer: Answer, quantity: str) -
     )
     return Picture(
         path,
-        f"Maps of the {what} of dx, dy and rotation over contact and angle: VHGP, drawn pushes, repetitions",
-        f"The {what} of the outcome of a push of 0.2 s at 20 mm/s, square on {grid.surface}, simulated. Above: VHGP of "
-        f"{_windows(study)} training windows, mean of the maps of {study.plan.seeds} draws of these. Below: "
-        f"{len(grid.seen)} pushes, {grid.cells[0].commanded} times each. "
-        "One colour scale per column; hatched: slid off too early, or beyond the training data. Between: the push of "
-        f"the column's largest {what} by repetitions (circle, at the same place in both maps), from above, pushed to "
-        "the right; grey the slider's start, "
-        "thin red the repetitions, red their mean, dashed blue the VHGP's mean.",
+        f"Maps of the {what} of dx, dy and rotation over contact and angle: VHGP, example pushes, repetitions",
+        f"The {what} of the outcome of a push of 0.2 s at 20 mm/s, square on {grid.surface}, simulated. Above: VHGP "
+        f"of {_windows(study)} training windows, mean of {study.plan.seeds} maps. Below: {len(grid.seen)} pushes, "
+        f"{grid.cells[0].commanded} repetitions each. One colour scale per column; hatched: the tip slid off too "
+        f"early, or outside the training data. Between: the push with the column's largest {what} by repetitions "
+        "(circle in both maps), seen from above, pushed to the right. Grey: start; thin red: repetitions; red: "
+        "their mean; dashed blue: the VHGP's mean.",
     )
 
 
@@ -153,11 +153,11 @@ def _difference_picture(study: Study, differences: list[tuple[str, Array, Array]
     shares = "; ".join(f"{name}: {_close_shares(errors)}" for name, _, errors in differences)
     return Picture(
         path,
-        "Maps of the VHGP less the repetitions, in mm and degrees and in standard errors, for mean and standard "
+        "Maps of the VHGP minus the repetitions, in mm and degrees and in standard errors, for mean and standard "
         "deviation",
-        f"VHGP (mean of the maps of {study.plan.seeds} draws of training windows) less repetitions: in mm and degrees, "
-        "and in standard errors of the repetitions (bootstrap). If the model were true, 95 % of the "
-        f"pushes would lie within two. Within {CLOSE:g} are, of dx, dy, rotation: {shares}.",
+        f"VHGP (mean of {study.plan.seeds} maps) minus repetitions: in mm and degrees, and in standard errors of the "
+        "repetitions (bootstrap). If the model were exact, 95 % of the pushes would lie within two standard errors. "
+        f"Shares within {CLOSE:g}, of dx, dy, rotation: {shares}.",
     )
 
 
@@ -169,26 +169,22 @@ def _close_shares(differences: Array) -> str:
 def _peak_caption(study: Study) -> str:
     grid = study.reference_grid
     return (
-        f"Where the absolute mean is largest; simulated square on {grid.surface}, 20 mm/s, 0.2 s. Repetitions: "
-        f"{len(grid.seen)} pushes of the grid, {grid.cells[0].commanded} times each, {DRAWS} draws of these. VHGP: "
-        f"{study.plan.seeds} draws of {_windows(study)} training windows (no window held back; judged against the "
-        "repetitions, which no model has seen); place of the mean map, interval of the mean over draws. By "
-        "repetitions, what picking the "
-        "largest of noisy means adds is taken off (basic bootstrap). It reaches: the mean at the paper's push over the "
-        "largest."
+        f"Where the absolute mean is largest. Simulated square on {grid.surface}, 20 mm/s, 0.2 s. Repetitions: "
+        f"{len(grid.seen)} pushes of the grid, {grid.cells[0].commanded} each, {DRAWS} resamples. VHGP: "
+        f"{study.plan.seeds} draws of {_windows(study)} training windows, none of the grid; place of the mean map, "
+        "interval over draws. For repetitions, a basic bootstrap removes the bias from picking the largest of noisy "
+        "means. Last column: the mean at the paper's push over the largest."
     )
 
 
 def _agreement_caption(study: Study) -> str:
     return (
-        f"Maps of models against those of the repetitions, simulated square on {study.reference_grid.surface}: "
-        f"{len(study.reference_grid.seen)} pushes, models of {_windows(study)} training windows of another recording, "
-        f"figures averaged over {study.plan.seeds} draws of these. "
-        "Correlation, squared error over the map's variance (NMSE), ratio of root mean squares (model over "
-        f"repetitions). Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × "
-        f"{in_degrees(BLOCK[1])}) "
-        "anew. The paper shows the maps and calls the means remarkably similar, the deviations well matched to a "
-        "certain degree; it gives no number."
+        "Agreement of the models' maps with those of the repetitions. Simulated square on "
+        f"{study.reference_grid.surface}, {len(study.reference_grid.seen)} pushes; models of {_windows(study)} "
+        f"training windows of another recording, mean over {study.plan.seeds} draws. NMSE: squared error over the "
+        "map's variance. RMS ratio: model over repetitions. Intervals resample blocks of neighbouring pushes "
+        f"({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}). The paper shows the maps without numbers; it calls "
+        "the means remarkably similar and the deviations well matched to a certain degree."
     )
 
 
@@ -197,12 +193,12 @@ def _windows(study: Study) -> int:
 
 
 def _measured_notes(study: Study) -> Sequence[str]:
-    """Where a VHGP of measured windows is largest, in words."""
+    """Notes on the maxima of VHGPs of measured windows."""
     notes = []
     for corpus in study.measured:
         models = square_maps(study, corpus)
         if not models:
-            notes.append(f"{corpus.title}: no windows of a square at about 20 mm/s, so no maps.")
+            notes.append(f"{corpus.title}: no windows of a square at about 20 mm/s, so there are no maps.")
             continue
         places = []
         for k, found in enumerate(model_peaks(models)):
@@ -214,6 +210,6 @@ def _measured_notes(study: Study) -> Sequence[str]:
             )
         notes.append(
             f"{corpus.title}. VHGPs of {len(models)} draws of training windows are largest at (mm, mm, deg): "
-            f"{'; '.join(places)}. There are no repetitions to hold against it."
+            f"{'; '.join(places)}. There are no repetitions to compare with."
         )
     return notes

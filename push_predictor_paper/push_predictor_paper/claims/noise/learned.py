@@ -1,4 +1,4 @@
-"""Size and span of the noise as VHGPs have learnt it, of simulated and of measured pushes, each by itself."""
+"""Size and range of the noise that VHGPs learn from simulated and from measured pushes."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ NAMES = ("dx", "dy", "rotation")
 
 
 def learnt_parts(study: Study) -> tuple[list[Table], list[str], dict[str, Any]]:
-    """A table for each corpus that has a square pushed at about 20 mm/s, a note for any other; the numbers."""
+    """A table for each corpus with a square pushed at about 20 mm/s, a note for any other, and the numbers."""
     tables, notes, data = [], [], {}
     for corpus in study.corpora:
         models = square_maps(study, corpus)
         if not models:
-            notes.append(f"{corpus.title}: no windows of a square at about 20 mm/s to learn its noise from.")
+            notes.append(f"{corpus.title}: no windows of a square at about 20 mm/s, so its noise cannot be learned.")
             continue
         figures = [learnt_figures(models, k) for k in range(len(OUTPUTS))]
         rows = [
@@ -46,7 +46,7 @@ KEYS = ("rms_ratio", "median_ratio", "within_10_to_40", "p95_over_p5")
 
 
 def learnt_figures(models: Sequence[ModelMap], k: int) -> tuple[Estimate, ...]:
-    """Of output k: RMS ratio, median ratio, share within 10 to 40 %, span; over the models."""
+    """RMS ratio, median ratio, share within 10 to 40 % and range of output k, over the models."""
     known = [np.isfinite(model.mean[..., k]) for model in models]
     parts = [(m.mean[at][:, k], m.process_sd[at][:, k]) for m, at in zip(models, known, strict=True)]
     figures = np.array([_figures(np.abs(mean), sd) for mean, sd in parts])
@@ -63,7 +63,8 @@ def _caption(study: Study, corpus: Corpus) -> str:
     shape, surface = corpus.reference
     windows = min(study.plan.size, len(corpus.sets[corpus.reference].table))
     return (
-        f"The process noise as learnt from {shape} on {surface}. {corpus.title}. VHGPs of {windows} training windows, "
-        f"asked at 20 mm/s for 61 angles (±86°) at 41 contacts, within the training data; mean over {study.plan.seeds} "
-        "draws of training windows with Student's interval. The paper: 10 to 40 %, up to an order of magnitude."
+        f"The process noise learned from {shape} on {surface}. {corpus.title}. VHGPs of {windows} training windows, "
+        "evaluated at 20 mm/s for 61 angles (±86°) and 41 contacts, within the training data; mean over "
+        f"{study.plan.seeds} draws of training windows with Student's interval. The paper: 10 to 40 %, up to an "
+        "order of magnitude."
     )

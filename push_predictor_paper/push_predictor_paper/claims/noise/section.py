@@ -1,4 +1,4 @@
-"""How large the noise is, how far it spans, and whether its shape is the same on different surfaces."""
+"""The size of the noise, its range over pushes, and its shape on different surfaces."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ from push_predictor_paper.statistics.noise_figures import Ratios, noise_ratios, 
 from push_predictor_paper.statistics.noise_shapes import FEWEST_PUSHES, ceiling, learnt_shapes, shapes
 from push_predictor_paper.study import Study
 
-TITLE = "Size, span and shape of the noise"
+TITLE = "Size, range and shape of the noise"
 
 
 def section(study: Study) -> Section:
-    """From repetitions on every surface, from the VHGPs, and from VHGPs of measured sets."""
+    """The noise of repetitions on every surface, of VHGPs, and of VHGPs of measured sets."""
     grid = study.reference_grid
     near = [cell for cell in grid.seen if abs(cell.angle) <= WIDE]
     if len(near) < FEWEST_PUSHES:
-        few = f"{len(near)} pushes within {in_degrees(WIDE)} were seen often enough; {FEWEST_PUSHES} are asked for."
+        few = (
+            f"Only {len(near)} pushes within {in_degrees(WIDE)} have enough repetitions; {FEWEST_PUSHES} are required."
+        )
         return Section("noise", TITLE, (Finding("The noise depends on the push", "not decided", few),))
     arm = radius_of_gyration(grid)
     ratios = {"all": noise_ratios(grid.seen, arm), "near": noise_ratios(near, arm)}
@@ -68,15 +70,14 @@ def section(study: Study) -> Section:
 
 
 NOTES = (
-    "All surfaces of the simulator share one mechanism of noise (contact and support change along a push and from "
-    "push to push, see push_predictor/simulation/scatter.py; trackers' noise) and one slider; they differ in its "
-    "parameters. That the shape of the noise is the same on all of them holds partly by construction and proves "
-    "nothing about the world.",
-    "Size and span follow from the strengths of that noise, which we chose; only where it is large and where small is "
-    "left to the mechanics.",
-    "Repetitions are at one speed, 20 mm/s: the paper's order of magnitude is over speeds too.",
-    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio says nothing; so quantiles, "
-    "root mean squares, and the whole motion (rotation as the way of a point at the radius of gyration).",
+    "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. "
+    "Contact and support vary along a push and from push to push, and the trackers add noise. That the noise has "
+    "the same shape on all surfaces therefore holds partly by construction and proves nothing about real surfaces.",
+    "The size of the noise follows from strengths that we chose. Only where it is large and where small follows from "
+    "the mechanics.",
+    "Repetitions are at one speed, 20 mm/s. The paper's order of magnitude is also over speeds.",
+    "|mean| of dy and of the rotation passes through zero between pushes, where the ratio has no meaning. The tables "
+    "therefore show quantiles, root mean squares, and the whole motion (rotation times the radius of gyration).",
 )
 
 
@@ -87,8 +88,8 @@ def _ratio_picture(study: Study, ratios: Sequence[Ratios]) -> Picture:
     return Picture(
         path,
         "Cumulative share of the pushes against the sd as a percentage of the mean, for each output",
-        f"How many of the {len(ratios[0].values)} pushes on {study.reference_grid.surface} (simulated repetitions) "
-        "have a noise of at most so much of their mean. Shaded: the paper's 10 to 40 %.",
+        f"Cumulative share of {len(ratios[0].values)} pushes on {study.reference_grid.surface} (simulated repetitions) "
+        "by their noise as a percentage of the mean. Shaded: the paper's 10 to 40 %.",
     )
 
 
@@ -99,8 +100,8 @@ def _map_pictures(study: Study) -> list[Picture]:
     maps = Picture(
         draw(study.out / "noise_maps.png", (9.0, height), lambda figure: paint_noise_maps(figure, grids)),
         "Maps of the standard deviation of dx, dy and rotation over contact and angle, a row for each surface",
-        "Sd of the first window over contact and angle, over its surface's median; simulated repetitions of each push: "
-        f"{again}. One scale per column.",
+        "Sd of the first window by contact and angle, divided by the median of its surface. Simulated repetitions "
+        f"of each push: {again}. One scale per column.",
     )
     others = {surface: g for surface, g in grids.items() if g is not reference}
     if not others:
@@ -108,7 +109,7 @@ def _map_pictures(study: Study) -> list[Picture]:
     scatter = Picture(
         draw(study.out / "noise_scatter.png", (9.0, 3.7), lambda figure: paint_scatter(figure, reference, others)),
         "The sd of every push on one surface against that on the others, for each output",
-        f"Each mark a push: its sd on {reference.surface} and on another surface, each over its surface's median; "
-        "simulated repetitions. On the line the shape is the same.",
+        f"Each mark is a push: its sd on {reference.surface} and on another surface, each divided by the median of its "
+        "surface. Simulated repetitions. On the line the shape is the same.",
     )
     return [maps, scatter]

@@ -22,7 +22,7 @@ CLAIM = "The shape of the noise is the same on different surfaces"
 def shape_finding(
     found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
 ) -> Finding:
-    """Over all pairs of surfaces, by repetitions and by VHGPs; near: over the pushes that are not steeply aslant."""
+    """Is the shape the same for all pairs of surfaces? near: only pushes at moderate angles."""
     if not found or most is None:
         return Finding(CLAIM, "not decided", "Fewer than two surfaces have repetitions of the same pushes.")
     verdict = agreed(_verdict(found), _verdict(learnt))
@@ -30,15 +30,13 @@ def shape_finding(
     return Finding(
         CLAIM,
         verdict,
-        f"Correlation of log sd over the pushes, pairs of surfaces: {len(found)}. By repetitions: {_told(found)}; over "
-        f"the pushes within {in_degrees(WIDE)}: {_told(near)}. Two halves of one surface's repetitions reach {halves}. "
-        "Of "
-        "the VHGPs' process noise, of which the paper speaks, one draw of training windows a surface: "
-        f"{_told(learnt)}. "
-        f"Rule, for repetitions and for VHGPs, all pushes: holds if the intervals of all pairs and outputs lie above "
-        f"{ALIKE:g}, does not hold if all lie below {UNLIKE:g}, in part if some lie above that; together in part if "
-        "it holds, or holds in part, by one of them only. The simulator's surfaces share one "
-        "mechanism of noise, so this holds partly by construction.",
+        f"Correlation of log sd over the pushes, for {len(found)} pairs of surfaces. By repetitions: "
+        f"{_ranges(found)}; within {in_degrees(WIDE)}: {_ranges(near)}. Two halves of one surface's repetitions "
+        f"reach {halves}. By the VHGPs' process noise, of which the paper speaks: {_ranges(learnt)}. Rule, over all "
+        f"pushes: holds if the intervals of all pairs and outputs lie above {ALIKE:g}; in part if some lie above "
+        f"{UNLIKE:g}; does not hold if all lie below {UNLIKE:g}. In part also if it holds, or holds in part, only by "
+        "repetitions or only by VHGPs. The simulator's surfaces share one mechanism of noise, so this holds partly "
+        "by construction.",
     )
 
 
@@ -56,9 +54,9 @@ def _verdict(found: Sequence[Shape]) -> Verdict:
 def shape_tables(
     study: Study, found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
 ) -> tuple[Table, ...]:
-    """By repetitions, over the pushes near the normal, and by the VHGPs."""
-    block = f"Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}) anew."
-    halved = "Halves of the repetitions of one surface: what too few repetitions leave of a correlation of one."
+    """Correlations by repetitions, by repetitions at moderate angles, and by the VHGPs."""
+    block = f"Intervals resample blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])})."
+    halved = "Halves of one surface's repetitions: the largest correlation that so few repetitions can show."
     nearest = ceiling(study.reference_grid, WIDE)
     size = f"{study.plan.size} training windows or all"
     return tuple(
@@ -69,8 +67,7 @@ def shape_tables(
                 _with(found, most),
             ),
             (
-                f"The same, pushes within {in_degrees(WIDE)}: what is left without the pushes that hardly move the "
-                "slider.",
+                f"The same for pushes within {in_degrees(WIDE)}, without those that hardly move the slider.",
                 _with(near, nearest),
             ),
             (
@@ -99,8 +96,8 @@ def shape_json(found: Sequence[Shape], most: Shape | None, learnt: Sequence[Shap
     }
 
 
-def _told(found: Sequence[Shape]) -> str:
-    """The range of each output's correlations over the pairs, and the lowest end of their intervals."""
+def _ranges(found: Sequence[Shape]) -> str:
+    """Range of each output's correlations over the pairs, and the lowest end of their intervals."""
     if not found:
         return "too few"
     parts = []

@@ -1,4 +1,4 @@
-"""The quasi-static study's computations: pushes of equal travel at every speed, models of growing brackets of them."""
+"""The computations of the quasi-static claim: pushes of equal travel, models of growing brackets of speeds."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from push_predictor_paper.study import Study
 
 FEWEST, MOST = 10, 50  # training windows of a speed
 EQUAL = 200  # training windows of the control, in every bracket
-MAIN, GP, SAME_SIZE, TOLD = "VHGP, not told", "GP, not told", "VHGP, not told, equal n", "VHGP, told the speed"
+MAIN, GP, SAME_SIZE, TOLD = "VHGP", "GP", "VHGP, equal n", "VHGP with speed as input"
 SERIES = (MAIN, GP, SAME_SIZE, TOLD)
 
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """All of the study: pushes at equal travel by speed, windows by speed, models; rows: windows a speed gives them."""
+    """The results: pushes of equal travel by speed, windows by speed, scores. rows: training windows of each speed."""
 
     pushes: int
     speeds: tuple[float, ...]
@@ -36,26 +36,26 @@ class Facts:
     same_size: int
 
     def size(self, series: str, bracket: int) -> int:
-        """Training windows of a bracket."""
+        """The number of training windows of a bracket."""
         return _rows(series, bracket + 1, self.rows, self.same_size) * (bracket + 1)
 
     @property
     def same_sizes(self) -> str:
-        """Training windows of the brackets of equal n, in words: they differ by rounding."""
+        """Training windows of the brackets of equal n, in words; rounding makes them differ."""
         sizes = sorted({self.size(SAME_SIZE, k) for k in range(len(self.judged.speeds))})
         return f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
 
     @property
     def judged_on(self) -> str:
-        """Which pushes, which split, which interval."""
+        """The pushes, the split and the kind of interval, in words."""
         return (
-            f"{len(self.judged.scores[MAIN][-1].push_id)} held-out pushes, whole pushes left out; intervals draw "
-            "folds with their models anew, and pushes within."
+            f"{len(self.judged.scores[MAIN][-1].push_id)} held-out pushes, whole pushes held out; intervals "
+            "resample folds with their models, and pushes within."
         )
 
 
 def facts_of(study: Study) -> Facts:
-    """Simulate, train, judge."""
+    """Simulate, train and score all models."""
     plan, pair = study.plan, study.simulated.reference
     calls = [(plan, *pair, number) for number in range(len(plan.speeds))]
     windows = study.work.run("pushes of equal travel", speed_windows, calls)

@@ -1,4 +1,4 @@
-"""What the quasi-static study's figures say: by which rule each claim holds or not."""
+"""The rules of the quasi-static claims."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ KEPT = 0.9  # share of a window on which the tip touches
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Models of growing brackets of speeds, all judged on the same held-out pushes.
+    """Scores of models of growing brackets of speeds, all on the same held-out pushes.
 
-    speeds (m/s) the brackets end at; scores: by series, one a bracket; numbers: places of these speeds in the plan.
+    speeds: top speeds (m/s) of the brackets. numbers: their places in the plan. scores: by series, one per bracket.
     """
 
     speeds: tuple[float, ...]
@@ -31,20 +31,20 @@ class Judged:
     scores: Mapping[str, Sequence[PushScores]]
 
     def same(self, series: str) -> Array:
-        """NMSE (brackets, 1 + draws) of each bracket on held-out pushes of its own speeds; see draws."""
+        """NMSE (brackets, 1 + draws) of each bracket on held-out pushes of its own speeds; the first is the value."""
         return np.array([self._draws(series, k, self.numbers[: k + 1]) for k in range(len(self.speeds))])
 
     def slow(self, series: str) -> Array:
-        """The same on the slowest pushes only."""
+        """NMSE on the slowest pushes only."""
         slow = [n for n, speed in zip(self.numbers, self.speeds, strict=True) if speed <= 1.001 * SLOW]
         return np.array([self._draws(series, k, slow) for k in range(len(self.speeds))])
 
     def single(self, series: str, bracket: int, place: int) -> Array:
-        """The same (1 + draws,) of one bracket's models on pushes of one speed."""
+        """NMSE (1 + draws,) of one bracket's models on pushes of one speed."""
         return self._draws(series, bracket, self.numbers[place : place + 1])
 
     def _draws(self, series: str, bracket: int, numbers: Sequence[int]) -> Array:
-        """The figure, then its draws: of folds with their models, and of pushes within."""
+        """The value, then its resamples of folds with their models, and of pushes within."""
         push_scores = self.scores[series][bracket]
         speed, push = np.array([number_of(name) for name in push_scores.push_id.tolist()]).T
         weights = _weights(push) * np.isin(speed, numbers)
@@ -53,7 +53,7 @@ class Judged:
 
 
 def _weights(push: np.ndarray) -> Array:
-    """Weights (1 + draws, p) of pushes: each once; then folds drawn, and in each of its draws numbers of pushes."""
+    """Weights (1 + draws, p) of pushes: each once, then resampled folds and, within them, resampled pushes."""
     drawn = push_bootstrap(push)
     folds, fold = np.unique(push % FOLDS, return_inverse=True)
     count = len(folds)
@@ -62,25 +62,25 @@ def _weights(push: np.ndarray) -> Array:
 
 
 def estimated(draws: Array) -> Estimate:
-    """Estimate of a figure (1 + draws,); draws that hold nothing are passed over."""
+    """Estimate from a value and its draws (1 + draws,); NaN draws are skipped."""
     known = draws[1:][np.isfinite(draws[1:])]
     return of_draws(draws[0], known) if len(known) else Estimate(float(draws[0]), np.nan, np.nan)
 
 
 def turn_of(speeds: Sequence[float], curves: Array) -> Estimate:
-    """The speed (m/s) at which curves (brackets, 1 + draws) are lowest; its draws are the draws' own turns."""
+    """The speed (m/s) at which curves (brackets, 1 + draws) are lowest, with interval."""
     lowest = np.argmin(np.where(np.isfinite(curves), curves, np.inf), axis=0)
     return estimated(np.asarray(speeds)[lowest])
 
 
 def turning_bracket(speeds: Sequence[float]) -> int | None:
-    """The last bracket that ends within the paper's turn."""
+    """The last bracket whose top speed lies in the range of the paper's turn."""
     within = [k for k, speed in enumerate(speeds) if TURN[0] <= speed <= TURN[1]]
     return within[-1] if within else None
 
 
 def helps_then_harms(gain: Estimate, harm: Estimate) -> Verdict:
-    """gain: NMSE of the slowest bracket less that at the paper's turn; harm: that of the widest less the same."""
+    """Verdict. gain: NMSE of the slowest bracket minus that at the paper's turn; harm: of the widest minus the same."""
     seen = (gain.low > 0.0) + (harm.low > 0.0)
     if seen:
         return "holds" if seen == 2 else "holds in part"
@@ -88,7 +88,7 @@ def helps_then_harms(gain: Estimate, harm: Estimate) -> Verdict:
 
 
 def turns_there(turn: Estimate) -> Verdict:
-    """Whether the turn lies where the paper's does."""
+    """Verdict on whether the turn lies in the paper's range."""
     low, high = 0.999 * TURN[0], 1.001 * TURN[1]
     if low <= turn.low and turn.high <= high:
         return "holds"
@@ -98,7 +98,7 @@ def turns_there(turn: Estimate) -> Verdict:
 
 
 def breaks_beyond(departures: Mapping[float, Estimate], error: float) -> Verdict:
-    """Do outcomes depart, by speed, notably from the quasi-static ones beyond the paper's turn, and not before it?"""
+    """Verdict: do outcomes depart notably from quasi-static ones beyond the paper's turn, and not before?"""
     slow = [d for speed, d in departures.items() if speed <= 1.001 * TURN[0]]
     fast = [d for speed, d in departures.items() if speed > 1.001 * TURN[1]]
     limit = NOTABLE * error
@@ -112,17 +112,17 @@ def breaks_beyond(departures: Mapping[float, Estimate], error: float) -> Verdict
 
 
 def lower(difference: Estimate) -> Verdict:
-    """Whether a difference of errors lies below zero."""
+    """Verdict on whether a difference of errors lies below zero."""
     if difference.high < 0.0:
         return "holds"
     return "does not hold" if difference.low > 0.0 else "not decided"
 
 
 def departure(slowest: EqualTravel, other: EqualTravel, kept_only: bool) -> tuple[Estimate, int]:
-    """Squared distance of outcomes from those of the same pushes at the slowest speed, and how many pushes.
+    """Squared distance of outcomes from those of the same pushes at the slowest speed, and the number of pushes.
 
-    In units of the variance of the slowest, summed over outputs: the NMSE of a prediction that errs in nothing but in
-    taking the push for quasi-static. kept_only: pushes that kept in touch at both speeds.
+    In units of the variance at the slowest speed, summed over outputs: the NMSE of a prediction whose only error is the
+    quasi-static assumption. kept_only: only pushes that stayed in contact at both speeds.
     """
     kept = (slowest.touching >= KEPT) & (other.touching >= KEPT) if kept_only else np.ones(len(slowest.outcomes), bool)
     count = int(kept.sum())

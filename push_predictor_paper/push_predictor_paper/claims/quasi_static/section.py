@@ -1,4 +1,4 @@
-"""How fast may a push be for the quasi-static assumption: models that are not told the speed, of growing top speed."""
+"""Up to which speed does the quasi-static assumption hold? Models without the speed, of growing top speed."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from push_predictor_paper.study import Study
 
 
 def section(study: Study) -> Section:
-    """NMSE against the top speed of the training pushes, and how far outcomes depart from the slow ones."""
+    """NMSE by the top speed of the training pushes, and the departure of outcomes from those of slow pushes."""
     facts = facts_of(study)
     if len(facts.judged.speeds) < 2:
         note = f"Fewer than two speeds gave {FEWEST} training windows in every fold."
@@ -63,10 +63,10 @@ def section(study: Study) -> Section:
 
 
 TITLE = "The quasi-static assumption: pushes of all speeds scaled to 10 mm/s"
-CLAIM_COURSE = "Adding faster pushes to a model that is not told the speed first helps, then harms"
-CLAIM_TURN = "It is best with pushes of up to 50 to 80 mm/s"
+CLAIM_COURSE = "Adding faster pushes to a model without the speed as an input first helps, then harms"
+CLAIM_TURN = "A model without the speed as an input is best with pushes of up to 50 to 80 mm/s"
 CLAIM_DIRECT = "The quasi-static assumption does not hold beyond 50 to 80 mm/s"
-CLAIM_TOLD = "There is value in the speed as an input"
+CLAIM_TOLD = "The speed is a useful input"
 
 
 def _course(facts: Facts) -> Finding:
@@ -79,20 +79,20 @@ def _course(facts: Facts) -> Finding:
     slow_gain, slow_harm = _against(judged.slow(MAIN), turn)
     slow_equal = _against(judged.slow(SAME_SIZE), turn)
     sentence = (
-        f"NMSE of the VHGP on held-out pushes of its own bracket, against that of the bracket up to "
-        f"{told(judged.speeds[turn])}: the slowest alone has {gain.text('+.3f')} (above 0: adding helped), all up "
-        f"to {told(judged.speeds[-1])} {harm.text('+.3f')} (above 0: adding harmed). With {facts.same_sizes} windows "
-        f"in every bracket instead: {equal_gain.text('+.3f')} and {equal_harm.text('+.3f')}; what helps in the first "
-        "pair only comes of more data, not of faster pushes. On the slow pushes alone (up to "
-        f"{told(SLOW)}): {slow_gain.text('+.3f')} and {slow_harm.text('+.3f')}, at equal n "
-        f"{slow_equal[0].text('+.3f')} and {slow_equal[1].text('+.3f')}. {facts.judged_on} Holds if both of the first "
-        "pair lie above 0, in part if one does; does not hold if none does and one lies below."
+        "NMSE of the VHGP on held-out pushes of its own speeds, minus that of the bracket up to "
+        f"{told(judged.speeds[turn])}: the slowest bracket {gain.text('+.3f')} (above 0: adding helped), the bracket "
+        f"up to {told(judged.speeds[-1])} {harm.text('+.3f')} (above 0: adding harmed). With {facts.same_sizes} "
+        f"windows in every bracket: {equal_gain.text('+.3f')} and {equal_harm.text('+.3f')}; a gain only in the "
+        f"first pair comes from more data, not from faster pushes. On slow pushes alone (up to {told(SLOW)}): "
+        f"{slow_gain.text('+.3f')} and {slow_harm.text('+.3f')}; at equal n {slow_equal[0].text('+.3f')} and "
+        f"{slow_equal[1].text('+.3f')}. {facts.judged_on} Rule: holds if both of the first pair lie above 0, in part "
+        "if one does, does not hold if none does and one lies below."
     )
     return Finding(CLAIM_COURSE, helps_then_harms(gain, harm), sentence)
 
 
 def _against(curve: Array, turn: int) -> tuple[Estimate, Estimate]:
-    """The slowest bracket and the widest less that at the turn."""
+    """NMSE of the slowest and of the widest bracket minus that of the bracket at the turn."""
     return estimated(curve[0] - curve[turn]), estimated(curve[-1] - curve[turn])
 
 
@@ -106,10 +106,10 @@ def _turn(facts: Facts) -> Finding:
     }
     elsewhere = "; ".join(f"{name} {_speeds(turn_of(judged.speeds, curve))}" for name, curve in others.items())
     sentence = (
-        f"The VHGP's NMSE on its own bracket is lowest with pushes of up to {_speeds(turn)}; {elsewhere}. "
-        f"{facts.judged_on} At the last speed means: it never turns. "
-        "Holds if the interval of the first lies within 50 to 80 mm/s, in part if the value alone does, does not hold "
-        "if the interval lies outside."
+        f"The VHGP's NMSE on its own speeds is lowest with pushes of up to {_speeds(turn)}; {elsewhere}. "
+        f"{facts.judged_on} A minimum at the last speed means that there is no turn. Rule: holds if the interval of "
+        "the first lies within 50 to 80 mm/s, in part if only the value does, does not hold if the interval lies "
+        "outside."
     )
     return Finding(CLAIM_TURN, turns_there(turn), sentence)
 
@@ -119,12 +119,12 @@ def _direct(facts: Facts, departures: Sequence[Estimate]) -> Finding:
     by_speed = dict(zip(facts.speeds[1:], departures[1:], strict=True))
     found = ", ".join(f"{told(speed)} {d.text('.3f')}" for speed, d in by_speed.items())
     sentence = (
-        f"The same {facts.pushes} pushes (contact, angle, place, draws) at every speed, outcome after "
-        f"{1e3 * TRAVEL:.0f} mm from the touch: mean squared distance from the outcome at {told(facts.speeds[0])}, in "
-        f"units of its variance, sum of 3, interval by push: {found}. The VHGP of the slowest pushes itself errs by "
-        f"{error.text('.3f')} on slow pushes (n = {facts.same_size}). Notable is {NOTABLE:.0%} of that. Holds "
-        "if all speeds above 80 mm/s are notable and none up to 50; in part if all above are, but some up to 50 may "
-        "be too; does not hold if some above is not."
+        f"Departure from the outcome at {told(facts.speeds[0])}, in units of its variance, sum of 3, interval by "
+        f"push: {found}. It is the mean squared distance of the outcomes of the same {facts.pushes} pushes after "
+        f"{1e3 * TRAVEL:.0f} mm from the first contact. The VHGP of the slowest pushes has an error of "
+        f"{error.text('.3f')} on slow pushes (n = {facts.same_size}). Rule: a departure is notable from "
+        f"{NOTABLE:.0%} of that. Holds if it is notable at all speeds above 80 mm/s and at none up to 50; in part if "
+        "at all above, but perhaps at some up to 50; does not hold if at some speed above it is not."
     )
     return Finding(CLAIM_DIRECT, breaks_beyond(by_speed, error.value), sentence)
 
@@ -134,9 +134,9 @@ def _told(facts: Facts) -> Finding:
     difference = estimated(judged.same(TOLD)[-1] - judged.same(MAIN)[-1])
     slowest = estimated(judged.same(TOLD)[0] - judged.same(MAIN)[0])
     sentence = (
-        f"NMSE of the VHGP that is told the speed less that of the one that is not, same windows, pushes of up to "
-        f"{told(judged.speeds[-1])}: {difference.text('+.3f')}; at {told(judged.speeds[0])} alone "
-        f"{slowest.text('+.3f')}. {facts.judged_on} Holds if the first lies below 0, does not if above."
+        f"NMSE of the VHGP with the speed as an input minus that without it, same windows: {difference.text('+.3f')} "
+        f"with pushes of up to {told(judged.speeds[-1])}, {slowest.text('+.3f')} at {told(judged.speeds[0])} alone. "
+        f"{facts.judged_on} Rule: holds if the first lies below 0, does not hold if above."
     )
     return Finding(CLAIM_TOLD, lower(difference), sentence)
 
@@ -157,32 +157,33 @@ def _picture(study: Study, facts: Facts, departures: Sequence[Estimate]) -> Pict
     )
     return Picture(
         path,
-        "NMSE against the top speed of the training pushes, map of NMSE by speed, departure from quasi-static outcomes",
-        f"Simulated, {' on '.join(study.simulated.reference)}. Above: NMSE (sum of 3) against the top speed of the "
+        "NMSE by the top speed of the training pushes, map of NMSE by speed, departure from quasi-static outcomes",
+        f"Simulated, {' on '.join(study.simulated.reference)}. Above: NMSE (sum of 3) by the top speed of the "
         f"training pushes, on held-out pushes of the same speeds, and on those of up to {told(SLOW)} only; "
-        f"{facts.rows} windows of every speed, or {facts.same_sizes} in every bracket (equal n). Below left: the VHGP "
-        "that is not told, trained up to one speed, judged at one. Below right: departure of the same push's outcome "
-        "from that "
-        f"at {told(facts.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s. {facts.judged_on}",
+        f"{facts.rows} windows of every speed, or {facts.same_sizes} in every bracket (equal n). Below left: the "
+        "VHGP without the speed, trained up to one speed, tested at another. Below right: departure of the outcome "
+        f"from that at {told(facts.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s. "
+        f"{facts.judged_on}",
     )
 
 
 def _notes(study: Study, facts: Facts) -> tuple[str, ...]:
-    left_out = [speed for k, speed in enumerate(facts.speeds) if k not in facts.judged.numbers]
+    skipped = [speed for k, speed in enumerate(facts.speeds) if k not in facts.judged.numbers]
     return (
-        f"Windows are {1e3 * TRAVEL:.0f} mm of the tip's way at every speed, end to end from the first touch, taken "
-        "from the simulator's true motion: at 500 mm/s they last 10 ms, one sample of its tracker. So they carry no "
-        "sensor noise, and the robot reaches its speed at least 2 mm before the touch at any speed.",
-        "As we read the paper, each bracket is judged on pushes of its own speeds: faster pushes make the task harder "
-        "as well as the data more. The slow pushes alone, and equal n, take the two apart.",
-        "Windows at high speed are those of pushes that kept in touch, a selection; the departure is of all pushes.",
-        "That inertia matters follows from mass, friction and contact of our simulator. Where the turn comes depends "
-        "on them, on the noise, on how many windows each speed gives, and on a window's length: the slider is at "
-        "rest at the first touch, so short windows see more of its setting in motion. It proves nothing about the "
-        "world.",
-        *([f"Too few windows to learn from at {', '.join(map(told, left_out))}."] if left_out else []),
+        f"Windows are {1e3 * TRAVEL:.0f} mm of the tip's path at every speed, end to end from the first contact. They "
+        "come from the simulator's true motion, because at 500 mm/s they last 10 ms, one sample of its tracker. They "
+        "therefore have no sensor noise. The robot reaches its speed at least 2 mm before the contact.",
+        "As we read the paper, each bracket is tested on pushes of its own speeds: faster pushes make the task "
+        "harder as well as the data more. The slow pushes alone, and equal n, separate the two.",
+        "Windows at high speed are those of pushes that stayed in contact, a selection; the departure is of all "
+        "pushes.",
+        "Inertia matters through the mass, friction and contact of our simulator. The turn depends on them, on the "
+        "noise, on the number of windows at each speed, and on the length of a window: the slider is at rest at the "
+        "first contact, so short windows see more of its acceleration. None of this proves anything about a real "
+        "rig.",
+        *([f"Too few training windows at {', '.join(map(told, skipped))}."] if skipped else []),
         *(
-            f"{corpus.title}: its windows are of equal duration, not of equal travel, and are not judged here."
+            f"{corpus.title}: its windows have equal duration, not equal travel, so they are not used here."
             for corpus in study.measured
         ),
         *(() if study.measured else ("No measured pushes of several speeds were given.",)),

@@ -1,4 +1,4 @@
-"""The quasi-static study's tables."""
+"""The tables of the quasi-static claim."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from push_predictor_paper.section import Table
 
 
 def bracket_table(facts: Facts) -> Table:
-    """NMSE by bracket."""
+    """NMSE by bracket of speeds."""
     judged = facts.judged
     curves = [judged.same(series) for series in SERIES] + [judged.slow(MAIN), judged.slow(SAME_SIZE)]
     rows = tuple(
@@ -24,17 +24,17 @@ def bracket_table(facts: Facts) -> Table:
         for k, speed in enumerate(judged.speeds)
     )
     caption = (
-        f"Simulated: NMSE (sum of 3) by the speeds of the training pushes, {facts.rows} windows of each speed, or n "
-        "in all (equal n). First four: on held-out pushes of the same speeds; last two: on pushes of up to "
-        f"{told(SLOW)} only. {facts.judged_on} The paper shows the first as a curve, without numbers: lowest at 50 to "
-        "80 mm/s."
+        f"NMSE (sum of 3) by the top speed of the training pushes. Simulated; {facts.rows} windows of each speed, or "
+        "n in all (equal n). First four: on held-out pushes of the same speeds; last two: on pushes of up to "
+        f"{told(SLOW)} only. {facts.judged_on} The paper shows the first as a curve, lowest at 50 to 80 mm/s, "
+        "without numbers."
     )
     slow = (f"slow pushes: {MAIN}", f"slow pushes: {SAME_SIZE}")
     return Table(caption, ("training pushes", "n", "equal n", *SERIES, *slow), rows)
 
 
 def single_table(facts: Facts) -> Table:
-    """NMSE at single speeds by bracket."""
+    """NMSE at single speeds, by bracket."""
     judged = facts.judged
     places = np.unique(np.linspace(0, len(judged.speeds) - 1, 5).round().astype(int)).tolist()
     rows = tuple(
@@ -42,14 +42,14 @@ def single_table(facts: Facts) -> Table:
         for k, speed in enumerate(judged.speeds)
     )
     caption = (
-        "Simulated: NMSE (sum of 3) of the VHGP that is not told the speed, on held-out pushes of one speed; the "
-        "spread is that about the mean of its training pushes. Intervals as above. All speeds: the map."
+        "NMSE (sum of 3) of the VHGP without the speed as an input, on held-out pushes of one speed. Simulated; the "
+        "variance is about the mean of its training pushes. Intervals as above. All speeds: see the map."
     )
     return Table(caption, ("training pushes", *(f"at {told(judged.speeds[p])}" for p in places)), rows)
 
 
 def speed_table(facts: Facts) -> Table:
-    """By speed: windows got and lost, departure from the slowest."""
+    """By speed: windows found and lost, departure from the slowest."""
     rows = []
     for speed, table, equal in zip(facts.speeds, facts.windows, facts.equal, strict=True):
         every, _ = departure(facts.equal[0], equal, False)
@@ -57,13 +57,12 @@ def speed_table(facts: Facts) -> Table:
         lost = WINDOWS * facts.pushes - len(table)
         rows.append((told(speed), str(len(table)), str(lost), every.cell(".3f"), str(count), kept.cell(".3f")))
     caption = (
-        f"Simulated, by speed: windows of {1e3 * TRAVEL:.0f} mm got of {facts.pushes} pushes, {WINDOWS} each (a window "
-        f"is lost where the tip touches on less than {KEPT:.0%} of it: the slider flies ahead or the tip slides off), "
-        f"and the departure from the outcome at {told(facts.speeds[0])} of {facts.pushes} other pushes made alike at "
-        "every speed, as in the finding, interval by push; first of all of them, then of those that kept in "
-        "touch at both speeds: a selection."
+        f"Windows and departure by speed. Simulated: windows of {1e3 * TRAVEL:.0f} mm found in {facts.pushes} pushes, "
+        f"{WINDOWS} each. A window is lost if the tip touches on less than {KEPT:.0%} of it, because the slider flies "
+        f"ahead or the tip slides off. Departure from the outcome at {told(facts.speeds[0])}: of {facts.pushes} other "
+        "pushes repeated at every speed, interval by push; then of those that stayed in contact at both speeds."
     )
-    head = ("speed", "windows", "lost", "departure, all pushes", "kept in touch", "departure, kept in touch")
+    head = ("speed", "windows", "lost", "departure, all pushes", "in contact", "departure, in contact")
     return Table(caption, head, tuple(rows))
 
 

@@ -1,4 +1,4 @@
-"""Three kinds of repeated push: convergent, divergent, multi-modal, each chosen by a rule and judged by numbers."""
+"""Three kinds of repeated push: convergent, divergent, multi-modal."""
 
 from __future__ import annotations
 
@@ -40,14 +40,12 @@ from push_predictor_paper.study import Study
 
 
 def section(study: Study) -> Section:
-    """The three pushes with their trajectories, and whether they are what they are called."""
+    """Choose a push of each kind, draw its trajectories, and test whether the kinds exist."""
     grid = study.reference_grid
     kinds = kinds_of(grid)
-    notes = NOTES if not study.measured else (*NOTES, "The measured sets hold no grid of repeated pushes.")
+    notes = NOTES if not study.measured else (*NOTES, "The measured sets have no grid of repeated pushes.")
     if kinds is None:
-        note = (
-            f"Fewer than two pushes of the grid moved the slider by {1e3 * LEAST_TRAVEL:.0f} mm, and up to their end."
-        )
+        note = f"Fewer than two pushes of the grid moved the slider by {1e3 * LEAST_TRAVEL:.0f} mm and up to their end."
         return Section("kinds_of_push", TITLE, (Finding(CLAIM_KINDS, "not decided", note),), notes=(note, *notes))
     return Section(
         key="kinds_of_push",
@@ -61,24 +59,25 @@ def section(study: Study) -> Section:
 
 
 TITLE = "Three kinds of push"
-CLAIM_KINDS = "Some pushes, repeated, are convergent (paths draw together as they go), others divergent (they fan out)"
+CLAIM_KINDS = "Some repeated pushes are convergent (their paths draw together), others divergent (they fan out)"
 CLAIM_APART = "Divergent pushes end further apart than convergent ones"
-CLAIM_MODES = "Some pushes, repeated, are multi-modal"
+CLAIM_MODES = "Some repeated pushes are multi-modal"
 NOTES = (
     "Spread: root mean square distance of the slider's centre from its mean. Relative spread: spread at the end over "
-    "the mean displacement. Paths are relative to where the slider was at the first touch, so all begin together: "
-    "what is seen is how they part, not whether differences at the start vanish.",
-    f"Only pushes that move the slider by {1e3 * LEAST_TRAVEL:.0f} mm or more (below, the tip grazes), that begin at "
-    f"least {EDGE:g} of the side from its ends, and of which at most {STOPPED:.0%} of the repetitions stop early (less "
-    f"than {1e3 * STILL:.1f} mm and {np.degrees(STILL_TURN):.1f}° in the last 0.1 s: the tip slid off). Growth: "
-    "relative spread at the end over that half-way. Convergent: least growth; divergent: largest; chosen by every "
-    "second repetition, judged by the others: the extremes of many noisy figures would else look more extreme than "
-    "they are. Multi-modal: least p of the dip test on the final poses (x, y or rotation), family-wise by Holm's "
-    "correction over all pushes and the three of them.",
-    "Repetitions in which the slider moves further within 20 ms than the tip could push it are left out: there the "
-    "path runs into the reset that follows a push whose first touch came late.",
-    "Why simulated repetitions part is a property of our simulator (friction and pressure that vary over table and "
-    "slider) and proves nothing about the world. The paper shows its three pushes by eye, without numbers.",
+    "the mean displacement. Paths are relative to the slider's pose at the first contact, so all begin together: they "
+    "show how paths part, not whether differences at the start vanish.",
+    f"Only pushes that move the slider by {1e3 * LEAST_TRAVEL:.0f} mm or more, that begin at least {EDGE:g} of the "
+    f"side from its ends, and of which at most {STOPPED:.0%} of the repetitions stop early (less than "
+    f"{1e3 * STILL:.1f} mm and {np.degrees(STILL_TURN):.1f}° in the last 0.1 s: the tip slid off).",
+    "Growth: relative spread at the end over that half-way. Convergent: least growth; divergent: largest. Every second "
+    "repetition chooses the push, the others test it; otherwise the extremes of many noisy values would look too "
+    "extreme.",
+    "Multi-modal: least p of the dip test on the final poses (x, y or rotation), family-wise by Holm's correction over "
+    "all pushes and the three outputs.",
+    "Repetitions in which the slider moves further within 20 ms than the tip could push it are dropped: there the path "
+    "runs into the reset after the push.",
+    "Why simulated repetitions part is a property of the simulator, whose friction and pressure vary over table and "
+    "slider. It proves nothing about a real rig. The paper shows its three pushes without numbers.",
 )
 
 
@@ -88,11 +87,11 @@ def _growth_finding(kinds: Kinds) -> Finding:
     return Finding(
         CLAIM_KINDS,
         draws_together_fans_out(narrow, wide),
-        f"Relative spread at the end over that half-way (1: straight rays; below: drawn together; above: fanned out): "
-        f"of the push with the least {narrow.text()}, of that with the largest {wide.text()}, by {_counts(kinds)} "
-        f"repetitions that did not choose them. Of all {len(kinds.paths)} pushes a tenth lie below {middle[0]:.2f}, "
-        f"half below {middle[1]:.2f}, a tenth above {middle[2]:.2f}. Rule: holds if the first interval lies below 1 "
-        "and the second above, in part if one does, does not hold if neither and one lies on the other side.",
+        f"Growth (1: straight rays; below: drawn together; above: fanned out): {narrow.text()} for the most convergent "
+        f"push, {wide.text()} for the most divergent one, by {_counts(kinds)} repetitions that did not choose them. Of "
+        f"all {len(kinds.paths)} pushes a tenth lies below {middle[0]:.2f}, half below {middle[1]:.2f}, a tenth above "
+        f"{middle[2]:.2f}. Rule: holds if the first interval lies below 1 and the second above; in part if one does; "
+        "does not hold if neither does and one lies on the other side.",
     )
 
 
@@ -106,9 +105,10 @@ def _apart_finding(kinds: Kinds) -> Finding:
         CLAIM_APART,
         apart(ratios),
         f"The repetitions of the most divergent push end {ratios[0].text()} times as far apart as those of the most "
-        f"convergent one, relative to its way {ratios[1].text()} times: {wide} and {narrow}, by {_counts(kinds, True)} "
-        f"repetitions that did not choose them, drawn anew for the interval. Rule: holds if both intervals lie above "
-        f"{APART:.0f}, in part if both above 1, does not hold if one ends below {APART:.0f} and reaches 1.",
+        f"convergent one; relative to the displacement, {ratios[1].text()} times. Spreads: {wide} and {narrow}, by "
+        f"{_counts(kinds, True)} repetitions that did not choose them, resampled for the interval. Rule: holds if both "
+        f"intervals lie above {APART:.0f}; in part if both lie above 1; does not hold if one contains 1 and ends below "
+        f"{APART:.0f}.",
     )
 
 
@@ -126,10 +126,10 @@ def _modes_finding(kinds: Kinds) -> Finding:
         CLAIM_MODES,
         has_modes(least, power),
         f"{count} of {len(kinds.p)} pushes that move the slider have final poses with more than one mode, 5 % "
-        f"family-wise. The push shown is that with the least p of the dip test, {least:.2g} after correction for "
-        f"choosing it among all. Two equal modes {FAR:.0f} of their sd apart would be found in {power:.0%} of cases at "
-        f"{repetitions} repetitions. Holds if that p is at most {LEVEL}; does not hold if not, though such modes are "
-        f"found in {POWER:.0%}.",
+        f"family-wise. The push shown has the least p of the dip test, {least:.2g} after correction for choosing it. "
+        f"Two equal modes {FAR:.0f} of their sd apart would be found in {power:.0%} of cases at {repetitions} "
+        f"repetitions. Rule: holds if that p is at most {LEVEL}; does not hold if it is larger, although such modes "
+        f"are found in {POWER:.0%} of cases; else not decided.",
     )
 
 
@@ -151,11 +151,10 @@ def _picture(study: Study, grid: RepeatedGrid, kinds: Kinds) -> Picture:
         path,
         "Trajectories of the most convergent push, the most divergent one, and the one with the largest dip",
         f"Simulated, {grid.shape} on {grid.surface}: all repetitions ({counts}) of three pushes of 1 cm at "
-        f"{1e3 * GRID_SPEED:.0f} mm/s; c: contact as a fraction of the side, angle from its normal. Above: slider at "
-        "the "
-        "start, tip and its way (grey), trajectories of the slider's centre (green). Middle: the same trajectories. "
-        "Below: the final poses (dots) about their mean; the red ellipse holds 95 % of them if they are Gaussian. x "
-        "and y have the same scale, and so have the three panels of a row.",
+        f"{1e3 * GRID_SPEED:.0f} mm/s. c: contact as a fraction of the side; angle from its normal. Above: slider at "
+        "the start, tip and its path (grey), trajectories of the slider's centre (green). Middle: the same "
+        "trajectories. Below: final poses (dots) about their mean, with the 95 % ellipse of a Gaussian (red). Both "
+        "axes, and the three panels of a row, have one scale.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Which repeated pushes are the most convergent, the most divergent and the most bimodal one, by which rule."""
+"""The rules that choose the most convergent, divergent and multi-modal push, and those of the verdicts."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ APART = 2.0  # how much further apart divergent pushes should end than convergen
 class Kinds:
     """A grid's pushes that move the slider to their end, with their whole paths.
 
-    Places of the three chosen ones; p (p, 3): family-wise p values of the dip of final x, y and heading. dropped: how
-    many pushes of the grid are not among them.
+    convergent, divergent, modal: indices of the chosen pushes. p (p, 3): family-wise p values of the dip of final x, y
+    and heading. dropped: number of pushes of the grid that are not among them.
     """
 
     cells: tuple[Repetitions, ...]
@@ -59,7 +59,7 @@ def kinds_of(grid: RepeatedGrid) -> Kinds | None:
 
 
 def to_the_end(paths: Array) -> bool:
-    """Whether paths (r, t, 3) are of a push that moves the slider, and up to the push's end in nearly all of them."""
+    """Whether the push of paths (r, t, 3) moves the slider, in nearly all of them up to its end."""
     if len(paths) < FEWEST or travel(paths[:, -1]) < LEAST_TRAVEL:
         return False
     last = paths[:, -1] - paths[:, -1 - LAST]
@@ -68,7 +68,7 @@ def to_the_end(paths: Array) -> bool:
 
 
 def whole_paths(paths: Array) -> Array:
-    """Those of paths (r, t, 3) along which the slider never moves further than the tip could push it."""
+    """The paths (r, t, 3) along which the slider never moves further than the tip could push it."""
     steps = np.hypot(*np.moveaxis(np.diff(paths[..., :2], axis=1), -1, 0))
     return np.asarray(paths[steps.max(axis=1) <= LARGEST_STEP])
 
@@ -85,18 +85,18 @@ def final_spread(paths: Array) -> float:
 
 
 def growth(paths: Array) -> float:
-    """Relative spread at the end over that half-way: above 1 paths fan out."""
+    """Relative spread at the end over that half-way; above 1 the paths fan out."""
     return relative_spread(paths) / relative_spread(paths, paths.shape[1] // 2)
 
 
 def resampled(paths: Array, figure: Figure, seed: int = 0) -> tuple[float, Array]:
-    """A figure of paths (r, t, 3), and its draws (DRAWS,) of repetitions."""
+    """A figure of paths (r, t, 3), and its resamples (DRAWS,) over repetitions."""
     rows = np.random.default_rng(seed).integers(0, len(paths), (DRAWS, len(paths)))
     return float(figure(paths)), np.array([figure(paths[drawn]) for drawn in rows])
 
 
 def apart(ratios: Sequence[Estimate]) -> Verdict:
-    """ratios: spread of the divergent push at the end over that of the convergent one, absolute and of the way."""
+    """Verdict. ratios: final spread of the divergent over that of the convergent push, absolute and relative."""
     if all(ratio.low > APART for ratio in ratios):
         return "holds"
     if all(ratio.low > 1.0 for ratio in ratios):
@@ -105,7 +105,7 @@ def apart(ratios: Sequence[Estimate]) -> Verdict:
 
 
 def draws_together_fans_out(convergent: Estimate, divergent: Estimate) -> Verdict:
-    """Growth of the relative spread of the two pushes along their second half."""
+    """Verdict by the growth of the relative spread of the two pushes."""
     right = (convergent.high < 1.0) + (divergent.low > 1.0)
     if right:
         return "holds" if right == 2 else "holds in part"
@@ -113,7 +113,7 @@ def draws_together_fans_out(convergent: Estimate, divergent: Estimate) -> Verdic
 
 
 def has_modes(p: float, power: float) -> Verdict:
-    """The least family-wise p of all pushes, and how surely modes far apart would be found."""
+    """Verdict by the least family-wise p of all pushes, and the power of the test."""
     if p <= LEVEL:
         return "holds"
     return "does not hold" if power >= POWER else "not decided"

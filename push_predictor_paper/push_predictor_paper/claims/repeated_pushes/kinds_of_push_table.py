@@ -21,21 +21,20 @@ from push_predictor_paper.statistics.grid_maps import told
 
 
 def kinds_table(grid: RepeatedGrid, kinds: Kinds) -> Table:
-    """A row a push."""
+    """A row for each of the three pushes."""
     rows = tuple(_row(kinds, name, k, half) for name, k, half in three(kinds))
     broken = sum(len(c.paths) - len(p) for c, p in zip(kinds.cells, kinds.paths, strict=True))
     caption = (
-        f"Simulated: the three pushes of the grid on {grid.surface}, 1 cm at {1e3 * GRID_SPEED:.0f} mm/s, chosen among "
-        f"the {len(kinds.cells)} that move the slider to their end ({kinds.dropped} do not, or begin at a corner). "
-        "Intervals draw repetitions anew; for the first two, of the half "
-        "that did not choose them. "
-        f"{broken} of {sum(len(c.paths) for c in kinds.cells)} repetitions left out, see below."
+        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {1e3 * GRID_SPEED:.0f} mm/s. Chosen "
+        f"among {len(kinds.cells)} that move the slider to their end ({kinds.dropped} do not, or begin at a corner). "
+        f"Intervals resample repetitions; for the first two, the half that did not choose them. {broken} of "
+        f"{sum(len(c.paths) for c in kinds.cells)} repetitions are dropped, see below."
     )
     head = (
         "push",
         "contact (of the side), angle",
         "repetitions",
-        "way (mm)",
+        "displacement (mm)",
         "spread half-way (mm)",
         "spread at the end (mm)",
     )
@@ -57,7 +56,7 @@ COLUMNS: tuple[tuple[Figure, str], ...] = (
 
 
 def three(kinds: Kinds) -> tuple[tuple[str, int, Array], ...]:
-    """Name, place and repetitions to judge by."""
+    """Name, place and test repetitions of each of the three pushes."""
     return (
         ("most convergent", kinds.convergent, kinds.paths[kinds.convergent][1::2]),
         ("most divergent", kinds.divergent, kinds.paths[kinds.divergent][1::2]),

@@ -1,4 +1,4 @@
-"""Which repeated pushes have more than one mode, and what a Gaussian makes of them."""
+"""Do repeated pushes have more than one mode, and how well does a Gaussian describe them?"""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ from push_predictor_paper.study import Study
 
 
 def section(study: Study) -> Section:
-    """Tests of unimodality, what they could have found, and what Gaussians lose where they are wrong."""
+    """Tests of unimodality, their power, and the loss of Gaussian densities."""
     grid = study.reference_grid
     if not grid.seen:
-        note = "No push of the grid was seen often enough to look for modes."
+        note = "No push of the grid has enough repetitions to test for modes."
         return Section("modality", TITLE, (Finding(CLAIM_MODES, "not decided", note),), notes=(note,))
     at, weights = _shapes(study, grid.seen), block_weights(grid.seen)
     powers = {s: found_at(s, repetitions_of(grid), 3 * len(grid.seen), LEVEL) for s in SEPARATIONS}
@@ -61,30 +61,31 @@ def section(study: Study) -> Section:
         ),
         tables=(counts_table(grid, at, weights), power_table(grid, powers), listed_table(grid, at["window"], loss)),
         pictures=(_picture(study, grid, at["window"], of_model),),
-        notes=NOTES if not study.measured else (*NOTES, "The measured sets hold no grid of repeated pushes."),
+        notes=NOTES if not study.measured else (*NOTES, "The measured sets have no grid of repeated pushes."),
         data=_json(grid, at, powers, loss),
     )
 
 
 TITLE = "Single pushes: histograms and modes"
-CLAIM_MODES = "Some pushes, repeated, have outcomes with more than one mode"
+CLAIM_MODES = "Some repeated pushes have outcomes with more than one mode"
 CLAIM_GAUSSIAN = "The outcomes of some repeated pushes are not Gaussian"
-CLAIM_GOOD = "The VHGP's Gaussian is a good approximation also of the pushes with several modes"
+CLAIM_GOOD = "The VHGP's Gaussian approximates even pushes with several modes well"
 NOTES = (
-    "Hartigan's dip test: how far the distribution of a push's outcomes is from the nearest with one mode. Its p value "
-    "is against the uniform, the unimodal law hardest to tell from two modes: of bell-shaped outcomes it rejects far "
-    "fewer than its level says. Holm's correction over all pushes and outputs of one time.",
-    "Where simulated pushes scatter, they do so by friction and pressure that vary smoothly over table and slider, and "
-    "by Gaussian sensor noise. Whether that splits a push into two outcomes is a property of our simulator and proves "
-    "nothing about the robot's pushes. The paper shows its modes by eye, without a test.",
-    f"Intervals draw blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}): they share the "
-    "error of a model.",
-    "Each output is tested by itself: the three together may have modes that none of them shows.",
+    "Hartigan's dip test measures the distance of the outcomes' distribution from the nearest unimodal one. Its p "
+    "value is against the uniform, the unimodal distribution hardest to distinguish from two modes. It therefore "
+    "rejects bell-shaped outcomes far less often than its level. Holm's correction covers all pushes and outputs of "
+    "one time.",
+    "The noise of simulated pushes comes from friction and pressure that vary smoothly over table and slider, and from "
+    "Gaussian sensor noise. Whether that splits a push into two outcomes is a property of the simulator and proves "
+    "nothing about real pushes. The paper shows its modes without a test.",
+    f"Intervals resample blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])}), because "
+    "they share the error of a model.",
+    "Each output is tested alone. The three together may have modes that none of them shows.",
 )
 
 
 def _shapes(study: Study, cells: Sequence[Repetitions]) -> dict[str, Shape]:
-    """At the end of the first window, and at the end of the push."""
+    """Shapes of the outcomes at the end of the first window and at the end of the push."""
     sizes = np.array([len(cell.outcomes) for cell in cells])
     outcomes = ([cell.outcomes for cell in cells], [cell.paths[:, -1] for cell in cells])
     shapes = study.work.run("modes of repeated pushes", shape, [(np.concatenate(rows), sizes) for rows in outcomes])
@@ -93,16 +94,16 @@ def _shapes(study: Study, cells: Sequence[Repetitions]) -> dict[str, Shape]:
 
 def _modes_finding(at: Mapping[str, Shape], power_far: float) -> Finding:
     counts = {when: int((of.several <= LEVEL).any(axis=1).sum()) for when, of in at.items()}
-    told = "; ".join(f"{WHEN[when]}, {count} of {len(at[when].dip)}" for when, count in counts.items())
+    found = "; ".join(f"{WHEN[when]}, {count} of {len(at[when].dip)}" for when, count in counts.items())
     raw = "; ".join(f"{WHEN[when]}, {np.sum(of.dip <= LEVEL)} of {of.dip.size}" for when, of in at.items())
     return Finding(
         CLAIM_MODES,
         some_modes(counts["window"], counts["end"], power_far),
-        f"Pushes with more than one mode in some output, 5 % family-wise: {told}. Without correction single tests at "
-        f"5 % reject: {raw}; by chance at most {LEVEL * at['window'].dip.size:.0f} of each. Two equal modes {FAR:.0f} "
-        f"of their sd apart would be found in {power_far:.0%} of cases, with correction. Asked: a push in the first "
-        f"window (in part: at the end only); does not hold: none, though modes that far apart are found in {POWER:.0%} "
-        "of cases.",
+        f"Pushes with more than one mode in some output, 5 % family-wise: {found}. Single tests at 5 % without "
+        f"correction reject: {raw}; at most {LEVEL * at['window'].dip.size:.0f} of each are expected by chance. Two "
+        f"equal modes {FAR:.0f} of their sd apart would be found in {power_far:.0%} of cases, with correction. Rule: "
+        "holds if a push has several modes in the first window, in part if only at the end; does not hold if none "
+        f"has, although modes that far apart are found in {POWER:.0%} of cases.",
     )
 
 
@@ -113,11 +114,11 @@ def _gaussian_finding(of: Shape, weights: Array) -> Finding:
     return Finding(
         CLAIM_GAUSSIAN,
         not_gaussian(certain, share),
-        f"Shapiro and Wilk's test, first window: {certain} of {len(of.normal)} pushes have an output that is not "
-        f"Gaussian, 5 % family-wise (Bonferroni); {share.text('.1%')} of the single tests reject at 5 %, as 5 % do of "
-        f"Gaussians. What it matters: two Gaussians instead of one change the log density of held-out repetitions by "
-        f"{gain.text('+.3f')} nats an outcome. Asked: a push (in part: none, but the share's interval above 5 %; does "
-        "not hold: none and the interval below 10 %).",
+        f"{certain} of {len(of.normal)} pushes have an output that is not Gaussian in the first window (Shapiro and "
+        f"Wilk, 5 % family-wise, Bonferroni). {share.text('.1%')} of the single tests reject at 5 %. Two Gaussians "
+        f"instead of one change the log density of held-out repetitions by {gain.text('+.3f')} nats an outcome. Rule: "
+        "holds if a push is not Gaussian; in part if none, but the share's interval lies above 5 %; does not hold if "
+        "none and the interval ends below 10 %.",
     )
 
 
@@ -134,18 +135,16 @@ def _good_finding(at: Shape, loss: Array, weights: Array, study: Study) -> Findi
     return Finding(
         CLAIM_GOOD,
         good_gaussian(given) if pushes.any() else "not decided",
-        f"To the Gaussian, or the two, fitted to the push itself, the VHGP's gives away: {where} {given.text()} nats "
-        f"an outcome and output, over all {len(loss)} {mean_over_pushes(loss, weights).text()}. Asked where there are "
-        "several "
-        f"modes: an interval below {GOOD} (in part: below {POOR}, the cost of an sd twice too wide; does not hold: "
-        f"above it). "
-        f"VHGP of {study.plan.size} windows of other pushes, the first of {study.plan.seeds} draws of these; first "
-        "window.",
+        f"Loss of the VHGP's Gaussian against the one or two Gaussians fitted to the push itself: {where} "
+        f"{given.text()} nats an outcome and output; over all {len(loss)} pushes "
+        f"{mean_over_pushes(loss, weights).text()}. VHGP of {study.plan.size} windows of other pushes, the first of "
+        f"{study.plan.seeds} draws; first window. Rule, where there are several modes: holds if the interval ends "
+        f"below {GOOD}, in part if below {POOR} (the cost of an sd twice too wide), does not hold if it lies above.",
     )
 
 
 def _model(study: Study, grid: RepeatedGrid) -> list[LogDensities]:
-    """The VHGP's densities of every push: of its repetitions, then of the values that are drawn."""
+    """The VHGP's densities of every push: at its repetitions, then at the values of the plot."""
     pushes = study.simulated.sets[study.simulated.reference]
     fit = Fit("vhgp", min(study.plan.size, len(pushes.table)), "none", 0)
     outcomes = [np.concatenate([cell.outcomes, shown_values(cell.outcomes)]) for cell in grid.seen]
@@ -163,13 +162,11 @@ def _picture(study: Study, grid: RepeatedGrid, of: Shape, of_model: Sequence[Log
     return Picture(
         path,
         "Histograms of single repeated pushes with the VHGP's densities",
-        f"Simulated: outcomes of single pushes on {grid.surface} in the first 0.2 s, about {repetitions_of(grid)} "
-        "repetitions, normalised. First and second row: largest and second largest dip of each output; third: the "
-        f"median one. Lines: the VHGP ({study.plan.size} windows of other pushes, first of {study.plan.seeds} draws), "
-        "moment-matched and exact (where it was asked). "
-        f"Every panel has scales of its own and shows at least {WIDTHS:g} of the VHGP's sd to both sides of its mean. "
-        "c: "
-        "contact as a fraction of the side, angle from its normal. p: of the dip alone, without correction.",
+        f"Outcomes of single simulated pushes on {grid.surface} in the first 0.2 s, about {repetitions_of(grid)} "
+        "repetitions, normalised. Rows: largest, second largest and median dip of each output. Lines: the VHGP "
+        f"({study.plan.size} windows of other pushes, first of {study.plan.seeds} draws), moment-matched and exact. "
+        f"Each panel has its own scales and shows at least {WIDTHS:g} of the VHGP's sd to both sides of its mean. c: "
+        "contact as a fraction of the side; angle from its normal. p: of the dip alone, without correction.",
     )
 
 

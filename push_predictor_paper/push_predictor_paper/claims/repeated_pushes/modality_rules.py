@@ -1,4 +1,4 @@
-"""How many modes repeated pushes have and what a Gaussian makes of them: figures, and by which rule a claim holds."""
+"""The number of modes of repeated pushes and the loss of a Gaussian: values, and the rules of the verdicts."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from push_predictor_paper.statistics.densities import LogDensities, Shape
 
 LEVEL = 0.05
 FAR, POWER = 6.0, 0.8  # two equal modes so many of their sd apart should be found so often
-GOOD, POOR = 0.16, 0.32  # nats an outcome; 0.32: what an sd twice as wide as it should be costs
+GOOD, POOR = 0.16, 0.32  # nats an outcome; 0.32 is the cost of an sd twice too wide
 
 
 def model_loss(cells: Sequence[Repetitions], at: Shape, of_model: Sequence[LogDensities]) -> Array:
-    """Mean log density (p, 3) that the model's Gaussian gives away to the better description by the push itself."""
+    """Mean log density (p, 3) that the model's Gaussian loses to the better fit to the push itself."""
     model = [logs.gaussian[: len(c.outcomes)].mean(axis=0) for c, logs in zip(cells, of_model, strict=True)]
     return np.asarray(at.own - np.array(model))
 
 
 def mean_over_pushes(values: Array, weights: Array) -> Estimate:
-    """Mean of those of values (p, k) that are not NaN, pushes drawn by weights (d, p); draws of none are passed "
-    "over."""
+    """Mean of the finite ones of values (p, k), pushes resampled by weights (d, p); draws without any are skipped."""
     sums, counts = np.nansum(values, axis=1), np.sum(np.isfinite(values), axis=1)
     total = weights @ counts
     drawn = (weights @ sums)[total > 0.0] / total[total > 0.0]
@@ -33,7 +32,7 @@ def mean_over_pushes(values: Array, weights: Array) -> Estimate:
 
 
 def some_modes(in_window: int, at_end: int, power_far: float) -> Verdict:
-    """What the number of pushes with several modes says, and how surely the test would find them."""
+    """Verdict by the number of pushes with several modes and the power of the test."""
     if in_window > 0:
         return "holds"
     if at_end > 0:
@@ -42,7 +41,7 @@ def some_modes(in_window: int, at_end: int, power_far: float) -> Verdict:
 
 
 def not_gaussian(certain: int, share: Estimate) -> Verdict:
-    """What the number of pushes that are surely not Gaussian says, and the share of single tests that reject."""
+    """Verdict by the number of pushes that are clearly not Gaussian and the share of single tests that reject."""
     if certain > 0:
         return "holds"
     if share.low > LEVEL:
@@ -51,7 +50,7 @@ def not_gaussian(certain: int, share: Estimate) -> Verdict:
 
 
 def good_gaussian(given_away: Estimate) -> Verdict:
-    """What the loss against a push's own description says."""
+    """Verdict by the loss against a push's own fit."""
     if given_away.high < GOOD:
         return "holds"
     if given_away.high < POOR:

@@ -1,4 +1,4 @@
-"""The tables of modes and of what a Gaussian makes of repeated pushes."""
+"""The tables of modes, and of the loss of a Gaussian."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Powers = Mapping[float, tuple[float, float]]  # by separation: found family-wise
 
 
 def counts_table(grid: RepeatedGrid, at: Mapping[str, Shape], weights: Array) -> Table:
-    """How many pushes are found to have several modes, or not to be Gaussian."""
+    """Numbers of pushes with several modes, and of pushes that are not Gaussian."""
     rows = []
     for when, of in at.items():
         for k, name in enumerate(OUTPUT_NAMES):
@@ -36,23 +36,24 @@ def counts_table(grid: RepeatedGrid, at: Mapping[str, Shape], weights: Array) ->
         "Gaussian rejected, single tests at 5 %",
     )
     caption = (
-        f"Simulated: how many of {len(grid.seen)} pushes of the grid on {grid.surface} have more than one mode, about "
-        f"{repetitions_of(grid)} repetitions each. Of the family-wise ones, one or more would be false with 5 % "
-        "probability at most. Last: log density of held-out fifths of the repetitions, two Gaussians less one; "
-        "beneath, 95 % interval, blocks of neighbouring pushes drawn anew; single outliers weigh heavily in it."
+        f"Numbers of pushes with more than one mode, of {len(grid.seen)} simulated pushes of the grid on "
+        f"{grid.surface}, about {repetitions_of(grid)} repetitions each. Family-wise: the probability of one or more "
+        "false ones is at most 5 %. Last: log density of held-out fifths of the repetitions, two Gaussians minus "
+        "one. Beneath: 95 % interval from resampling blocks of neighbouring pushes; single outliers weigh heavily "
+        "in it."
     )
     return Table(caption, (*head, "single rejections by chance", "two Gaussians over one (nats)"), tuple(rows))
 
 
 def power_table(grid: RepeatedGrid, powers: Powers) -> Table:
-    """What the test would find."""
+    """The power of the test."""
     rows = tuple((f"{s:.1f}", f"{corrected:.0%}", f"{single:.0%}") for s, (corrected, single) in powers.items())
     enough = [s for s, (corrected, _) in powers.items() if corrected >= POWER]
     least = f"from {enough[0]:.1f} sd on" if enough else f"only beyond {SEPARATIONS[-1]:.0f} sd"
     caption = (
-        f"What the test would find at {repetitions_of(grid)} repetitions: two equal Gaussian modes, their distance in "
-        f"units of the sd of each (below 2 their sum has one mode), by 1000 draws, ±3 % at the most. {POWER:.0%} are "
-        f"found {least}; nearer modes may have been missed."
+        f"The power of the test at {repetitions_of(grid)} repetitions: two equal Gaussian modes, their distance in "
+        f"units of the sd of each (below 2 their sum has one mode), by 1000 draws, ±3 % at most. {POWER:.0%} are "
+        f"found {least}; the test may miss nearer modes."
     )
     return Table(caption, ("distance of the modes (sd)", "found, 5 % family-wise", "found by one test at 5 %"), rows)
 
@@ -69,14 +70,14 @@ def listed_table(grid: RepeatedGrid, of: Shape, loss: Array) -> Table:
         )
     head = ("push", "repetitions", "p of the dip", "p family-wise", "p of a Gaussian", "two Gaussians over one (nats)")
     caption = (
-        "Simulated: the outcomes of the first window with the largest dips, and all with several modes. Last: what the "
-        "VHGP's Gaussian gives away to the push's own. Single pushes, no interval."
+        "The outcomes of the first window with the largest dips, and all with several modes. Simulated. Last: the "
+        "loss of the VHGP's Gaussian against the push's own fit. Single pushes, without interval."
     )
-    return Table(caption, (*head, "given away by the VHGP (nats)"), tuple(rows))
+    return Table(caption, (*head, "lost by the VHGP (nats)"), tuple(rows))
 
 
 def repetitions_of(grid: RepeatedGrid) -> int:
-    """How often a push of the grid was seen."""
+    """The median number of repetitions of a push of the grid."""
     return int(np.median([len(cell.outcomes) for cell in grid.seen]))
 
 
