@@ -116,10 +116,10 @@ def _check(
 
 
 def _require(name: str, values: Numbers, accepted: bool | BoolArray, meaning: str, *details: object) -> None:
-    """Raise RequestError for the first value that is not accepted; in a column its index is added to the name.
+    """Raise RequestError for the first value that is not accepted; for a column the name gets its index.
 
-    meaning: what is accepted, a format string for details, which are columns too or apply to all. It is filled only
-    for an error.
+    meaning: a format string that states what is accepted. details: its numbers, each one for all pushes or a column.
+    The string is filled only for an error.
     """
     if not isinstance(accepted, np.ndarray):
         if not accepted:
@@ -131,7 +131,7 @@ def _require(name: str, values: Numbers, accepted: bool | BoolArray, meaning: st
 
 
 def _at(values: object, index: int) -> object:
-    """The value of one push: a column's entry, or what applies to all."""
+    """The value for one push: the entry of a column, or a value for all pushes."""
     return float(values[index]) if isinstance(values, np.ndarray) else values
 
 

@@ -1,4 +1,4 @@
-"""Validation while pushes happen, without ROS: session, buffers, stream sync, running scores, files, processes.
+"""What the nodes do online, without ROS: sessions, buffers, running scores, files, request statistics, processes.
 
-`nodes.validator` adds topics and services; import anything from here.
+`nodes.validator` and `nodes.server` add topics, services and the action; import anything from here.
 """

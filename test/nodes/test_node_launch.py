@@ -30,15 +30,17 @@ PARAMETERS = {
 
 
 @dataclass
-class Standin:
+class FakeAction:
     """An action of launch that records its arguments."""
 
     args: tuple[Any, ...]
     kwargs: dict[str, Any] = field(default_factory=dict)
 
 
-def standin(name: str) -> type[Standin]:
-    return type(name, (Standin,), {"__init__": lambda self, *args, **kwargs: Standin.__init__(self, args, kwargs)})
+def fake_action(name: str) -> type[FakeAction]:
+    return type(
+        name, (FakeAction,), {"__init__": lambda self, *args, **kwargs: FakeAction.__init__(self, args, kwargs)}
+    )
 
 
 @pytest.fixture
@@ -52,12 +54,12 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     }
     for module, names in needed.items():
         made = ModuleType(module)
-        vars(made).update({name: standin(name) for name in names})
+        vars(made).update({name: fake_action(name) for name in names})
         monkeypatch.setitem(sys.modules, module, made)
     return runpy.run_path(str(FILE))
 
 
-def actions(launch_file: dict[str, Any]) -> list[Standin]:
+def actions(launch_file: dict[str, Any]) -> list[FakeAction]:
     return list(launch_file["generate_launch_description"]().args[0])
 
 

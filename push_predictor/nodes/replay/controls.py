@@ -31,20 +31,20 @@ class ReplayControls:
 
     def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
         self._node, self._player, self._restamps = node, player, restamps
-        for kind, name in (
-            (Pause, "pause"),
-            (Resume, "resume"),
-            (TogglePaused, "toggle_paused"),
-            (IsPaused, "is_paused"),
-            (GetRate, "get_rate"),
-            (SetRate, "set_rate"),
-            (Play, "play"),
-            (PlayNext, "play_next"),
-            (Burst, "burst"),
-            (Seek, "seek"),
-            (Stop, "stop"),
+        for kind, name, callback in (
+            (Pause, "pause", self._pause),
+            (Resume, "resume", self._resume),
+            (TogglePaused, "toggle_paused", self._toggle_paused),
+            (IsPaused, "is_paused", self._is_paused),
+            (GetRate, "get_rate", self._get_rate),
+            (SetRate, "set_rate", self._set_rate),
+            (Play, "play", self._play),
+            (PlayNext, "play_next", self._play_next),
+            (Burst, "burst", self._burst),
+            (Seek, "seek", self._seek),
+            (Stop, "stop", self._stop),
         ):
-            node.create_service(kind, f"~/{name}", getattr(self, f"_{name}"))
+            node.create_service(kind, f"~/{name}", callback)
 
     def _pause(self, request: Any, response: Any) -> Any:
         self._player.pause()
