@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
-from push_predictor.simulation.physics import Acting, Physics
+from push_predictor.simulation.physics import ActingForces, Physics
 from push_predictor.simulation.pushes import PusherPath
 from push_predictor.types import Array
 
@@ -142,7 +142,7 @@ def _arms(support: Array, heading: Array) -> tuple[Array, Array]:
     return cos * support[:, 0] - sin * support[:, 1], sin * support[:, 0] + cos * support[:, 1]
 
 
-def _drag(physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
+def _drag(physics: Physics, acting: ActingForces, arms: tuple[Array, Array], velocity: Array, dt: Array) -> _Drag:
     x, y = arms
     vx = velocity[:, :1] - velocity[:, 2:] * y
     vy = velocity[:, 1:2] + velocity[:, 2:] * x
@@ -158,7 +158,7 @@ def _drag(physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity:
 
 
 def _directed_drag(
-    physics: Physics, acting: Acting, arms: tuple[Array, Array], velocity: Array, dt: Array
+    physics: Physics, acting: ActingForces, arms: tuple[Array, Array], velocity: Array, dt: Array
 ) -> _DirectedDrag:
     """The drag with grain and viscosity: a point at velocity v resists with W^-1 v grip / sqrt(v' W^-1 v)."""
     x, y = arms

@@ -19,7 +19,7 @@ GRAVITY = 9.81  # m/s^2
 
 
 @dataclass(frozen=True, eq=False)
-class Acting:
+class ActingForces:
     """Friction and forces on n sliders at an instant.
 
     grip (n, k) N, friction (n,) at the rod; grain (n, 2), viscosity (n,) N s/m and pull (n, 3) N, N m as in Changes.
@@ -65,18 +65,18 @@ class Physics:
 
     def acting(
         self, pose: Array, velocity: Array, contact: Array, travelled: Array, points: tuple[Array, Array]
-    ) -> Acting:
+    ) -> ActingForces:
         """Friction and forces at an instant.
 
         Arguments as in Moment, points: world x, y (n, k) of the support, m.
         """
         if self.changes == PLAIN:
-            return Acting(self.grip(*points, travelled), self.friction_at_rod(travelled))
+            return ActingForces(self.grip(*points, travelled), self.friction_at_rod(travelled))
         changes, moment = self.changes, Moment(self.conditions, pose, velocity, contact, travelled)
         load = self.load_noise.at(travelled)
         grip = self._grip(load if changes.load is None else load + changes.load(moment), *points)
         friction = self.friction_at_rod(travelled)
-        return Acting(
+        return ActingForces(
             grip if changes.grip is None else grip * changes.grip(moment)[:, None],
             friction if changes.contact_friction is None else _added(friction, changes.contact_friction(moment)),
             None if changes.grain is None else changes.grain(moment),

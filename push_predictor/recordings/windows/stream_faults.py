@@ -38,7 +38,7 @@ CLOCK_TOLERANCE = 0.25  # s; larger clock offsets between two streams are report
 
 def describe_faults(counts: Mapping[str, int]) -> list[str]:
     """Sentences about the faults that a sound system does not have, from the counts of a WindowFinder."""
-    return [f"{counts[kind]} {kind} ({FAULTS[kind]})" for kind in WARNED if counts.get(kind)]
+    return [f"{counts[kind]} {FAULTS[kind]}" for kind in WARNED if counts.get(kind)]
 
 
 def describe_recording_faults(recording: Recording, counts: Mapping[str, int]) -> list[str]:
