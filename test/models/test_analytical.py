@@ -31,7 +31,7 @@ directions = st.floats(-1.5, 1.5)
 
 
 def pushes(n: int, seed: int = 0, travel: float = 0.004, speed: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
-    """Random pushes all round a slider: inputs (n, 3) and durations (n,)."""
+    """Random pushes all around a slider: inputs (n, 3) and durations (n,)."""
     draw = np.random.default_rng(seed)
     inputs = np.column_stack([np.full(n, speed), draw.uniform(0.0, 1.0, n), draw.uniform(-1.5, 1.5, n)])
     return inputs, np.full(n, travel / speed)
@@ -72,7 +72,7 @@ supports = st.builds(Support, st.tuples(coordinates, coordinates), st.floats(0.0
 
 @settings(max_examples=300, deadline=None)
 @given(st.tuples(coordinates, coordinates), directions, frictions, supports)
-def test_the_wrench_acts_at_the_contact_inside_the_friction_cone(point, angle, friction, support):
+def test_wrench_acts_at_contact_inside_friction_cone(point, angle, friction, support):
     move = one_contact(point, angle, friction, support)
     force, arm = move["force"], move["arm"]
     assert move["moment"] == pytest.approx(arm[0] * force[1] - arm[1] * force[0], abs=1e-12)
@@ -82,7 +82,7 @@ def test_the_wrench_acts_at_the_contact_inside_the_friction_cone(point, angle, f
 
 @settings(max_examples=300, deadline=None)
 @given(st.tuples(coordinates, coordinates), directions, frictions, supports)
-def test_the_pusher_and_the_contact_agree_as_coulomb_friction_says(point, angle, friction, support):
+def test_contact_velocity_obeys_coulomb_friction(point, angle, friction, support):
     move = one_contact(point, angle, friction, support)
     relative = move["pusher"] - move["contact"]
     assert relative[0] == pytest.approx(0.0, abs=1e-10)  # neither separation nor penetration
@@ -119,20 +119,20 @@ def test_motion_is_parallel_to_the_gradient_of_the_limit_surface():
     assert twist @ gradient > 0.0
 
 
-def test_both_slips_and_sticking_occur():
+def test_slip_to_both_sides_and_sticking_occur():
     slips = {int(one_contact((-0.045, 0.02), angle, 0.3, Support((0.0, 0.0), 0.034))["slip"])
              for angle in np.linspace(-1.4, 1.4, 30)}  # fmt: skip
     assert slips == {-1, 0, 1}
 
 
-def test_a_pusher_that_leaves_moves_nothing():
+def test_receding_pusher_leaves_slider_at_rest():
     for angle in (np.pi / 2 + 0.01, np.pi, -2.0):
         assert one_contact((-0.045, 0.02), angle, 0.5, Support((0.0, 0.0), 0.034))["contact"] == pytest.approx([0, 0])
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.tuples(coordinates, coordinates), directions, supports)
-def test_friction_beyond_all_bounds_sticks_wherever_the_pusher_need_not_pull(point, angle, support):
+def test_very_high_friction_sticks_unless_pusher_would_have_to_pull(point, angle, support):
     move = one_contact(point, angle, 1e9, support)
     lever = np.array([-move["arm"][1], move["arm"][0]]) / support.length
     to_stick = np.linalg.solve(np.eye(2) + np.outer(lever, lever), move["pusher"])
@@ -153,7 +153,7 @@ def test_without_friction_the_force_is_along_the_normal():
 
 @settings(max_examples=200, deadline=None)
 @given(coordinates, directions, frictions, supports)
-def test_the_slider_turns_as_the_three_rays_vote(y, angle, friction, support):
+def test_turn_direction_follows_mason_voting_theorem(y, angle, friction, support):
     """Mason 1986: two of the push direction and the two edges of the friction cone agree on the side to turn to."""
     move = one_contact((-0.045, y), angle, friction, support)
     rays = [np.array([np.cos(angle), np.sin(angle)]), np.array([1.0, friction]), np.array([1.0, -friction])]
@@ -165,17 +165,17 @@ def test_the_slider_turns_as_the_three_rays_vote(y, angle, friction, support):
 # --- supports ------------------------------------------------------------------------------------------------------
 
 
-def test_even_pressure_under_a_circle_reaches_two_thirds_of_its_radius():
+def test_uniform_pressure_of_circle_has_length_two_thirds_of_radius():
     assert uniform_support(ellipse(0.0525, 0.0525)).length == pytest.approx(2.0 / 3.0 * 0.0525, rel=1e-15)
 
 
-def test_even_pressure_under_a_square_has_the_known_mean_distance():
+def test_uniform_pressure_of_square_has_known_mean_distance():
     expected = 0.09 * (np.sqrt(2.0) + np.log(1.0 + np.sqrt(2.0))) / 6.0
     assert uniform_support(square(0.09)).length == pytest.approx(expected, rel=1e-14)
 
 
 @EVERY_OUTLINE
-def test_even_pressure_equals_a_sum_over_a_grid(outline):
+def test_uniform_pressure_equals_sum_over_grid(outline):
     ticks = np.linspace(-0.11, 0.11, 881) + 1.3e-5  # off the edges
     points = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
     inside = points[outline.project(points).distance < 0.0]
@@ -184,7 +184,7 @@ def test_even_pressure_equals_a_sum_over_a_grid(outline):
     assert support.centre == pytest.approx(np.mean(inside, axis=0), abs=2e-4)
 
 
-def test_even_pressure_holds_for_an_outline_that_is_not_convex():
+def test_uniform_pressure_of_nonconvex_outline_equals_sum_over_grid():
     ell = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.1], [0.0, 0.1]]))
     ticks = np.linspace(0.0005, 0.0995, 100)
     points = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
@@ -194,7 +194,7 @@ def test_even_pressure_holds_for_an_outline_that_is_not_convex():
     assert support.length == pytest.approx(np.mean(np.linalg.norm(points - support.centre, axis=1)), rel=1e-3)
 
 
-def test_support_points_share_the_load():
+def test_support_of_points_is_the_load_weighted_mean():
     support = support_of_points(np.array([[0.03, 0.0, 2.0], [-0.03, 0.0, 1.0], [-0.03, 0.0, 1.0]]))
     assert support.centre == pytest.approx((0.0, 0.0))
     assert support.length == pytest.approx(0.03)
@@ -252,7 +252,7 @@ def test_scaling_all_lengths_scales_the_motion():
 
 @pytest.mark.parametrize("travel", [0.004, 0.0145])
 @EVERY_OUTLINE
-def test_the_disc_ends_on_the_outline_or_off_it(outline, travel):
+def test_disc_ends_on_the_outline_or_outside_it(outline, travel):
     model = AnalyticalPush(outline, RADIUS)
     contact, sweep = sweeps(model, *pushes(300, travel=travel))
     pose = slide(contact, sweep)
@@ -276,7 +276,7 @@ def test_a_pusher_that_slides_off_leaves_the_slider_behind():
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.0, 0.013), st.floats(-0.03, 0.03))
-def test_a_disc_moves_the_slider_only_from_where_it_touches(distance, y):
+def test_disc_moves_slider_only_after_touch(distance, y):
     contact = DiscContact(square(0.09), RADIUS, 0.3, Support((0.0, 0.0), 0.034))
     start, ahead = np.array([[-0.045 - RADIUS - distance, y]]), np.array([[1.0, 0.0]])
     after_gap = slide(contact, Sweep(start, ahead, np.array([0.014])))
@@ -293,7 +293,7 @@ def test_a_disc_crosses_a_notch_and_pushes_its_far_side():
     assert pose[0] == pytest.approx([0.035 - (0.04 - 2 * RADIUS - 1e-4), 0.0, 0.0], abs=3e-5)
 
 
-def test_a_pusher_that_turns_away_moves_nothing():
+def test_pusher_that_moves_away_leaves_slider_at_rest():
     model = AnalyticalPush(square(0.09), RADIUS)
     assert np.all(model.displacement(np.array([[0.02, 0.1, 2.0]]), np.array([0.2])) == 0.0)
 
@@ -334,7 +334,7 @@ def test_displacements_are_within_a_thousandth_of_fine_steps(outline):
     assert np.all(error[~moved] < 1e-5 * sweep.travel[~moved])
 
 
-def test_steps_are_of_fourth_order_while_the_contact_keeps_its_kind():
+def test_integration_is_fourth_order_while_contact_mode_is_constant():
     model = AnalyticalPush(square(0.09), RADIUS)
     inputs = np.array([[0.02, 0.07, 0.05], [0.02, 0.11, 0.9], [0.02, 0.16, -0.8]])  # sticks, slips left, slips right
     contact, sweep = sweeps(model, inputs, np.full(3, 1.0))
@@ -356,10 +356,10 @@ def _seconds(model: AnalyticalPush, inputs: np.ndarray, duration: np.ndarray) ->
     return time.process_time() - begin
 
 
-# --- fit and refusals --------------------------------------------------------------------------------------
+# --- fit and errors --------------------------------------------------------------------------------------
 
 
-def test_the_fit_finds_the_parameters_that_made_the_outcomes():
+def test_fit_recovers_true_parameters():
     truth = AnalyticalPush(square(0.09), RADIUS, 0.22, Support((0.0, 0.0), 0.029))
     inputs, duration = pushes(200)
     exact = truth.displacement(inputs, duration)
@@ -370,7 +370,7 @@ def test_the_fit_finds_the_parameters_that_made_the_outcomes():
         assert fitted.support.length == pytest.approx(0.029, rel=share)
 
 
-def test_the_fit_is_the_same_every_time_and_leaves_the_rest():
+def test_fit_is_deterministic_and_keeps_other_parameters():
     start = AnalyticalPush(square(0.09), RADIUS, support=Support((0.003, 0.001), 0.03))
     inputs, duration = pushes(60)
     outcomes = replace(start, contact_friction=0.5).displacement(inputs, duration)
@@ -380,7 +380,7 @@ def test_the_fit_is_the_same_every_time_and_leaves_the_rest():
     assert first.pusher_radius == start.pusher_radius
 
 
-def test_the_fit_keeps_to_lengths_that_a_pressure_could_have():
+def test_fit_stays_within_physical_lengths():
     inputs, duration = pushes(60)
     pure_shift = np.column_stack([inputs[:, 0] * duration, np.zeros(60), np.zeros(60)])
     fitted = fit_analytical(AnalyticalPush(square(0.09), RADIUS), inputs, duration, pure_shift)
@@ -388,13 +388,13 @@ def test_the_fit_keeps_to_lengths_that_a_pressure_could_have():
 
 
 @pytest.mark.parametrize("outcomes", [np.zeros((3, 2)), np.zeros((2, 3)), np.full((3, 3), np.nan)])
-def test_rows_that_cannot_be_fitted_are_refused(outcomes):
+def test_fit_rejects_unusable_rows(outcomes):
     inputs, duration = pushes(3)
     with pytest.raises(TrainingError, match="rows"):
         fit_analytical(AnalyticalPush(square(0.09), RADIUS), inputs, duration, outcomes)
 
 
-def test_a_rig_out_of_range_is_refused():
+def test_rejects_rig_values_out_of_range():
     for wrong in ({"pusher_radius": -0.1}, {"contact_friction": np.inf}):
         with pytest.raises(RigError, match=next(iter(wrong))):
             AnalyticalPush(**({"outline": square(0.09), "pusher_radius": RADIUS} | wrong))
@@ -403,7 +403,7 @@ def test_a_rig_out_of_range_is_refused():
 
 
 @pytest.mark.parametrize(("column", "name"), [(0, "velocity"), (1, "contact"), (2, "angle")])
-def test_a_request_that_is_not_finite_is_refused(column, name):
+def test_rejects_nonfinite_request(column, name):
     inputs, duration = pushes(3)
     inputs[1, column] = np.nan
     with pytest.raises(RequestError, match=name):

@@ -1,4 +1,4 @@
-"""Few pushes of the analytical model in plain numbers: the same answers as from arrays."""
+"""Single pushes of the analytical model in plain numbers equal those computed as arrays."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SUPPORT = Support((0.004, -0.003), 0.03)
 
 
 def spread_pushes(n: int, seed: int = 0) -> tuple[Array, Array]:
-    """Short and long pushes, some of them to where the pusher slides off."""
+    """Short and long pushes; in some of them the pusher slides off."""
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([rng.uniform(0.0, 0.2, n), rng.random(n), rng.uniform(-1.5, 1.5, n)])
     return inputs, rng.uniform(0.01, 0.5, n)
@@ -53,7 +53,7 @@ def test_the_nearest_point_is_that_of_the_outline(shape: str, place: tuple[float
     assert np.hypot(nx, ny) == pytest.approx(1.0)
 
 
-def test_points_on_a_level_with_corners_are_inside_or_outside_as_they_should_be() -> None:
+def test_points_level_with_corners_are_classified_correctly() -> None:
     nearest = nearest_on(OUTLINES["square"])
     height = float(OUTLINES["square"].vertices[:, 1].max())
     for x, y, inside in ((0.0, 0.0, True), (-0.2, height, False), (0.2, -height, False), (-0.2, 0.0, False)):
@@ -62,7 +62,7 @@ def test_points_on_a_level_with_corners_are_inside_or_outside_as_they_should_be(
 
 @pytest.mark.parametrize("radius", [0.00475, 0.0])
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_one_push_goes_as_it_goes_among_others(shape: str, radius: float) -> None:
+def test_single_push_equals_the_same_push_in_a_batch(shape: str, radius: float) -> None:
     physics = AnalyticalPush(OUTLINES[shape], radius, 0.3, SUPPORT)
     inputs, duration = spread_pushes(60)
     assert np.max(inputs[:, 0] * duration) > 10.0 * LONGEST_STEP
@@ -72,7 +72,7 @@ def test_one_push_goes_as_it_goes_among_others(shape: str, radius: float) -> Non
 
 
 @pytest.mark.parametrize("count", [0, 2, FEW, FEW + 1])
-def test_few_and_many_are_alike(count: int) -> None:
+def test_few_pushes_equal_many_pushes(count: int) -> None:
     physics = AnalyticalPush(OUTLINES["hexagon"], 0.005, 0.4)
     inputs, duration = spread_pushes(count)
     ours = scalar_analytical(physics).displacement(inputs, duration)
@@ -80,7 +80,7 @@ def test_few_and_many_are_alike(count: int) -> None:
     np.testing.assert_allclose(ours, physics.displacement(inputs, duration), rtol=1e-9, atol=1e-12)
 
 
-def test_what_is_prepared_stays_where_the_physics_change() -> None:
+def test_replaced_physics_keeps_prepared_outline() -> None:
     physics = AnalyticalPush(OUTLINES["square"], 0.005)
     inputs, duration = spread_pushes(1, seed=3)
     for change in ({"contact_friction": 0.1}, {"pusher_radius": 0.01}, {"support": SUPPORT}):
@@ -91,7 +91,7 @@ def test_what_is_prepared_stays_where_the_physics_change() -> None:
 
 
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
-def test_every_response_is_the_same(mechanism) -> None:
+def test_responses_equal_those_of_array_mechanics(mechanism) -> None:
     physics = AnalyticalPush(OUTLINES["square"], 0.00475)
     inputs, duration = spread_pushes(5, seed=1)
     push = Push(inputs, duration, {"slider_heading": np.linspace(-3.0, 3.0, 5)})
@@ -100,6 +100,6 @@ def test_every_response_is_the_same(mechanism) -> None:
 
 
 @pytest.mark.parametrize("push", [(np.nan, 0.1, 0.1), (-0.1, 0.1, 0.1), (0.02, np.inf, 0.1), (0.02, 0.1, np.nan)])
-def test_what_is_no_push_is_refused_by_name(push: tuple[float, float, float]) -> None:
+def test_rejects_invalid_push_by_name(push: tuple[float, float, float]) -> None:
     with pytest.raises(RequestError, match="is not accepted, give a finite number"):
         scalar_analytical(AnalyticalPush(OUTLINES["square"], 0.005)).displacement(np.array([push]), np.array([0.2]))

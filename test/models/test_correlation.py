@@ -1,4 +1,4 @@
-"""The correlation of the outputs: what it is everywhere, and whether it is found where there is one, and only there."""
+"""The correlation of the outputs: its properties at all inputs, and a fit that finds it only if it exists."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def correlation_of(model: PushModel) -> Correlation:
 
 
 def alone(model: PushModel) -> GaussianProcessPredictor:
-    """Its body with independent outputs."""
+    """Its predictor with independent outputs."""
     assert isinstance(model.predictor, GaussianProcessPredictor)
     return replace(model.predictor, correlation=None)
 
@@ -75,7 +75,7 @@ def model() -> PushModel:
     return trained()
 
 
-# --- what it is, wherever it is asked -------------------------------------------------------------------------------
+# --- properties at all inputs -------------------------------------------------------------------------------
 
 moderate = st.floats(-4.0, 4.0)
 
@@ -88,7 +88,7 @@ moderate = st.floats(-4.0, 4.0)
     bandwidth=st.floats(0.05, 5.0),
     shrinkage=st.floats(0.1, 100.0),
 )
-def test_it_is_a_correlation_matrix_everywhere(
+def test_correlation_is_a_correlation_matrix_everywhere(
     features: Array, residuals: Array, asked: Array, bandwidth: float, shrinkage: float
 ) -> None:
     found = Correlation(features, residuals, bandwidth, shrinkage).at(np.concatenate([asked, features]))
@@ -97,21 +97,21 @@ def test_it_is_a_correlation_matrix_everywhere(
     assert np.all(np.linalg.eigvalsh(found) > 0.0)
 
 
-def test_far_from_the_rows_the_outputs_are_independent(model: PushModel) -> None:
+def test_outputs_are_independent_far_from_training_rows(model: PushModel) -> None:
     correlation = correlation_of(model)
     far = np.array([[1e3, 0.0], [0.0, -1e3], [1e9, 1e9]])
     assert np.array_equal(correlation.at(far), np.broadcast_to(np.eye(3), (3, 3, 3)))
     assert np.all(correlation.at(correlation.features[:0]).shape == np.array((0, 3, 3)))
 
 
-def test_where_rows_are_many_it_is_theirs() -> None:
+def test_correlation_equals_that_of_many_nearby_rows() -> None:
     rng, r = np.random.default_rng(0), np.array([[1.0, 0.5, -0.6], [0.5, 1.0, 0.1], [-0.6, 0.1, 1.0]])
     z = rng.multivariate_normal(np.zeros(3), r, 20_000)
     found = Correlation(rng.standard_normal((20_000, 2)) * 0.1, z, 1.0, 2.0).at(np.zeros((1, 2)))[0]
     assert found == pytest.approx(r, abs=0.03)
 
 
-def test_many_points_are_asked_in_parts(monkeypatch: pytest.MonkeyPatch, model: PushModel) -> None:
+def test_many_points_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch, model: PushModel) -> None:
     correlation = correlation_of(model)
     asked = np.random.default_rng(1).standard_normal((500, 2))
     whole = correlation.at(asked)
@@ -136,7 +136,7 @@ def test_outcome_process_and_their_difference_are_covariances(numbers: Array, la
 
 @settings(max_examples=100, deadline=None)
 @given(numbers=arrays(float, (3, 3), elements=st.floats(-5.0, 5.0)))
-def test_three_numbers_stand_for_a_correlation_matrix(numbers: Array) -> None:
+def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
     matrices = bounded(numbers)
     assert np.all(np.linalg.eigvalsh(matrices) > 0.0)
     for one, matrix in zip(numbers, matrices, strict=True):
@@ -144,7 +144,7 @@ def test_three_numbers_stand_for_a_correlation_matrix(numbers: Array) -> None:
     assert bounded(unbounded(matrices)) == pytest.approx(matrices, abs=1e-7)
 
 
-# --- what is learnt -------------------------------------------------------------------------------------------------
+# --- fit -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
@@ -155,7 +155,7 @@ def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
-def test_pushes_that_it_has_not_seen_are_likelier_with_it(kind: str) -> None:
+def test_correlation_increases_likelihood_of_new_pushes(kind: str) -> None:
     model, new = trained(kind), pushes(400, 1, 0.8)
     with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
@@ -170,7 +170,7 @@ def test_pushes_that_it_has_not_seen_are_likelier_with_it(kind: str) -> None:
         assert np.diagonal(ours, axis1=1, axis2=2) == pytest.approx(np.diagonal(theirs, axis1=1, axis2=2), rel=1e-12)
 
 
-def test_no_correlation_is_found_where_there_is_none() -> None:
+def test_no_correlation_is_fitted_to_independent_outputs() -> None:
     model = trained(strength=0.0, n=240)
     assert isinstance(model.predictor, GaussianProcessPredictor)
     scaling, found = model.predictor.scaling, 0
@@ -187,12 +187,12 @@ def test_no_correlation_is_found_where_there_is_none() -> None:
     assert found <= 1
 
 
-def test_too_few_pushes_tell_nothing() -> None:
+def test_no_correlation_is_fitted_to_too_few_pushes() -> None:
     model = trained(n=FEWEST_PUSHES * PER_PUSH - 1 * PER_PUSH)
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is None
 
 
-def test_no_residual_counts_for_more_than_is_expected_of_it(model: PushModel) -> None:
+def test_residuals_are_bounded_by_their_expected_length(model: PushModel) -> None:
     lengths = np.linalg.norm(correlation_of(model).residuals, axis=1)
     assert lengths.max() == pytest.approx(LONGEST, rel=1e-6) and lengths.min() < 1.0
 
@@ -211,7 +211,7 @@ def test_held_out_correlation_is_that_of_the_other_blocks(model: PushModel) -> N
         assert found[out] == pytest.approx(others.at(correlation.features[out]), abs=1e-12)
 
 
-def test_of_many_rows_it_keeps_some(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_correlation_keeps_a_sample_of_many_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(correlation_fit, "MOST_ROWS", 150)
     monkeypatch.setattr(correlation_fit, "MOST_BLOCKS", 30)
     model = trained()
@@ -241,7 +241,7 @@ def test_held_out_moments_include_the_correlation(model: PushModel) -> None:
     assert np.abs(total[:, 0, 2]).max() > 0.0
 
 
-def test_the_sums_of_no_rows_are_independence() -> None:
+def test_sums_of_no_rows_give_independence() -> None:
     assert np.array_equal(correlations(np.zeros((2, 6)), 3.0), np.broadcast_to(np.eye(3), (2, 3, 3)))
 
 
@@ -249,7 +249,7 @@ def test_the_sums_of_no_rows_are_independence() -> None:
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
-def test_a_loaded_model_has_the_correlation_of_the_saved_one(kind: str, tmp_path: Path) -> None:
+def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> None:
     model = trained(kind)
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
@@ -260,7 +260,7 @@ def test_a_loaded_model_has_the_correlation_of_the_saved_one(kind: str, tmp_path
         assert np.array_equal(ours, theirs)
 
 
-def test_only_a_correlation_asks_for_version_5(model: PushModel, tmp_path: Path) -> None:
+def test_only_a_correlation_needs_format_5(model: PushModel, tmp_path: Path) -> None:
     physics = AnalyticalPush(model.rig.outline, model.rig.pusher_radius)
     tip = Effect(
         "contact_friction", "velocity", DriverBasis("constant"), np.array([0.1]), np.array([[0.01]]), np.ones(3)
@@ -287,7 +287,7 @@ def test_only_a_correlation_asks_for_version_5(model: PushModel, tmp_path: Path)
         ({"residuals": np.full((400, 3), np.inf)}, "residuals of the correlation are not 400 times three"),
     ],
 )
-def test_a_damaged_correlation_is_refused_in_words(
+def test_rejects_damaged_correlation_with_a_clear_message(
     model: PushModel, change: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     assert isinstance(model.predictor, GaussianProcessPredictor)

@@ -1,4 +1,4 @@
-"""A model extended by effects: what it predicts, what it asks for, the file it lives in, and how effects are sized."""
+"""A model extended by effects: predictions, needed covariates, files, and the estimation of effects."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), **(precision or {"rtol": 0.0}))
 
 
-# --- what it predicts -------------------------------------------------------------------------------------------
+# --- predictions -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kind: str) -> None:
+def test_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kind: str) -> None:
     base, table = bases[kind], pushes(20, 1)
     nothing = extended(base, slippery(0.0), grain(0.0).__class__(*GRAIN, np.zeros(2), np.zeros((2, 2)), np.ones(3)))
     assert_same(predicted(nothing, table), predicted(base, table))
@@ -81,25 +81,25 @@ def test_an_effect_of_size_zero_changes_nothing(bases: dict[str, PushModel], kin
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_effects_shift_the_mean_and_add_what_they_are_unsure_of(bases: dict[str, PushModel], kind: str) -> None:
+def test_effects_shift_the_mean_and_add_their_uncertainty(bases: dict[str, PushModel], kind: str) -> None:
     base, table, effects = bases[kind], pushes(20, 1), (slippery(0.1, sd=0.05), grain(0.1))
     model, push = extended(base, *effects, scale=(0.5, 1.0, 2.0)), Push(table.inputs, table.duration, table.covariates)
     ours, theirs = predicted(model, table), predicted(base, table)
-    shifts, unsure = zip(*(effect.shift(physics(), push) for effect in effects), strict=True)
+    shifts, uncertainty = zip(*(effect.shift(physics(), push) for effect in effects), strict=True)
     scale = np.diag([0.5, 1.0, 2.0])
     np.testing.assert_allclose(ours.mean, theirs.mean + sum(shifts), rtol=1e-12)
-    np.testing.assert_allclose(ours.covariance, scale @ theirs.covariance @ scale + sum(unsure), atol=1e-18)
+    np.testing.assert_allclose(ours.covariance, scale @ theirs.covariance @ scale + sum(uncertainty), atol=1e-18)
     np.testing.assert_allclose(ours.process_covariance, scale @ theirs.process_covariance @ scale, atol=1e-18)
 
 
-def test_the_exact_density_is_that_of_the_base_where_the_effect_has_moved_it(bases: dict[str, PushModel]) -> None:
+def test_exact_density_is_that_of_the_base_shifted_by_the_effect(bases: dict[str, PushModel]) -> None:
     base, table, effect = bases["vhgp"], pushes(20, 1), slippery(0.2)
     shift, _ = effect.shift(physics(), Push(table.inputs, table.duration, table.covariates))
     moved = extended(base, effect).exact_log_density(replace(table, outcomes=table.outcomes + shift))
     np.testing.assert_allclose(moved, base.exact_log_density(table), rtol=1e-9)
 
 
-def test_the_exact_density_has_the_variance_that_is_predicted(bases: dict[str, PushModel]) -> None:
+def test_exact_density_has_the_predicted_variance(bases: dict[str, PushModel]) -> None:
     model, one = extended(bases["vhgp"], slippery(0.2, sd=0.3), scale=(0.5, 1.0, 2.0)), pushes(3, 1).take([0])
     prediction = predicted(model, one)
     sd = np.sqrt(np.diagonal(prediction.covariance[0]))
@@ -112,7 +112,7 @@ def test_the_exact_density_has_the_variance_that_is_predicted(bases: dict[str, P
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_served_model_answers_one_push_as_it_answers_many(bases: dict[str, PushModel], kind: str) -> None:
+def test_tabulated_model_predicts_single_push_as_in_a_batch(bases: dict[str, PushModel], kind: str) -> None:
     model, table = extended(bases[kind], slippery(0.2, sd=0.1), grain(0.1)), pushes(5, 1)
     tabulated = tabulate(model)
     assert tabulated.tabulated == (kind != "analytical")
@@ -142,8 +142,8 @@ def joint(model: PushModel, table: PushTable) -> np.ndarray:
     return design @ whole @ design.transpose(0, 2, 1)
 
 
-def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
-    """Two drivers that go together: neither coefficient is known, their sum is."""
+def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> None:
+    """Two correlated covariates: neither coefficient is determined, but their sum is."""
     table = pushes(100, 4, slippery(0.2))
     slid = table.covariates["elapsed_time"] + np.repeat(40.0 * np.random.default_rng(5).standard_normal(100), 3)
     table = replace(table, covariates={**table.covariates, "slid_distance": slid})
@@ -153,13 +153,13 @@ def test_what_effects_share_counts(bases: dict[str, PushModel]) -> None:
     one = with_effects(refit_base(bases["analytical"], table), table, terms[:1])
     assert isinstance(both.predictor, ExtendedPredictor) and isinstance(one.predictor, ExtendedPredictor)
     push = Push(table.inputs, table.duration, table.covariates)
-    unsure, alone = both.predictor.shift(push)[1], one.predictor.shift(push)[1]
-    np.testing.assert_allclose(unsure, joint(both, table), rtol=1e-9, atol=1e-18)
+    uncertainty, alone = both.predictor.shift(push)[1], one.predictor.shift(push)[1]
+    np.testing.assert_allclose(uncertainty, joint(both, table), rtol=1e-9, atol=1e-18)
     apart = sum(effect.shift(physics(), push)[1] for effect in both.predictor.effects)
-    assert np.trace(unsure.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
+    assert np.trace(uncertainty.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
 
 
-def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, PushModel], tmp_path: Path) -> None:
+def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, PushModel], tmp_path: Path) -> None:
     table = pushes(60, 4, slippery(0.2))
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     first = with_effects(refit_base(bases["gp"], table), table, terms)
@@ -173,16 +173,16 @@ def test_what_effects_share_stays_theirs_when_more_are_added(bases: dict[str, Pu
     save_model(second, tmp_path / "m")
     loaded, probe = load_model(tmp_path / "m"), pushes(10, 3)
     assert_same(predicted(loaded, probe), predicted(second, probe), rtol=1e-9, atol=1e-15)
-    unsure = second.predictor.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
-    np.testing.assert_allclose(unsure, joint(second, probe), rtol=1e-9, atol=1e-18)
+    uncertainty = second.predictor.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
+    np.testing.assert_allclose(uncertainty, joint(second, probe), rtol=1e-9, atol=1e-18)
 
 
-# --- where it has seen pushes -----------------------------------------------------------------------------------
+# --- the range of its covariates -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("answer", [lambda model: model, tabulate])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_covariate_far_from_what_was_seen_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
+def test_covariate_outside_training_range_is_out_of_domain(bases: dict[str, PushModel], kind: str, answer) -> None:
     model, table = answer(extended(bases[kind], slippery(0.1), grain(0.1))), pushes(20, 1).take(np.arange(1, 59))
     inside = predicted(model, table).in_domain
     np.testing.assert_array_equal(inside, predicted(answer(bases[kind]), table).in_domain)
@@ -199,7 +199,7 @@ def test_a_covariate_far_from_what_was_seen_is_out_of_domain(bases: dict[str, Pu
     np.testing.assert_array_equal(predicted(model, warm).in_domain, inside)
 
 
-def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
+def test_covariate_ranges_survive_saving(bases: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(extended(bases["gp"], slippery(0.1)), tmp_path / "m")
     loaded, training = load_model(tmp_path / "m"), bases["gp"].training
     assert predicted(loaded, training).in_domain.all()
@@ -208,7 +208,7 @@ def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("seen", "inside", "outside"),
+    ("observed", "inside", "outside"),
     [
         ([-0.5, 0.0, 0.5], [-0.5, 0.2, 0.5, 0.5 + 2.0 * np.pi], [-0.6, 0.6, 3.0, -3.0]),
         ([3.0, -3.0], [3.0, np.pi, -np.pi, -3.0, 3.1], [2.9, -2.9, 0.0]),
@@ -217,13 +217,13 @@ def test_what_was_seen_is_known_to_the_file(bases: dict[str, PushModel], tmp_pat
         (np.linspace(-np.pi, np.pi, 30), [-np.pi, 0.11, 3.0, 9.0], []),
     ],
 )
-def test_headings_come_around(seen: list[float], inside: list[float], outside: list[float]) -> None:
-    known = range_of("slider_heading", np.array(seen))
+def test_range_of_headings_wraps_around(observed: list[float], inside: list[float], outside: list[float]) -> None:
+    known = range_of("slider_heading", np.array(observed))
     assert known.contains(np.array(inside)).all()
     assert not known.contains(np.array(outside)).any()
 
 
-def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]) -> None:
+def test_covariates_that_follow_from_the_push_are_not_needed(bases: dict[str, PushModel]) -> None:
     faster = Effect(
         "inertia", "velocity", DriverBasis("linear", ("velocity",), (0.02,), (0.01,)), np.ones(1), np.eye(1), NOISE
     )
@@ -232,18 +232,18 @@ def test_what_the_push_itself_tells_is_not_asked_for(bases: dict[str, PushModel]
     model, table = extended(bases["gp"], faster, tip), pushes(10, 1)
     assert model.needs == ()
     inputs = table.inputs * [2.0, 1.0, 1.0]
-    told = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
-    push = Push(inputs, table.duration, told)
+    given = {"velocity": inputs[:, 0], "edge": np.floor(4.0 * inputs[:, 1])}
+    push = Push(inputs, table.duration, given)
     shift = faster.shift(physics(), push)[0] + tip.shift(physics(), push)[0]
     ours, theirs = (m.predict_rows(inputs, table.duration).mean for m in (model, bases["gp"]))
     np.testing.assert_allclose(ours - theirs, shift, atol=1e-15)
     np.testing.assert_allclose(tabulate(model).predict_rows(inputs[:1], table.duration[:1]).mean, ours[:1], rtol=1e-9)
 
 
-# --- what it asks for -------------------------------------------------------------------------------------------
+# --- needed covariates -------------------------------------------------------------------------------------------
 
 
-def test_it_needs_what_drives_its_effects_and_what_their_mechanisms_take(bases: dict[str, PushModel]) -> None:
+def test_model_needs_covariates_of_bases_and_mechanisms(bases: dict[str, PushModel]) -> None:
     assert bases["gp"].needs == ()
     assert extended(bases["gp"], slippery(0.1), grain(0.1), slippery(0.2)).needs == ("elapsed_time", "slider_heading")
 
@@ -256,14 +256,14 @@ def test_it_needs_what_drives_its_effects_and_what_their_mechanisms_take(bases: 
         ({"elapsed_time": 1.0, "other": np.inf}, "covariate other: inf is not accepted, give a finite number"),
     ],
 )
-def test_a_request_without_what_it_needs_is_refused_by_name(
+def test_rejects_request_without_needed_covariate_by_name(
     bases: dict[str, PushModel], brought: dict[str, float], message: str
 ) -> None:
     with pytest.raises(RequestError, match=message):
         check_request(extended(bases["gp"], slippery(0.1)), PushRequest(0.02, 0.1, 0.2, 0.2, brought))
 
 
-def test_what_it_does_not_need_is_no_matter(bases: dict[str, PushModel]) -> None:
+def test_unneeded_covariates_are_ignored(bases: dict[str, PushModel]) -> None:
     push = PushRequest(0.02, 0.1, 0.2, 0.2, {"elapsed_time": 1.0, "other": 2.0})
     check_request(extended(bases["gp"], slippery(0.1)), push)
     table = pushes(5, 1)
@@ -271,16 +271,16 @@ def test_what_it_does_not_need_is_no_matter(bases: dict[str, PushModel]) -> None
     check_table(extended(bases["gp"], slippery(0.1)), table)
 
 
-def test_a_table_without_what_it_needs_is_refused_by_name(bases: dict[str, PushModel]) -> None:
+def test_rejects_table_without_needed_covariate_by_name(bases: dict[str, PushModel]) -> None:
     with pytest.raises(RequestError, match="covariate elapsed_time: 'missing'"):
         check_table(extended(bases["gp"], slippery(0.1)), replace(pushes(5, 1), covariates={}))
 
 
-# --- its file ---------------------------------------------------------------------------------------------------
+# --- files ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
+def test_extended_model_survives_saving(bases: dict[str, PushModel], kind: str, tmp_path: Path) -> None:
     generic = Effect(None, "topic:/warmth", WARMTH, np.full(18, 0.1), 1e-4 * np.eye(18), NOISE / 0.004)
     trained = with_effects(
         bases[kind], pushes(40, 2, slippery(0.2)), [("contact_friction", "elapsed_time", DRIFT), GRAIN]
@@ -299,7 +299,7 @@ def test_a_file_keeps_it(bases: dict[str, PushModel], kind: str, tmp_path: Path)
     assert loaded_json["nlpd"] == pytest.approx(ours["nlpd"], rel=1e-9)
 
 
-def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushModel], tmp_path: Path) -> None:
+def test_file_with_effects_needs_a_reader_of_its_format(bases: dict[str, PushModel], tmp_path: Path) -> None:
     apart = extended(bases["gp"], slippery(0.1), slippery(0.2))
     assert isinstance(apart.predictor, ExtendedPredictor)
     sharing = replace(apart, predictor=replace(apart.predictor, cross={(0, 1): np.zeros((1, 1))}))
@@ -318,7 +318,7 @@ def test_only_a_reader_that_knows_effects_takes_the_file(bases: dict[str, PushMo
         ((0, 2), 0.0, "effects 0 and 2 of 2 share a covariance"),
     ],
 )
-def test_a_damaged_shared_covariance_is_refused(
+def test_rejects_damaged_shared_covariance(
     bases: dict[str, PushModel], pair: tuple[int, int], shared: Any, message: str, tmp_path: Path
 ) -> None:
     model = extended(bases["analytical"], slippery(0.1, sd=1.0), slippery(0.2, sd=1.0))
@@ -346,7 +346,7 @@ DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_effect_is_refused_by_name(bases: dict[str, PushModel], damage: str, tmp_path: Path) -> None:
+def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str, tmp_path: Path) -> None:
     harm, message = DAMAGES[damage]
     save_model(extended(bases["analytical"], grain(0.1), slippery(0.1)), tmp_path / "m")
     with np.load(tmp_path / "m") as archive:
@@ -360,7 +360,7 @@ def test_a_damaged_effect_is_refused_by_name(bases: dict[str, PushModel], damage
         load_model(tmp_path / "m")
 
 
-# --- its making -------------------------------------------------------------------------------------------------
+# --- estimation -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
@@ -381,7 +381,7 @@ def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushM
     assert np.all(sd < [0.05, 0.05, 0.05])
 
 
-def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushModel]) -> None:
+def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]) -> None:
     table = pushes(100, 4, slippery(0.2))
     alike = DriverBasis("quadratic", ("elapsed_time",), (500.0,), (300.0,))
     terms = [("contact_friction", "elapsed_time", DRIFT), ("contact_friction", "elapsed_time", alike)]
@@ -394,7 +394,7 @@ def test_two_terms_that_overlap_share_what_they_explain(bases: dict[str, PushMod
 
 
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
+def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
@@ -406,7 +406,7 @@ def test_an_effect_that_is_there_gains_on_held_out_pushes(bases: dict[str, PushM
 
 
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
-def test_an_effect_that_is_not_there_gains_nothing(bases: dict[str, PushModel], kind: str) -> None:
+def test_absent_effect_improves_nothing(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(100, 7), pushes(60, 8)
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
@@ -415,7 +415,7 @@ def test_an_effect_that_is_not_there_gains_nothing(bases: dict[str, PushModel], 
     assert nlpd.high > 0.0
 
 
-def test_a_refit_keeps_the_physics_and_learns_the_covariance(bases: dict[str, PushModel]) -> None:
+def test_refit_keeps_physics_and_estimates_covariance(bases: dict[str, PushModel]) -> None:
     base, table = bases["analytical"], pushes(60, 9)
     loud = replace(table, outcomes=table.outcomes + 5.0 * NOISE * np.random.default_rng(0).standard_normal((180, 3)))
     refit = refit_base(base, loud)
@@ -439,7 +439,7 @@ def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushMod
     assert np.all(np.abs(more.predictor.effects[1].coefficients) < 0.1)
 
 
-def test_what_drives_an_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
+def test_effect_of_unknown_mechanism_is_modelled_by_the_generic_one(bases: dict[str, PushModel]) -> None:
     table, held_out = pushes(150, 12, slippery(0.3)), pushes(60, 13, slippery(0.3))
     refit = refit_base(bases["analytical"], table)
     after = with_effects(refit, table, [(None, "elapsed_time", DRIFT)])
@@ -459,7 +459,9 @@ def model_file(bases: dict[str, PushModel], tmp_path_factory: pytest.TempPathFac
     return path
 
 
-def test_predict_takes_the_covariate_and_asks_for_it(model_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_predict_command_accepts_and_requires_the_covariate(
+    model_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     push = ["predict", str(model_file), "--velocity", "0.02", "--contact", "0.1", "--angle", "-0.8"]
     assert main(push) != 0
     assert "covariate elapsed_time: 'missing' is not accepted, give a finite number, in s" in capsys.readouterr().err
@@ -470,15 +472,13 @@ def test_predict_takes_the_covariate_and_asks_for_it(model_file: Path, capsys: p
     assert means[0] != means[1]
 
 
-def test_info_tells_what_it_needs_and_where_it_has_seen_it(
-    model_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_info_lists_needed_covariates_and_their_ranges(model_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(model_file), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["needs"] == ["elapsed_time"] and found["covariate_ranges"] == {"elapsed_time": [0.0, 1000.0]}
 
 
-def test_evaluate_names_the_column_that_a_table_lacks(
+def test_evaluate_names_the_missing_column_of_a_table(
     model_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_table(tmp_path / "whole.csv", pushes(10, 1))
@@ -489,23 +489,23 @@ def test_evaluate_names_the_column_that_a_table_lacks(
     assert "covariate elapsed_time" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("driver", ["elapsed_time", "topic:/warmth"])
-def test_validate_takes_from_the_windows_what_it_needs_or_names_it(
-    bases: dict[str, PushModel], driver: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("covariate", ["elapsed_time", "topic:/warmth"])
+def test_validate_uses_covariates_of_windows_or_names_the_missing_one(
+    bases: dict[str, PushModel], covariate: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    effect = replace(slippery(0.2), basis=replace(DRIFT, drivers=(driver,)))
+    effect = replace(slippery(0.2), basis=replace(DRIFT, drivers=(covariate,)))
     save_model(extended(bases["gp"], effect), tmp_path / "m")
     write_recording(tmp_path / "bag", translating_push())
     status = main(["validate", str(tmp_path / "m"), str(tmp_path / "bag"), "--json", "-"])
     heard = capsys.readouterr()
-    if driver == "elapsed_time":
+    if covariate == "elapsed_time":
         assert (status, json.loads(heard.out)["n_test"]) == (0, 5)
     else:
         assert status == 1
         assert "covariate topic:/warmth: 'missing' is not accepted" in heard.err
 
 
-def test_the_shelf_lists_what_a_request_must_bring(model_file: Path) -> None:
+def test_registry_lists_covariates_that_a_request_must_contain(model_file: Path) -> None:
     registry = ModelRegistry()
     registry.load(model_file)
     assert "covariates=elapsed_time;" in registry.describe("extended")
@@ -513,7 +513,7 @@ def test_the_shelf_lists_what_a_request_must_bring(model_file: Path) -> None:
 
 @pytest.fixture(scope="module")
 def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
-    """Calls a service of a running predict_server that serves the extended model."""
+    """Call a service of a running predict_server with the extended model."""
     domain, kinds = (
         harness.free_domain(),
         {"predict_push": PredictPush, "predict_push_batch": PredictPushBatch, "list_models": ListModels},
@@ -526,7 +526,7 @@ def ask(model_file: Path) -> Iterator[Callable[..., Any]]:
         yield lambda name, request: harness.call(clients[name], request)
 
 
-def test_the_service_refuses_a_push_without_the_covariate_by_name(ask: Callable[..., Any]) -> None:
+def test_service_rejects_push_without_covariate_by_name(ask: Callable[..., Any]) -> None:
     response = ask("predict_push", query_to_request("", np.array([0.02, 0.1, 0.2]), 0.2))
     assert not response.success
     assert response.message.startswith("covariate elapsed_time: 'missing' is not accepted, give a finite number, in s")

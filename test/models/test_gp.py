@@ -55,13 +55,13 @@ def test_gradient_equals_finite_differences(n: int) -> None:
         assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
 
 
-def test_far_from_the_data_the_prior_is_left() -> None:
+def test_prediction_far_from_data_is_the_prior() -> None:
     prediction = GaussianProcess(*rows(30), PARAMETERS).predict(np.array([[50.0, 50.0]]))
     assert prediction.mean[0] == pytest.approx(0.0, abs=1e-12)
     assert prediction.variance[0] == pytest.approx(PARAMETERS.kernel.variance)
 
 
-def test_rows_have_no_order() -> None:
+def test_order_of_rows_does_not_matter() -> None:
     inputs, outputs = rows(40)
     order = np.random.default_rng(5).permutation(40)
     new = rows(6, seed=1)[0]
@@ -71,7 +71,7 @@ def test_rows_have_no_order() -> None:
     np.testing.assert_allclose(straight.variance, shuffled.variance, atol=1e-12)
 
 
-def test_more_rows_never_make_the_model_less_sure() -> None:
+def test_more_rows_never_increase_the_variance() -> None:
     inputs, outputs = rows(40)
     new = rows(50, seed=1)[0]
     few = GaussianProcess(inputs[:20], outputs[:20], PARAMETERS).predict(new)
@@ -89,7 +89,7 @@ def test_one_input_is_predicted_as_in_a_batch() -> None:
         assert single.variance[0] == pytest.approx(batch.variance[i], rel=1e-10)
 
 
-def test_the_fit_finds_the_noise_and_the_input_that_matters() -> None:
+def test_fit_recovers_noise_and_relevant_input() -> None:
     inputs, outputs = rows(300, noise=0.2)
     fitted = fit_gp(inputs, outputs)
     assert np.exp(fitted.parameters.log_noise_sd) == pytest.approx(0.2, rel=0.15)
@@ -97,7 +97,7 @@ def test_the_fit_finds_the_noise_and_the_input_that_matters() -> None:
     assert irrelevant > relevant + 2.0
 
 
-def test_jumps_from_side_to_side_are_learnt_and_not_called_noise() -> None:
+def test_jumps_between_sides_are_learnt_and_not_taken_for_noise() -> None:
     """Five sides that no symmetry folds, the outcome turning its sign on each: features.EDGE_SPACING apart."""
     rng = np.random.default_rng(0)
     side, along, angle = rng.integers(5, size=300), rng.random(300), rng.uniform(-1.0, 1.0, 300)
@@ -107,7 +107,7 @@ def test_jumps_from_side_to_side_are_learnt_and_not_called_noise() -> None:
     assert np.exp(fit_gp(inputs, outputs).parameters.log_noise_sd) < 0.25
 
 
-def test_the_fit_is_where_the_likelihood_is_level() -> None:
+def test_gradient_of_likelihood_vanishes_at_the_fit() -> None:
     fitted = fit_gp(*rows(100))
     _, gradient = log_likelihood_and_gradient(fitted.inputs, fitted.outputs, fitted.parameters)
     inside = np.append(fitted.parameters.log_lengthscales < 6.8, [True, True])
@@ -124,6 +124,6 @@ def test_the_fit_is_where_the_likelihood_is_level() -> None:
         (np.full((5, 2), np.inf), np.zeros(5), "infinity"),
     ],
 )
-def test_rows_that_cannot_be_learnt_from_are_refused(inputs: Array, outputs: Array, complaint: str) -> None:
+def test_rejects_unusable_rows(inputs: Array, outputs: Array, complaint: str) -> None:
     with pytest.raises(TrainingError, match=complaint):
         fit_gp(inputs, outputs)

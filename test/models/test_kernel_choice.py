@@ -1,4 +1,4 @@
-"""Matern-5/2 beside the squared exponential, and a nugget in the noise process: from kernels to served models."""
+"""Matern-5/2 and squared exponential kernels, and a nugget in the noise process: from kernels to tabulated models."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_matern_values_are_those_of_its_definition_by_a_bessel_function() -> Non
     np.testing.assert_allclose(KERNEL.cross(left, right), expected, rtol=1e-12)
 
 
-def test_at_short_distances_matern_falls_as_its_second_derivative_says_and_at_long_ones_exponentially() -> None:
+def test_matern_is_quadratic_at_short_and_exponential_at_long_distances() -> None:
     kernel = Matern52(np.zeros(1), 0.0)
     near = kernel.cross(np.zeros((2, 1)), np.array([[1e-3], [2e-3]]))[0]
     assert 1.0 - near == pytest.approx(5.0 / 6.0 * np.array([1e-6, 4e-6]), rel=1e-3)
@@ -91,20 +91,20 @@ def test_matrices_are_symmetric_positive_and_at_most_their_diagonal(
     assert np.linalg.eigvalsh(matrix).min() > -1e-9 * kernel.variance
 
 
-def test_one_row_of_matern_gives_what_many_give() -> None:
+def test_one_row_of_matern_equals_that_of_many() -> None:
     left, right = normal(6, 3), normal(140, 3, seed=1)
     alone = [KERNEL.cross(left[i : i + 1], right)[0] for i in range(6)]
     np.testing.assert_allclose(alone, KERNEL.cross(left, right), rtol=1e-12)
 
 
-def test_an_endless_lengthscale_removes_its_input() -> None:
+def test_infinite_lengthscale_removes_its_input() -> None:
     inputs = normal(20, 3)
     blind, pair = Matern52(np.array([0.3, -0.4, 20.0]), 0.2), Matern52(np.array([0.3, -0.4]), 0.2)
     np.testing.assert_allclose(blind.matrix(inputs), pair.matrix(inputs[:, :2]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_kernel_gradient_equals_finite_differences_and_leaves_the_weights(family: KernelFamily) -> None:
+def test_kernel_gradient_equals_finite_differences_and_does_not_change_weights(family: KernelFamily) -> None:
     inputs, weights = normal(100, 3), normal(100, 100, seed=1)
     weights = weights + weights.T
     before = weights.copy()
@@ -158,7 +158,7 @@ def test_the_gradient_of_the_bound_equals_finite_differences(choice: KernelChoic
 
 
 @pytest.mark.parametrize("n", [50, 300])
-def test_a_nugget_kept_apart_is_the_nugget_in_the_matrix(n: int) -> None:
+def test_separate_nugget_equals_nugget_in_the_matrix(n: int) -> None:
     matrix, weights = SquaredExponential(np.full(2, 0.5), 0.1).matrix(normal(n, 2)), np.exp(normal(n, seed=2))
     apart = factorise(matrix, 0.3).regularise(weights)
     inside = RegularisableKernel(matrix + 0.3 * np.eye(n), None).regularise(weights)
@@ -196,7 +196,7 @@ def test_a_vanishing_nugget_changes_nothing() -> None:
     assert bounds[0] == pytest.approx(bounds[1], abs=1e-6)
 
 
-def test_the_numbers_of_a_vector_come_back() -> None:
+def test_vector_of_parameters_round_trips() -> None:
     for choice in CHOICES:
         chosen = parameters(choice)
         again = VhgpParameters.from_vector(chosen.to_vector(), choice)
@@ -216,7 +216,7 @@ def test_a_kinked_function_is_likelier_under_matern_and_a_smooth_one_under_the_s
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_every_choice_finds_where_it_is_noisy_also_when_the_search_begins_on_a_third_of_the_rows(
+def test_every_kernel_choice_recovers_noise_even_from_a_third_of_the_rows(
     choice: KernelChoice,
 ) -> None:
     model = fit_vhgp(*rows(420), choice)
@@ -240,7 +240,7 @@ def models() -> dict[KernelChoice, PushModel]:
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_a_loaded_model_has_its_kernels(
+def test_loaded_model_has_its_kernels(
     models: dict[KernelChoice, PushModel], choice: KernelChoice, tmp_path: Path
 ) -> None:
     save_model(models[choice], tmp_path / "m")
@@ -251,7 +251,7 @@ def test_a_loaded_model_has_its_kernels(
 
 
 def independent(model: PushModel) -> PushModel:
-    """Without the correlation of its outputs, which asks for a later version of the format."""
+    """The model without the correlation of its outputs, which needs a later format."""
     return replace(model, predictor=replace(model.predictor, correlation=None))
 
 
@@ -264,9 +264,7 @@ def test_a_gp_keeps_its_family(tmp_path: Path) -> None:
     assert [r.parameters.family for r in loaded.predictor.regressions] == ["matern52"] * 3
 
 
-def test_a_model_that_version_1_can_hold_is_written_as_one(
-    models: dict[KernelChoice, PushModel], tmp_path: Path
-) -> None:
+def test_model_without_new_parts_is_written_in_format_1(models: dict[KernelChoice, PushModel], tmp_path: Path) -> None:
     for choice, model in models.items():
         save_model(independent(model), tmp_path / "m")
         found = header(tmp_path / "m")
@@ -288,7 +286,7 @@ def test_an_older_reader_refuses_other_kernels_by_their_version(
                 load_model(tmp_path / "m")
 
 
-def test_a_family_that_is_not_known_is_refused(
+def test_rejects_unknown_kernel_family(
     models: dict[KernelChoice, PushModel], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save_model(models[KernelChoice("matern52")], tmp_path / "m")
@@ -298,7 +296,7 @@ def test_a_family_that_is_not_known_is_refused(
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_a_served_model_is_true_to_it_by_a_table_or_without(
+def test_tabulated_model_is_accurate_with_or_without_a_table(
     models: dict[KernelChoice, PushModel], choice: KernelChoice
 ) -> None:
     answers, table = tabulate(models[choice]), noisy_pushes(60)

@@ -26,7 +26,7 @@ def test_values_are_the_formula() -> None:
     np.testing.assert_allclose(KERNEL.cross(left, right), expected, rtol=1e-14)
 
 
-def test_one_row_gives_what_many_give() -> None:
+def test_one_row_equals_that_of_many() -> None:
     left, right = normal(6, 3), normal(40, 3, seed=1)
     rows = [KERNEL.cross(left[i : i + 1], right)[0] for i in range(6)]
     np.testing.assert_allclose(rows, KERNEL.cross(left, right), rtol=1e-13)
@@ -48,7 +48,7 @@ def test_only_differences_of_inputs_matter(shift: float) -> None:
     np.testing.assert_allclose(KERNEL.matrix(inputs + shift), KERNEL.matrix(inputs), rtol=1e-9, atol=1e-11)
 
 
-def test_an_endless_lengthscale_removes_its_input() -> None:
+def test_infinite_lengthscale_removes_its_input() -> None:
     inputs = normal(20, 3)
     blind = SquaredExponential(np.array([0.3, -0.4, 20.0]), 0.2)
     pair = SquaredExponential(np.array([0.3, -0.4]), 0.2)
@@ -93,7 +93,7 @@ def test_a_smooth_kernel_of_many_rows_is_factorised_and_a_rough_one_is_not() -> 
     assert factorise(rough.matrix(inputs)).root is None
 
 
-def test_low_rank_and_dense_agree_where_the_diagonal_spans_many_decades() -> None:
+def test_low_rank_equals_dense_for_diagonal_over_many_decades() -> None:
     matrix = SquaredExponential(np.zeros(2), 0.0).matrix(normal(300, 2))
     weights = 10.0 ** np.random.default_rng(1).uniform(-3, 3, 300)
     low, dense = factorise(matrix).regularise(weights), RegularisableKernel(matrix, None).regularise(weights)
@@ -109,6 +109,6 @@ def test_posterior_of_a_noiseless_function_passes_through_its_values() -> None:
     np.testing.assert_allclose(posterior.explained_variance(cross), KERNEL.variance, atol=1e-8)
 
 
-def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
+def test_rejects_matrix_that_is_not_positive_definite() -> None:
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         KernelPosterior(np.ones((3, 3)), np.full(3, -2.0))

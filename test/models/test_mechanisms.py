@@ -1,4 +1,4 @@
-"""Mechanisms: the response of an outcome to what a base model lacks, checked against mechanics solved another way."""
+"""Mechanisms: the response of an outcome to each parameter, checked against mechanics solved by other methods."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcome
 BY_NAME = {mechanism.name: mechanism for mechanism in LIBRARY}
 TRIANGLE = Outline(np.array([[-0.05, -0.05], [0.10, -0.05], [-0.05, 0.10]]))
 OUTLINES = {name: shape_outline(name) for name in ("rect1", "ellip1", "ellip2", "ellip3", "hex")} | {"tri": TRIANGLE}
-IN_METRES = np.array([1.0, 1.0, 0.04])  # a turn counts as the way of a point 4 cm from the centre
+IN_METRES = np.array([1.0, 1.0, 0.04])  # a turn counts as the path of a point 4 cm from the centre
 
 # Under a reflection of body, table and push in the body's x axis each parameter keeps its sign (1) or changes it (-1).
 MIRRORED = {
@@ -78,9 +78,7 @@ def share_explained(difference: np.ndarray, response: np.ndarray) -> tuple[float
 
 @pytest.mark.parametrize("outline", OUTLINES)
 @pytest.mark.parametrize("mechanism", LIBRARY, ids=lambda m: m.name)
-def test_a_response_has_a_finite_column_that_is_not_nothing_for_each_parameter(
-    mechanism: Mechanism, outline: str
-) -> None:
+def test_response_has_a_finite_nonzero_column_per_parameter(mechanism: Mechanism, outline: str) -> None:
     response = mechanism.response(physics_of(outline), pushes(30))
     assert response.shape == (30, 3, len(mechanism.parameters))
     assert np.all(np.isfinite(response))
@@ -104,9 +102,7 @@ def test_a_mirrored_push_has_the_mirrored_response(mechanism: Mechanism) -> None
 
 @pytest.mark.parametrize(("outline", "order"), [("rect1", 4), ("hex", 6), ("ellip2", 2)])
 @pytest.mark.parametrize("mechanism", [m for m in LIBRARY if m.name not in FIXED_TO_THE_BODY], ids=lambda m: m.name)
-def test_the_same_push_on_another_side_that_lies_the_same_way_has_the_same_response(
-    mechanism: Mechanism, outline: str, order: int
-) -> None:
+def test_response_is_the_same_on_equivalent_sides(mechanism: Mechanism, outline: str, order: int) -> None:
     push = pushes(30)
     contact = np.random.default_rng(1).uniform(0.001, 1.0 / order - 0.001, 30)
     here = mechanism.response(physics_of(outline), altered(push, contact))
@@ -116,7 +112,7 @@ def test_the_same_push_on_another_side_that_lies_the_same_way_has_the_same_respo
 
 
 @pytest.mark.parametrize(("name", "sign"), [("anisotropic_friction", 1), ("tilted_surface", -1), ("inertia", 1)])
-def test_a_grain_looks_the_same_from_behind_a_slope_does_not(name: str, sign: int) -> None:
+def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int) -> None:
     push = pushes(40)
     here, there = (BY_NAME[name].response(physics_of("hex"), p) for p in (push, altered(push, turn=np.pi)))
     assert there == pytest.approx(sign * here, abs=1e-9)
@@ -135,7 +131,7 @@ def test_the_perturbed_push_without_a_change_is_the_analytical_push(outline: str
 
 
 @pytest.mark.parametrize("outline", ["rect1", "tri"])
-def test_long_pushes_have_responses_that_grow_with_the_way(outline: str) -> None:
+def test_responses_grow_with_path_length(outline: str) -> None:
     for mechanism in LIBRARY:
         short, long = (mechanism.response(physics_of(outline), pushes(15, duration=t)) for t in (0.2, 1.0))
         assert np.all(np.isfinite(long))
@@ -153,16 +149,16 @@ def test_the_parameters_add_up_to_a_finite_change_of_the_model() -> None:
     assert np.sum((left * IN_METRES) ** 2) < 0.01 * np.sum((difference * IN_METRES) ** 2)
 
 
-# --- what physics says must be zero -----------------------------------------------------------------------------------
+# --- responses that must be zero -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["contact_friction", "contact_asymmetry"])
-def test_friction_at_the_contact_changes_nothing_where_it_sticks(name: str) -> None:
+def test_contact_friction_has_no_response_where_contact_sticks(name: str) -> None:
     straight = Push(np.array([[0.02, 0.125, angle] for angle in (-0.1, -0.05, 0.0, 0.05, 0.1)]), np.full(5, 0.2), {})
     assert BY_NAME[name].response(physics_of("rect1"), straight) == pytest.approx(0.0, abs=1e-5)
 
 
-def test_friction_at_the_contact_tells_where_it_slips() -> None:
+def test_contact_friction_has_a_response_where_contact_slips() -> None:
     slipping = Push(np.array([[0.02, 0.125, 1.0], [0.02, 0.125, -1.0]]), np.full(2, 0.2), {})
     symmetric = BY_NAME["contact_friction"].response(physics_of("rect1"), slipping)
     lopsided = BY_NAME["contact_asymmetry"].response(physics_of("rect1"), slipping)
@@ -172,12 +168,12 @@ def test_friction_at_the_contact_tells_where_it_slips() -> None:
 
 
 @pytest.mark.parametrize("name", ["limit_surface_power", "pressure_spread", "pushing_height"])
-def test_a_push_through_the_centre_turns_nothing(name: str) -> None:
+def test_push_through_the_centre_does_not_turn_the_slider(name: str) -> None:
     through = Push(np.array([[0.02, 0.125, 0.0]]), np.full(1, 0.2), {})
     assert BY_NAME[name].response(physics_of("rect1"), through) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_inertia_grows_with_the_square_of_the_speed_for_the_same_way() -> None:
+def test_inertia_grows_with_squared_speed_for_equal_path_length() -> None:
     slow = pushes(50)
     fast = Push(slow.inputs * [3.0, 1.0, 1.0], slow.duration / 3.0, slow.covariates)
     once, nine = (BY_NAME["inertia"].response(physics_of("ellip1", 2.0), push) for push in (slow, fast))
@@ -191,7 +187,7 @@ def test_a_plausible_parameter_lies_within_the_limit() -> None:
     assert not inertia.plausible(np.array([[0.4], [-61.0]]))
 
 
-# --- against the limit surface solved as it stands --------------------------------------------------------------------
+# --- against the limit surface solved directly --------------------------------------------------------------------
 
 
 class Surface:
@@ -210,7 +206,7 @@ class Surface:
         power: float = 2.0,
         height: float = 0.0,
     ) -> np.ndarray:
-        """Twist (3,) of the body's origin in the push frame, per metre of the tip's way."""
+        """Twist (3,) of the body's origin in the push frame, per metre of the tip's path."""
         a, b = stretch
         mobility = np.array([[1.0 + a, b], [b, 1.0 - a]])
 
@@ -270,7 +266,7 @@ def test_a_response_is_the_derivative_of_the_surface_solved_by_root_finding(
 
 
 def test_a_friction_gradient_shifts_the_centre_of_friction_of_a_slider_to_the_rougher_side() -> None:
-    """Over an even square the centre of Coulomb friction that rises by s a metre is s a^2 / 12 from the middle."""
+    """Coulomb friction that rises by s per metre has its centre s a^2 / 12 from the middle of a square of uniform pressure."""
     physics, push = physics_of("rect1"), pushes(40)
     level = replace(push, covariates={"slider_heading": np.zeros(40)})
     gradient = BY_NAME["friction_gradient"].response(physics, level)
@@ -278,7 +274,7 @@ def test_a_friction_gradient_shifts_the_centre_of_friction_of_a_slider_to_the_ro
     assert np.all(size(gradient - shift * 0.09**2 / 12.0) < 0.1 * size(gradient))
 
 
-# --- against the rig simulator, which knows Newton and Coulomb but no limit surface -----------------------------------
+# --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------
 
 
 def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_response_to_it() -> None:
@@ -314,7 +310,7 @@ def test_the_worked_example_of_the_docs_is_a_mechanism() -> None:
     cable: Mechanism = space["TWISTING_CABLE"]
     through = Push(np.array([[0.02, 0.125, 0.0]]), np.full(1, 0.2), {})
     turned = cable.response(physics_of("rect1", STICKING), through)[0, 2, 0]
-    assert turned > 0.01  # a push straight through the centre turns the way that the cable twists
+    assert turned > 0.01  # a push straight through the centre turns in the direction in which the cable twists
 
 
 def test_the_docs_name_every_mechanism_with_its_limit() -> None:

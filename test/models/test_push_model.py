@@ -1,4 +1,4 @@
-"""Push models: training, symmetry, domain, requests, and the files they live in."""
+"""Push models: training, symmetry, domain, requests and files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def models() -> dict[str, PushModel]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_model_predicts_pushes_it_has_not_seen(models: dict[str, PushModel], kind: str) -> None:
+def test_model_predicts_new_pushes(models: dict[str, PushModel], kind: str) -> None:
     held_out = noisy_pushes(200, seed=1)
     metrics = metrics_json(compare(models[kind], held_out))
     assert metrics["nmse"]["total"] < 0.6  # three outputs: "predict the mean" scores 3
@@ -53,7 +53,7 @@ def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict
 
 @settings(max_examples=25, deadline=None)
 @given(fraction=st.floats(0.0, 0.99), angle=st.floats(-1.2, 1.2), side=st.integers(1, 3))
-def test_the_four_sides_of_a_square_are_one(
+def test_four_sides_of_a_square_share_features(
     models: dict[str, PushModel], fraction: float, angle: float, side: int
 ) -> None:
     one, other = (np.array([[0.02, (k + fraction) / 4.0, angle]]) for k in (0, side))
@@ -63,14 +63,14 @@ def test_the_four_sides_of_a_square_are_one(
         assert a.covariance == pytest.approx(b.covariance, rel=1e-6, abs=1e-15)
 
 
-def test_a_circle_has_no_contact_and_an_ellipse_no_seam() -> None:
+def test_circle_has_no_contact_feature_and_ellipse_no_seam() -> None:
     contact = np.array([0.0, 1.0 - 1e-9, 0.5])
     inputs = np.column_stack([np.full(3, 0.02), contact, np.full(3, 0.1)])
     assert push_features(shape_outline("ellip1"), inputs).shape == (3, 2)
     assert np.ptp(push_features(shape_outline("ellip3"), inputs), axis=0) == pytest.approx(0.0, abs=1e-7)
 
 
-def test_edges_without_symmetry_are_kept_apart() -> None:
+def test_edges_without_symmetry_have_distant_features() -> None:
     starts = triangle().edge_starts
     across = np.array([starts[1] - 1e-9, starts[1] + 1e-9])
     features = push_features(triangle(), np.column_stack([np.full(2, 0.02), across, np.zeros(2)]))
@@ -93,7 +93,7 @@ def test_a_number_of_rows_is_drawn_by_the_seed() -> None:
         training_rows(table, 101, 0)
 
 
-def test_constant_inputs_are_left_out_and_constant_outcomes_refused() -> None:
+def test_constant_inputs_are_dropped_and_constant_outcomes_rejected() -> None:
     table = noisy_pushes(60)
     table.inputs[:, 0] = 0.02
     assert len(train_model(table, square_rig(), "gp", name="g").predictor.scaling.columns) == 2
@@ -134,7 +134,7 @@ def test_the_first_bad_push_of_a_batch_is_named_by_its_index(models: dict[str, P
         check_requests(models["gp"], inputs, 0.2, {})
 
 
-def test_the_analytical_model_takes_any_duration(models: dict[str, PushModel]) -> None:
+def test_analytical_model_accepts_any_duration(models: dict[str, PushModel]) -> None:
     check_request(models["analytical"], PushRequest(0.02, 0.1, 0.0, 6.0))
 
 
@@ -155,7 +155,7 @@ def test_a_loaded_model_predicts_what_the_saved_one_did(
     assert np.array_equal(loaded.training.covariates["elapsed_time"], np.arange(120.0))
 
 
-def test_no_damaged_copy_of_a_model_is_served_with_other_numbers(models: dict[str, PushModel], tmp_path: Path) -> None:
+def test_no_damaged_copy_of_a_model_predicts_other_values(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     whole, rng = (tmp_path / "m").read_bytes(), np.random.default_rng(0)
     probe = np.array([[0.02, 0.1, 0.2]]), np.array([0.2])
@@ -174,11 +174,11 @@ def test_no_damaged_copy_of_a_model_is_served_with_other_numbers(models: dict[st
             refused += 1
             assert str(tmp_path / "d") in str(error)
         else:
-            assert np.array_equal(found, expected)  # the flipped bit was in a part that says nothing
+            assert np.array_equal(found, expected)  # the flipped bit has no meaning
     assert refused > 120
 
 
-def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
+def test_rejects_file_of_another_kind(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("not a model")
     np.savez(tmp_path / "arrays.npz", a=np.zeros(3))
     for name in ("text", "arrays.npz"):
@@ -189,7 +189,7 @@ def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
         load_model(tmp_path / "absent")
 
 
-def test_a_newer_file_says_what_to_do(models: dict[str, PushModel], tmp_path: Path) -> None:
+def test_error_of_newer_file_tells_user_to_update(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     _rewrite_header(tmp_path / "m", {"format_version": FORMAT_VERSION + 1, "written_by": "9.9"})
     with pytest.raises(
@@ -216,7 +216,7 @@ def test_no_code_from_a_file_is_executed(models: dict[str, PushModel], tmp_path:
     assert not Path("/tmp/push_predictor_bomb").exists()
 
 
-def test_a_failed_save_leaves_the_old_file(models: dict[str, PushModel], tmp_path: Path) -> None:
+def test_failed_save_keeps_the_old_file(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     before = (tmp_path / "m").read_bytes()
     (tmp_path / "m.d").mkdir()
@@ -231,7 +231,7 @@ def test_a_thousand_windows_make_a_small_file(tmp_path: Path) -> None:
     covariates = {f"covariate {k}": np.random.default_rng(k).random(1000) for k in range(11)}
     full = PushTable(table.inputs, table.duration, table.outcomes, table.push_id, covariates)
     save_model(train_model(full, square_rig(), "analytical", name="a"), tmp_path / "m")
-    with_sites = (tmp_path / "m").stat().st_size + 3 * 1000 * 8  # what a VHGP stores besides
+    with_sites = (tmp_path / "m").stat().st_size + 3 * 1000 * 8  # which a VHGP stores in addition
     assert with_sites < 200_000
 
 

@@ -1,4 +1,4 @@
-"""Pushes as a user states them: scalars, lists, arrays; anything else is refused by field."""
+"""Pushes as a user states them: scalars, lists, arrays; anything else is rejected by field."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from push_predictor.models.pushes import Pushes
 VELOCITIES = st.lists(st.floats(1e-3, 0.2), min_size=1, max_size=5)
 
 
-def test_scalars_make_one_push_of_a_usual_window():
+def test_scalars_make_one_push_of_default_duration():
     pushes = Pushes(0.02, 0.1, 0.3)
     np.testing.assert_array_equal(pushes.inputs, [[0.02, 0.1, 0.3]])
     np.testing.assert_array_equal(pushes.duration, [0.2])
@@ -52,7 +52,7 @@ def test_lists_tuples_and_arrays_mean_the_same_and_scalars_apply_to_all(
         ((0.02, 0.1, 0.3, 0.2, {"dwell_time": np.nan}), "covariate dwell_time: nan is not accepted"),
     ],
 )
-def test_what_is_no_push_is_refused_by_field_and_value(arguments: tuple[object, ...], message: str):
+def test_rejects_invalid_push_by_field_and_value(arguments: tuple[object, ...], message: str):
     with pytest.raises(RequestError, match=message):
         Pushes(*arguments)  # type: ignore[arg-type]
 

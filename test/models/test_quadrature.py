@@ -1,4 +1,4 @@
-"""The exact predictive density of a VHGP against adaptive integration and against what it must be in limits."""
+"""The exact predictive density of a VHGP against adaptive integration and in its limits."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_known_noise_level_makes_both_densities_the_same() -> None:
     )
 
 
-def test_an_unsure_noise_level_has_heavier_tails() -> None:
+def test_uncertain_noise_level_has_heavier_tails() -> None:
     of = prediction(0.0, 0.01, -1.0, 1.0, m=2)
     outcomes = 5.0 * np.sqrt(of.outcome_variance[0]) * np.array([-1.0, 1.0])
     assert (exact_log_density(of, outcomes) > gaussian_log_density(of, outcomes) + 1.0).all()

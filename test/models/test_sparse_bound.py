@@ -1,4 +1,4 @@
-"""The sparse bound: the dense one where every row is an inducing input, below it where not; inducing inputs."""
+"""The sparse bound: equal to the dense one if every row is an inducing input, else below it; selection of inducing inputs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def problem(n: int, signal: int, noise: int, parameters: VhgpParameters = PARAME
     return SparseProblem.of(inputs, outputs, parameters, inputs[:signal], inputs[n - noise :])
 
 
-def test_with_every_row_an_inducing_input_it_is_the_dense_bound() -> None:
+def test_bound_equals_dense_one_if_every_row_is_inducing() -> None:
     inputs, outputs = rows(60)
     sites = np.exp(0.5 * np.random.default_rng(1).normal(size=60) - 0.7)
     dense = Bound.tied(VhgpProblem.of(inputs, outputs, PARAMETERS), sites)
@@ -31,7 +31,7 @@ def test_with_every_row_an_inducing_input_it_is_the_dense_bound() -> None:
     np.testing.assert_allclose(sparse.signal.optimal_precisions, dense.optimal_precisions, atol=1e-6)
 
 
-def test_and_its_maximum_over_q_is_that_of_the_dense_one() -> None:
+def test_maximum_over_q_equals_that_of_the_dense_bound() -> None:
     dense = dense_maximum(VhgpProblem.of(*rows(60), PARAMETERS), None, 1e-13)
     sparse = maximise_over_noise(problem(60, 60, 60), [], 1e-13)
     assert sparse.value == pytest.approx(dense.value, abs=1e-6)
@@ -89,35 +89,37 @@ def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
         assert SparseBound.at(found, Sites(precisions, potentials)).value < best.value
 
 
-def test_at_the_maximum_one_number_per_row_describes_q() -> None:
+def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
     found = problem(200, 20, 15)
     best = maximise_over_noise(found, [], 1e-12)
     np.testing.assert_allclose(best.tied_precisions, best.sites.precisions, atol=1e-5)
     assert SparseBound.tied(found, best.tied_precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
-def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
+def test_search_for_q_converges_from_any_start() -> None:
     elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
     start = maximise_over_noise(problem(200, 20, 15, elsewhere), [], 1e-3).sites
     fresh, warm = (maximise_over_noise(problem(200, 20, 15), where, 1e-11).value for where in ([], [start]))
     assert warm == pytest.approx(fresh, abs=1e-7)
 
 
-def test_what_is_left_unknown_is_the_diagonal_of_the_dense_kernel_less_what_is_told() -> None:
+def test_unexplained_variance_is_kernel_diagonal_minus_explained() -> None:
     inputs, _ = rows(50)
     kernel = PARAMETERS.signal
     induced = InducedKernel.of(kernel, inputs, inputs[:15])
     cross, between = kernel.cross(inputs, inputs[:15]), kernel.matrix(inputs[:15])
-    told = cross @ np.linalg.solve(between + 1e-9 * kernel.variance * np.eye(15), cross.T)
-    np.testing.assert_allclose(induced.unexplained, kernel.variance - np.diagonal(told), atol=1e-7)
-    np.testing.assert_allclose(induced.times(inputs[:, 0]), told @ inputs[:, 0], atol=1e-6)
+    explained = cross @ np.linalg.solve(between + 1e-9 * kernel.variance * np.eye(15), cross.T)
+    np.testing.assert_allclose(induced.unexplained, kernel.variance - np.diagonal(explained), atol=1e-7)
+    np.testing.assert_allclose(induced.times(inputs[:, 0]), explained @ inputs[:, 0], atol=1e-6)
     weights = np.exp(inputs[:, 1])
-    ridge, precision = induced.regularise(weights), np.linalg.inv(told + np.diag(1.0 / weights))
+    ridge, precision = induced.regularise(weights), np.linalg.inv(explained + np.diag(1.0 / weights))
     np.testing.assert_allclose(ridge.residual(inputs[:, 0]), precision @ (inputs[:, 0] / weights), atol=1e-6)
-    np.testing.assert_allclose(ridge.posterior_diagonal, np.diagonal(told - told @ precision @ told), atol=1e-6)
+    np.testing.assert_allclose(
+        ridge.posterior_diagonal, np.diagonal(explained - explained @ precision @ explained), atol=1e-6
+    )
 
 
-def test_inducing_inputs_tell_more_than_as_many_random_rows() -> None:
+def test_inducing_inputs_explain_more_than_random_rows() -> None:
     inputs, _ = rows(2000)
     kernel = PARAMETERS.signal
     chosen = inducing_rows(kernel, inputs, 30)
@@ -127,7 +129,7 @@ def test_inducing_inputs_tell_more_than_as_many_random_rows() -> None:
     assert unknown < 0.3 * then
 
 
-def test_where_few_rows_tell_of_all_others_no_more_are_taken() -> None:
+def test_selection_stops_when_few_rows_determine_all_others() -> None:
     inputs = np.random.default_rng(0).integers(0, 3, size=(500, 2)).astype(float)
     chosen = inducing_rows(PARAMETERS.signal, inputs, 100)
     assert len(chosen) == 9

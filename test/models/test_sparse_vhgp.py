@@ -1,4 +1,4 @@
-"""The sparse VHGP: learnt from many rows, predicting, left out, on grids, in files, as a push model."""
+"""The sparse VHGP: fit, prediction, held-out rows, grids, files, and as a push model."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from push_predictor.types import Array
 
 @cache
 def dense_and_sparse(n: int) -> tuple[VHGP, SparseVHGP]:
-    """The same hyperparameters and sites; as many inducing inputs as tell of all rows."""
+    """The same hyperparameters and sites; enough inducing inputs to determine all rows."""
     inputs, outputs = rows(n)
     dense = fit_vhgp(inputs, outputs)
     chosen = inducing_rows(dense.parameters.signal, inputs, n), inducing_rows(dense.parameters.noise, inputs, n)
@@ -43,7 +43,7 @@ def fitted() -> SparseVHGP:
     return fit_sparse_vhgp(*rows(3000), 40)
 
 
-def test_the_fit_finds_where_it_is_noisy(fitted: SparseVHGP) -> None:
+def test_fit_recovers_input_dependent_noise(fitted: SparseVHGP) -> None:
     new = np.random.default_rng(9).uniform(-1.2, 1.2, size=(200, 2))
     prediction = fitted.predict(new)
     ratio = np.sqrt(prediction.process_variance) / np.exp(new[:, 1] - 1.0)
@@ -51,7 +51,7 @@ def test_the_fit_finds_where_it_is_noisy(fitted: SparseVHGP) -> None:
     assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.03
 
 
-def test_it_predicts_what_a_dense_model_of_the_same_rows_and_hyperparameters_does() -> None:
+def test_predictions_equal_those_of_a_dense_model() -> None:
     dense, sparse = dense_and_sparse(300)
     new = rows(50, seed=3)[0]
     one, other = dense.predict(new), sparse.predict(new)
@@ -60,7 +60,7 @@ def test_it_predicts_what_a_dense_model_of_the_same_rows_and_hyperparameters_doe
     np.testing.assert_allclose(other.log_noise_variance, one.log_noise_variance, rtol=1e-2, atol=1e-4)
 
 
-def test_more_rows_than_a_dense_model_takes_teach_it_more(fitted: SparseVHGP) -> None:
+def test_rows_beyond_the_dense_limit_improve_the_model(fitted: SparseVHGP) -> None:
     inputs, outputs = rows(3000)
     new, truth = rows(500, seed=5)[0], np.sin(rows(500, seed=5)[0][:, 0])
     dense: VHGP = fit_vhgp(inputs[:300], outputs[:300])
@@ -75,7 +75,7 @@ def test_the_same_rows_give_the_same_model(fitted: SparseVHGP) -> None:
     np.testing.assert_array_equal(again.inducing_noise, fitted.inducing_noise)
 
 
-def test_a_model_is_its_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
+def test_model_is_determined_by_rows_hyperparameters_sites_and_inducing_rows(fitted: SparseVHGP) -> None:
     chosen = fitted.inducing_signal, fitted.inducing_noise
     again = SparseVHGP(fitted.inputs, fitted.outputs, fitted.parameters, fitted.site_precisions, *chosen)
     one, other = fitted.predict(fitted.inputs[:50]), again.predict(fitted.inputs[:50])
@@ -105,13 +105,13 @@ def test_held_out_prediction_does_not_depend_on_the_row_itself() -> None:
     wrong = sparse.outputs.copy()
     wrong[7] += 3.0
     chosen = sparse.inducing_signal, sparse.inducing_noise
-    told = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
-    one, other = (model.held_out(np.arange(300)).mean[7] for model in (sparse, told))
+    shifted = SparseVHGP(sparse.inputs, wrong, sparse.parameters, sparse.site_precisions, *chosen)
+    one, other = (model.held_out(np.arange(300)).mean[7] for model in (sparse, shifted))
     assert one == pytest.approx(other, abs=1e-9)
-    assert told.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
+    assert shifted.predict(sparse.inputs[7:8]).mean[0] > sparse.predict(sparse.inputs[7:8]).mean[0] + 1e-3
 
 
-def test_on_a_grid_it_is_what_it_predicts(fitted: SparseVHGP) -> None:
+def test_grid_posterior_equals_predictions(fitted: SparseVHGP) -> None:
     regression = sparse_grid_regression(fitted)
     axes = np.linspace(-1.0, 1.0, 7), np.linspace(-1.5, 1.0, 5)
     points = fitted.predict(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
@@ -129,7 +129,7 @@ def test_on_a_grid_it_is_what_it_predicts(fitted: SparseVHGP) -> None:
         np.testing.assert_allclose(on_grid[1].ravel(), variance, rtol=1e-7)
 
 
-def test_a_record_gives_the_same_model_again(fitted: SparseVHGP) -> None:
+def test_record_round_trips(fitted: SparseVHGP) -> None:
     arrays: dict[str, np.ndarray] = {}
     put_inducing(fitted, 1, arrays)
     assert has_inducing(1, arrays) and not has_inducing(0, arrays)
@@ -142,7 +142,7 @@ def test_a_record_gives_the_same_model_again(fitted: SparseVHGP) -> None:
             sparse_regression(*known, 1, {**arrays, "inducing_noise_1": wrong})
 
 
-def test_far_from_the_data_the_prior_is_left(fitted: SparseVHGP) -> None:
+def test_prediction_far_from_data_is_the_prior(fitted: SparseVHGP) -> None:
     far, parameters = fitted.predict(np.array([[1e6, 1e6]])), fitted.parameters
     assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
     assert far.variance[0] == pytest.approx(parameters.signal.variance, rel=1e-5)
@@ -150,7 +150,7 @@ def test_far_from_the_data_the_prior_is_left(fitted: SparseVHGP) -> None:
     assert far.log_noise_variance[0] == pytest.approx(parameters.noise.variance)
 
 
-def test_memory_is_that_of_the_rows_times_the_inducing_inputs() -> None:
+def test_memory_grows_with_rows_times_inducing_inputs() -> None:
     inputs, outputs = rows(20_000)
     chosen = np.arange(0, 20_000, 400)
     tracemalloc.start()
@@ -169,13 +169,13 @@ def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> Non
     assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
 
 
-def test_repeated_inputs_are_no_obstacle() -> None:
+def test_repeated_inputs_are_accepted() -> None:
     inputs, outputs = rows(1200)
     inputs = inputs[np.arange(1200) // 40 * 40]
     assert np.isfinite(fit_sparse_vhgp(inputs, outputs, 50).bound)
 
 
-def test_rows_and_kernels_that_cannot_be_learnt_from_are_refused() -> None:
+def test_rejects_unusable_rows_and_kernels() -> None:
     with pytest.raises(TrainingError, match="NaN"):
         fit_sparse_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
     rough = VhgpParameters.from_vector(PARAMETERS.to_vector(), KernelChoice("matern52"))
@@ -192,7 +192,7 @@ def table(n: int) -> PushTable:
     return PushTable(inputs, np.full(n, 0.2), outcomes, np.array([f"push-{k // 5}" for k in range(n)]))
 
 
-def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None:
+def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
     assert inducing_inputs("vhgp", MOST_DENSE_ROWS) is None
     assert inducing_inputs("vhgp", MOST_DENSE_ROWS + 1) == DEFAULT_INDUCING
     assert inducing_inputs("vhgp", 100, 30) == 30
@@ -202,7 +202,7 @@ def test_many_windows_or_asked_for_inducing_inputs_make_a_sparse_model() -> None
             inducing_inputs(kind, 100, wanted)
 
 
-def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) -> None:
+def test_sparse_push_model_is_trained_saved_loaded_and_tabulated(tmp_path: Path) -> None:
     rows = table(400)
     model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=30))
     assert isinstance(model.predictor, GaussianProcessPredictor)
@@ -220,7 +220,7 @@ def test_a_sparse_push_model_is_trained_saved_loaded_and_served(tmp_path: Path) 
     assert np.exp(np.abs(np.log(variance[:, 0] / truth)).mean()) < 1.4
 
 
-def test_a_sparse_model_takes_no_other_kernels() -> None:
+def test_sparse_model_rejects_other_kernels() -> None:
     with pytest.raises(TrainingError, match="squared exponential"):
         train_model(
             table(50),

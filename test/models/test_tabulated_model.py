@@ -1,4 +1,4 @@
-"""Served models: a table that is true to the model inside its domain, the model itself everywhere else."""
+"""Tabulated models: an accurate table inside the domain, the model itself everywhere else."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def coupled(model: PushModel, bandwidth: float = 0.5) -> PushModel:
 
 
 def sign_change(model: PushModel, bandwidth: float) -> Correlation:
-    """dx and dtheta go together at angles above zero, against each other below, dy goes with neither."""
+    """dx and dtheta correlate positively at angles above zero and negatively below; dy correlates with neither."""
     assert isinstance(model.predictor, GaussianProcessPredictor)
     z = np.random.default_rng(7).standard_normal((len(model.training), 3))
     z[:, 2] = 0.2 * z[:, 2] + np.sign(model.training.inputs[:, 2]) * z[:, 0]
@@ -130,11 +130,11 @@ def assert_true_to_the_model(answers: TabulatedModel, n: int = 400) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
-def test_the_table_is_true_to_the_model(shape: str, kind: str) -> None:
+def test_table_is_accurate(shape: str, kind: str) -> None:
     assert_true_to_the_model(tabulated(shape, kind))
 
 
-def test_the_made_up_correlation_is_a_strong_one_of_either_sign() -> None:
+def test_simulated_correlation_is_strong_and_of_both_signs() -> None:
     answers = tabulated("square", "coupled vhgp")
     covariance = of(answers, inside(answers.model, 200)).process_covariance
     correlation = covariance[:, 0, 2] / np.sqrt(covariance[:, 0, 0] * covariance[:, 2, 2])
@@ -148,7 +148,7 @@ def test_independent_outputs_have_no_covariance() -> None:
             assert np.all(covariance - variances(covariance)[:, :, None] * np.eye(3) == 0.0)
 
 
-def test_a_covariance_errs_by_what_it_says_of_the_worst_combination_of_outputs() -> None:
+def test_covariance_error_is_that_of_the_worst_combination_of_outputs() -> None:
     exact = np.array([[1.0, 0.0, 0.99], [0.0, 1.0, 0.0], [0.99, 0.0, 1.0]])
     found = exact.copy()
     found[0, 2] = found[2, 0] = 0.98  # one percent, but the variance of dx - dtheta has doubled
@@ -180,7 +180,7 @@ NARROW = {
 
 @pytest.mark.parametrize("shape", ["square", "ellipse", "circle", "triangle"])
 @pytest.mark.parametrize("narrow", NARROW)
-def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
+def test_constant_inputs_have_no_axis(shape: str, narrow: str) -> None:
     low, high = (np.array(limit) for limit in NARROW[narrow])
     model = trained(OUTLINES[shape], "gp", low, high, n=60)
     assert_true_to_the_model(tabulate(coupled(model)), n=200)
@@ -194,20 +194,20 @@ def test_inputs_that_do_not_vary_take_no_axis(shape: str, narrow: str) -> None:
     contact=st.floats(0.0, 1.0, exclude_max=True),
     angle=st.floats(-1.2, 1.2),
 )
-def test_a_push_gets_the_same_answer_alone_and_among_others(
+def test_single_push_gets_the_prediction_it_has_in_a_batch(
     shape: str, kind: str, velocity: float, contact: float, angle: float
 ) -> None:
     model, push = tabulated(shape, kind), np.array([[velocity, contact, angle]])
     others = inside(model.model, 20)
     alone, among = of(model, push), of(model, np.concatenate([others[:10], push, others[10:]]))
-    # Outside the domain the model itself answers, whose solver takes one row or many in a different order.
+    # Outside the domain the model itself predicts; its solver takes one row or many in a different order.
     precision = 1e-12 if alone.in_domain[0] else 1e-8
     assert_close(alone, among, 10, precision)
 
 
 @settings(max_examples=40, deadline=None)
 @given(fraction=st.floats(0.02, 0.95), angle=st.floats(-0.9, 0.9), kind=st.sampled_from(KINDS))
-def test_sides_that_symmetry_makes_one_are_one(fraction: float, angle: float, kind: str) -> None:
+def test_sides_that_symmetry_folds_share_predictions(fraction: float, angle: float, kind: str) -> None:
     for shape, order in (("square", 4), ("ellipse", 2)):
         turned = np.array([[0.02, (k + fraction) / order, angle] for k in range(order)])
         prediction = of(tabulated(shape, kind), turned)
@@ -216,14 +216,14 @@ def test_sides_that_symmetry_makes_one_are_one(fraction: float, angle: float, ki
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
-def test_a_circle_does_not_tell_contacts_apart(kind: str) -> None:
+def test_contact_does_not_matter_on_a_circle(kind: str) -> None:
     contact = np.linspace(0.0, 0.999, 7)
     inputs = np.column_stack([np.full(7, 0.02), contact, np.full(7, 0.3)])
     assert np.ptp(of(tabulated("circle", kind), inputs).mean, axis=0) == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_outside_the_domain_the_model_itself_answers(shape: str) -> None:
+def test_pushes_outside_the_domain_are_predicted_by_the_model(shape: str) -> None:
     model = tabulated(shape, "coupled gp")
     out = inside(model.model, 30)
     out[::2, 0] = 0.2
@@ -237,7 +237,7 @@ def test_outside_the_domain_the_model_itself_answers(shape: str) -> None:
     assert np.array_equal(mixed.in_domain, [False] * 30 + [True] * 5)
 
 
-def test_the_rim_of_the_domain_belongs_to_it() -> None:
+def test_boundary_of_the_domain_is_inside() -> None:
     for model in (tabulated(shape, kind) for shape in OUTLINES for kind in ("gp", "vhgp")):
         rim = np.array([[v, 0.3, a] for v in (0.0, 1.0) for a in (0.0, 1.0)])
         known = model.model.training.inputs
@@ -261,7 +261,7 @@ def test_no_rows_give_no_predictions() -> None:
     assert (prediction.mean.shape, prediction.covariance.shape, prediction.in_domain.shape) == ((0, 3), (0, 3, 3), (0,))
 
 
-def test_the_analytical_model_answers_itself() -> None:
+def test_analytical_model_has_no_table() -> None:
     model = trained(OUTLINES["square"], "analytical", *WIDE)
     answers, inputs = tabulate(model), inside(model, 5)
     assert not answers.tabulated and answers.error is None and answers.how.startswith("exact")
@@ -269,7 +269,7 @@ def test_the_analytical_model_answers_itself() -> None:
         np.testing.assert_allclose(of(answers, inputs[:count]).mean, of(model, inputs[:count]).mean, rtol=1e-12)
 
 
-def test_a_table_that_would_be_too_large_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_large_table_is_not_built(monkeypatch: pytest.MonkeyPatch) -> None:
     for limit in ("MOST_KNOTS", "MOST_NODES"):
         with monkeypatch.context() as patch:
             patch.setattr(prediction_table, limit, 100)
@@ -278,7 +278,7 @@ def test_a_table_that_would_be_too_large_is_not_made(monkeypatch: pytest.MonkeyP
         assert "at most 100" in answers.how
 
 
-def test_a_table_that_is_not_true_to_the_model_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_inaccurate_table_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     model = tabulated("square", "vhgp").model
     for name in ("SIGNAL", "NOISE"):
         monkeypatch.setattr(prediction_table, name, prediction_table.Density(nodes=0.3, cells=0.3))
@@ -293,7 +293,7 @@ def test_a_table_that_is_not_true_to_the_model_is_not_used(monkeypatch: pytest.M
 # --- interpolation ----------------------------------------------------------------------------------------------
 
 
-def test_a_spline_takes_the_values_at_its_knots_and_reproduces_cubics() -> None:
+def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
     axes = [Axis(-1.0, 2.0, 5), Axis(0.0, 0.5, 7)]
 
     def cubic(x: Array, y: Array) -> Array:
@@ -324,10 +324,10 @@ def test_few_nodes_resolve_a_smooth_function() -> None:
         assert knots == pytest.approx(np.exp(-(np.linspace(0.2, 3.0, 11) ** 2)), abs=error)
 
 
-# --- what the server answers ------------------------------------------------------------------------------------
+# --- services ------------------------------------------------------------------------------------
 
 
-def test_the_services_answer_what_the_served_model_says(tmp_path: Path) -> None:
+def test_services_return_predictions_of_the_tabulated_model(tmp_path: Path) -> None:
     pytest.importorskip("rclpy")
     from msg_adapters.predictions import (
         PushQuery,

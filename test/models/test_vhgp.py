@@ -1,4 +1,4 @@
-"""The VHGP: its bound is a bound, its gradient is the gradient, it finds noise that depends on the input."""
+"""The VHGP: its bound, its gradient, and fits that recover input-dependent noise."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_the_bound_is_below_the_marginal_likelihood_and_near_it() -> None:
     assert evidence - 0.1 < bound < evidence
 
 
-def test_without_freedom_for_the_noise_the_bound_is_the_homoscedastic_likelihood() -> None:
+def test_bound_with_fixed_noise_is_the_homoscedastic_likelihood() -> None:
     inputs, outputs = rows(60)
     parameters = VhgpParameters(PARAMETERS.log_lengthscales, 0.2, np.zeros(2), -9.0, -1.0)
     problem = VhgpProblem.of(inputs, outputs, parameters)
@@ -91,7 +91,7 @@ def test_no_other_q_of_the_noise_has_a_higher_bound() -> None:
         assert Bound.at(problem, Sites(precisions, potentials)).value < best.value
 
 
-def test_at_the_maximum_one_number_per_row_describes_q() -> None:
+def test_q_at_the_maximum_has_one_parameter_per_row() -> None:
     problem = VhgpProblem.of(*rows(60), PARAMETERS)
     best = maximise_over_noise(problem, None, 1e-13)
     np.testing.assert_allclose(best.mean_weights, best.site_precisions - 0.5, atol=1e-5)
@@ -99,7 +99,7 @@ def test_at_the_maximum_one_number_per_row_describes_q() -> None:
     assert Bound.tied(problem, best.site_precisions).value == pytest.approx(best.value, abs=1e-8)
 
 
-def test_a_loose_search_for_q_is_described_by_one_number_per_row_too() -> None:
+def test_q_of_a_loose_search_has_one_parameter_per_row() -> None:
     problem = VhgpProblem.of(*rows(250), PARAMETERS)
     loose = maximise_over_noise(problem, None, 1e-4)
     best = maximise_over_noise(problem, None, 1e-12).value
@@ -109,7 +109,7 @@ def test_a_loose_search_for_q_is_described_by_one_number_per_row_too() -> None:
     assert best - 1e-3 < tied.value <= best + 1e-9
 
 
-def test_far_from_a_goal_the_search_for_q_ends_sooner() -> None:
+def test_search_for_q_ends_sooner_far_from_the_goal() -> None:
     problem = VhgpProblem.of(*rows(60), PARAMETERS)
     best = maximise_over_noise(problem, None, 1e-12).value
     near, far = (maximise_over_noise(problem, None, 1e-12, goal=best + gap).value for gap in (0.0, 50.0))
@@ -118,7 +118,7 @@ def test_far_from_a_goal_the_search_for_q_ends_sooner() -> None:
 
 
 @pytest.mark.parametrize("choice", [DEFAULT_CHOICE, KernelChoice("matern52", noise_nugget=True)])
-def test_a_fit_takes_less_memory_than_six_dense_matrices(choice: KernelChoice) -> None:
+def test_fit_needs_less_memory_than_six_dense_matrices(choice: KernelChoice) -> None:
     inputs, outputs = rows(700)
     tracemalloc.start()
     try:
@@ -129,7 +129,7 @@ def test_a_fit_takes_less_memory_than_six_dense_matrices(choice: KernelChoice) -
     assert peak < 6 * 8 * 700**2
 
 
-def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
+def test_search_for_q_converges_from_any_start() -> None:
     inputs, outputs = rows(80)
     elsewhere = VhgpParameters(np.array([1.0, 0.5]), -0.5, np.array([-1.0, 0.8]), 0.7, 1.5)
     start = maximise_over_noise(VhgpProblem.of(inputs, outputs, elsewhere), None, 1e-3).sites
@@ -138,7 +138,7 @@ def test_the_search_for_q_ends_at_the_same_place_from_anywhere() -> None:
     assert warm.value == pytest.approx(fresh.value, abs=1e-8)
 
 
-def test_the_fit_finds_where_it_is_noisy(fitted: VHGP) -> None:
+def test_fit_recovers_input_dependent_noise(fitted: VHGP) -> None:
     new = np.random.default_rng(9).uniform(-1.2, 1.2, size=(200, 2))
     prediction = fitted.predict(new)
     ratio = np.sqrt(prediction.process_variance) / np.exp(new[:, 1] - 1.0)
@@ -146,7 +146,7 @@ def test_the_fit_finds_where_it_is_noisy(fitted: VHGP) -> None:
     assert np.abs(prediction.mean - np.sin(new[:, 0])).mean() < 0.1
 
 
-def test_heteroscedastic_data_are_explained_better_than_by_one_noise_level(fitted: VHGP) -> None:
+def test_vhgp_is_likelier_than_gp_on_heteroscedastic_data(fitted: VHGP) -> None:
     assert fitted.bound > log_marginal_likelihood(fit_gp(*rows(250))) + 30.0
 
 
@@ -177,7 +177,7 @@ def test_one_input_is_predicted_as_in_a_batch(fitted: VHGP) -> None:
         assert single.outcome_variance[0] == pytest.approx(batch.outcome_variance[i], rel=1e-9)
 
 
-def test_rows_have_no_order(fitted: VHGP) -> None:
+def test_order_of_rows_does_not_matter(fitted: VHGP) -> None:
     order = np.random.default_rng(5).permutation(250)
     shuffled = VHGP(fitted.inputs[order], fitted.outputs[order], fitted.parameters, fitted.site_precisions[order])
     new = rows(20, seed=6)[0]
@@ -186,7 +186,7 @@ def test_rows_have_no_order(fitted: VHGP) -> None:
     np.testing.assert_allclose(one.outcome_variance, other.outcome_variance, rtol=1e-8)
 
 
-def test_far_from_the_data_the_prior_is_left(fitted: VHGP) -> None:
+def test_prediction_far_from_data_is_the_prior(fitted: VHGP) -> None:
     far = fitted.predict(np.array([[1e6, 1e6]]))
     parameters = fitted.parameters
     assert far.mean[0] == pytest.approx(0.0, abs=1e-9)
@@ -211,12 +211,12 @@ def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> Non
     assert np.isfinite(prediction.mean).all() and np.isfinite(prediction.outcome_variance).all()
 
 
-def test_repeated_inputs_are_no_obstacle() -> None:
+def test_repeated_inputs_are_accepted() -> None:
     inputs, outputs = rows(300)
     inputs = inputs[np.arange(300) // 10 * 10]
     assert np.isfinite(fit_vhgp(inputs, outputs).bound)
 
 
-def test_rows_that_cannot_be_learnt_from_are_refused() -> None:
+def test_rejects_unusable_rows() -> None:
     with pytest.raises(TrainingError, match="NaN"):
         fit_vhgp(np.zeros((5, 2)), np.array([0.0, np.nan, 0.0, 0.0, 0.0]))
