@@ -266,7 +266,7 @@ def test_a_response_is_the_derivative_of_the_surface_solved_by_root_finding(
 
 
 def test_a_friction_gradient_shifts_the_centre_of_friction_of_a_slider_to_the_rougher_side() -> None:
-    """Coulomb friction that rises by s per metre has its centre s a^2 / 12 from the middle of a square of uniform pressure."""
+    """Friction that rises by s per metre has its centre s a^2 / 12 from the middle of a square of uniform pressure."""
     physics, push = physics_of("rect1"), pushes(40)
     level = replace(push, covariates={"slider_heading": np.zeros(40)})
     gradient = BY_NAME["friction_gradient"].response(physics, level)

@@ -1,4 +1,4 @@
-"""The sparse bound: equal to the dense one if every row is an inducing input, else below it; selection of inducing inputs."""
+"""The sparse bound: the dense one if every row is an inducing input, else below it; and the choice of inducing inputs."""
 
 from __future__ import annotations
 

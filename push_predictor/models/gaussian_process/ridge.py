@@ -64,10 +64,6 @@ class RegularisableKernel:
         """K vector, shape (n,)."""
         return self.matrix @ vector + self.nugget * vector
 
-    def dense(self) -> Array:
-        """K itself, shape (n, n)."""
-        return self.matrix + self.nugget * np.eye(len(self.matrix))
-
 
 def factorise(matrix: Array, nugget: float = 0.0, *, smooth: bool = True) -> RegularisableKernel:
     """A kernel matrix (n, n) with its root (r, n), matrix = root' root, where the rank r is low.

@@ -155,14 +155,10 @@ class Bound:
         """The sites that a fixed point reproduces: where a step of natural gradient of length 1 ends."""
         return sites_from(self.optimal_precisions, self.noise_mean)
 
-    def hyperparameter_gradient(self, tied: bool = False) -> Array:
-        """dF/d(parameters.to_vector()) at fixed Lambda and b, or with b following Lambda - 1/2 (`tied`).
-
-        Both agree at a maximum over (b, Lambda). The untied one omits a term that vanishes there and
-        costs a product of two (n, n) matrices.
-        """
+    def hyperparameter_gradient(self) -> Array:
+        """dF/d(parameters.to_vector()) at fixed Lambda and b; at a maximum over these, that of the maximum."""
         signal = self._signal_gradient()
-        noise = self._noise_gradient(tied)
+        noise = self._noise_gradient()
         of_noise, of_nugget = noise[: len(signal)], noise[len(signal) :]
         return np.concatenate([signal, of_noise, [self.optimal_weights.sum()], of_nugget])
 
@@ -175,24 +171,15 @@ class Bound:
         gradient[-1] += 2.0 * jitter
         return 0.5 * gradient
 
-    def _noise_gradient(self, complete: bool) -> Array:
+    def _noise_gradient(self) -> Array:
         problem = self.problem
         weights = self.noise_ridge.precision()
-        if complete:
-            unbalance = (self.optimal_precisions - self.site_precisions) / self.site_precisions**2
-            weights += (weights * unbalance) @ weights
         # b gb' + gb b' - b b' with gb the optimal weights, as one symmetric difference of squares
         _subtract_square(weights, self.optimal_weights)
         _subtract_square(weights, self.optimal_weights - self.mean_weights, -1.0)
         parameters, trace = problem.parameters, float(np.trace(weights))
         gradient = -0.5 * parameters.noise.gradient(problem.inputs, problem.noise_kernel.matrix, weights)
         return gradient if parameters.log_nugget_sd is None else np.append(gradient, -parameters.nugget * trace)
-
-    def site_gradient(self) -> Array:
-        """dF/dLambda with b = Lambda - 1/2 tied to it: -(K_g + 1/2 S o S)(Lambda - optimal), shape (n,)."""
-        kernel = self.problem.noise_kernel.dense()
-        posterior = kernel - kernel @ self.noise_ridge.precision() @ kernel
-        return -(kernel + 0.5 * posterior**2) @ (self.site_precisions - self.optimal_precisions)
 
 
 def sites_from(precisions: Array, noise_mean: Array) -> Sites:
