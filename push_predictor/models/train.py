@@ -79,16 +79,18 @@ def train_model(
     rows = table.take(training_rows(table, options.n_train, options.seed))
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
-    inducing = inducing_inputs(kind, len(rows), options.inducing)
     with one_blas_thread():
-        predictor: Predictor = (
-            _analytical(rows, rig, options.fit)
-            if kind == "analytical"
-            else _learnt(rows, rig, kind, options.kernels, inducing, watch)
-        )
+        predictor = _predictor(rows, rig, kind, options, watch)
     watch(f"trained {kind} on {len(rows)} windows of {len(rows.pushes)} pushes", 1.0)
     provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
     return PushModel(name, kind, rig, predictor, rows, provenance)
+
+
+def _predictor(rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch) -> Predictor:
+    inducing = inducing_inputs(kind, len(rows), options.inducing)
+    if kind == "analytical":
+        return _analytical(rows, rig, options.fit)
+    return _learnt(rows, rig, kind, options.kernels, inducing, watch)
 
 
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:

@@ -1,4 +1,4 @@
-"""The sparse bound: the dense one if every row is an inducing input, else below it; and the choice of inducing inputs."""
+"""The sparse bound: the dense one if every row is an inducing input, else below it; choice of inducing inputs."""
 
 from __future__ import annotations
 
