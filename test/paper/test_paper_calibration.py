@@ -90,7 +90,7 @@ def test_coverage_counts_outcomes_in_the_central_interval() -> None:
     assert [e.value for e in told] == [0.75, 0.5, 0.5]
 
 
-def test_intervals_of_coverage_draw_pushes_and_not_windows() -> None:
+def test_intervals_of_coverage_resample_pushes_not_windows() -> None:
     same_within_a_push = np.repeat(uniform(60, 1), 10, axis=0)
     by_push = coverage(ids(60, 10), same_within_a_push, 0.5)[0]
     by_window = coverage(ids(600, 1), same_within_a_push, 0.5)[0]
@@ -108,18 +108,18 @@ def test_no_window_gives_nothing() -> None:
     assert np.isnan(coverage(ids(0), np.zeros((0, 3)), 0.9)[0].value)
 
 
-def test_uniform_probabilities_are_not_called_uneven() -> None:
+def test_uniform_probabilities_do_not_reject_a_flat_histogram() -> None:
     """Of 20 made-up sets of three outputs, 5 % are wrongly rejected; more than 7 of 60 is past chance (p < 0.01)."""
     rejected = sum(int((histogram(ids(100), uniform(100, seed=s)).p <= 0.05).sum()) for s in range(20))
     assert rejected <= 7
 
 
-def test_what_is_the_same_all_over_a_push_is_no_evidence_of_unevenness() -> None:
+def test_windows_that_repeat_one_push_do_not_reject_a_flat_histogram() -> None:
     repeated = [np.repeat(uniform(100, 1, seed=s), 4, axis=0) for s in range(20)]
     assert sum(int((histogram(ids(100), probabilities).p <= 0.05).sum()) for probabilities in repeated) <= 7
 
 
-def test_probabilities_of_too_wide_a_forecast_are_uneven() -> None:
+def test_too_wide_forecast_rejects_a_flat_histogram() -> None:
     shape = histogram(ids(200), 0.25 + 0.5 * uniform(200))
     assert (shape.p <= 0.05).all()
     assert shape.misplaced == pytest.approx(np.full(3, 0.4), abs=0.02)  # four bars hold 0.2 each instead of 0.1
@@ -150,7 +150,7 @@ def test_where_the_predictive_is_gaussian_both_transforms_agree(kind: str) -> No
     assert found.exact == pytest.approx(found.gaussian, abs=1e-9)
 
 
-def test_several_folds_are_put_together() -> None:
+def test_together_joins_the_windows_of_several_folds() -> None:
     folds = [pits(made_up_set(), Fit("gp", 30, "push", fold)) for fold in range(5)]
     whole = together(folds)
     assert len(whole.push_id) == 160 and len(whole.push_scores.push_id) == 40
@@ -160,7 +160,7 @@ def test_several_folds_are_put_together() -> None:
 # ---- verdicts
 
 
-def test_a_promise_is_kept_broken_or_open() -> None:
+def test_state_of_an_output_is_kept_broken_or_open() -> None:
     kept = [Estimate(0.5, 0.45, 0.55), Estimate(0.9, 0.88, 0.93), SURE]
     assert promise(kept) == "kept"
     assert promise([Estimate(0.5, 0.35, 0.65), *kept[1:]]) == "open"
@@ -169,7 +169,7 @@ def test_a_promise_is_kept_broken_or_open() -> None:
     assert promise([Estimate(0.75, 0.65, 0.85), *kept[1:]]) == "broken"
 
 
-def test_nine_corrected_intervals_are_kept_together_about_as_often_as_one() -> None:
+def test_nine_corrected_intervals_jointly_cover_as_often_as_one() -> None:
     """Of 1000 made-up sets of nine figures each, at least 940 have all nine within their corrected intervals."""
     figures = np.random.default_rng(0).standard_normal((1000, 9))
     wide = corrected(Estimate(0.0, -1.96, 1.96), 9)
@@ -219,7 +219,7 @@ BETTER, SAME, WORSE = Estimate(-0.2, -0.3, -0.1), Estimate(0.0, -0.1, 0.1), Esti
         (["open", "open", "open"], "not decided"),
     ],
 )
-def test_intervals_hold_if_every_output_keeps_its_promise(outputs: list[str], verdict: str) -> None:
+def test_interval_claim_holds_if_every_output_is_kept(outputs: list[str], verdict: str) -> None:
     finding = coverage_finding(found(outputs, [0.5] * 3, (SAME, SAME)), EXACT)
     assert finding.verdict == verdict
     assert "800 windows of 200 pushes" in finding.sentence and "0.950" in finding.sentence
@@ -236,7 +236,7 @@ def test_intervals_hold_if_every_output_keeps_its_promise(outputs: list[str], ve
         ([0.01, 0.01, 0.01], 59, "does not hold"),
     ],
 )
-def test_the_shape_holds_if_every_histogram_may_be_flat(p: list[float], pushes: int, verdict: str) -> None:
+def test_shape_claim_holds_if_no_histogram_is_rejected(p: list[float], pushes: int, verdict: str) -> None:
     assert shape_finding(found(["kept"] * 3, p, (SAME, SAME), pushes)).verdict == verdict
 
 
@@ -325,7 +325,7 @@ def test_speed_claim_does_not_hold_if_no_cell_misses() -> None:
     assert speed_finding(coverage_by_speed(SPEEDS, right, right)).verdict == "does not hold"
 
 
-def test_a_group_without_windows_leaves_it_open() -> None:
+def test_speed_claim_is_not_decided_with_an_empty_group() -> None:
     right = uniform_pits(30)
     slow = replace(right, speed=np.full(len(right.speed), 0.02))
     groups = coverage_by_speed(SPEEDS, slow, slow)

@@ -88,7 +88,7 @@ def test_noise_from_push_to_push_widens_the_interval():
     assert wide.high / wide.low > 1.5 * narrow.high / narrow.low
 
 
-def test_a_crossing_says_where_the_sizes_end():
+def test_crossing_text_names_the_smallest_and_largest_size():
     assert Crossing(10.0, 10.0, np.inf, 10, 1000).text() == "at most 10 (at most 10 to beyond 1000)"
     assert Crossing(np.inf, 95.0, np.inf, 10, 1000).json()["value"] is None
 
@@ -137,7 +137,7 @@ def test_similar_means_within_a_tenth(vhgp, verdict):
     assert similar_mean(CORPUS, found, 1000).verdict == verdict
 
 
-def test_a_ratio_known_badly_is_no_more_than_part():
+def test_wide_ratio_holds_at_most_in_part():
     noisy = [{"nmse": 0.4, "noise": 0.01}, {"nmse": 0.4, "noise": 0.01}, {"nmse": 0.4, "noise": 3.0}]
     found = curves_of(gp=levels(0.4, 0.4, 0.4), vhgp=noisy)
     assert similar_mean(CORPUS, found, 1000).verdict in ("holds in part", "not decided")
@@ -172,7 +172,7 @@ def test_the_largest_size_alone_decides_whether_the_mean_improves(signs, verdict
     assert improves(CORPUS, gains(*signs), 40).verdict == verdict
 
 
-def test_what_the_other_sizes_say_is_told():
+def test_mean_gain_names_sizes_with_better_and_worse_intervals():
     sentence = improves(CORPUS, gains(1, -1, 0), 40).sentence
     assert "Better with the whole interval at n = 100, worse at n = 10 " in sentence
 
@@ -205,7 +205,7 @@ def test_a_gain_lies_with_the_slow_pushes_if_they_have_it_and_the_fast_ones_have
 
 
 @pytest.mark.parametrize("improvement", ["not decided", "does not hold"])
-def test_where_there_is_no_gain_nobody_can_tell_where_it_lies(improvement):
+def test_place_of_the_gain_is_not_decided_without_a_gain(improvement):
     assert where_it_counts(CORPUS, two_speeds(0.5, 1.5), [0, 1], improvement).verdict == "not decided"
 
 
@@ -223,7 +223,7 @@ def compared(study):
     return section(study)
 
 
-def test_the_section_compares_all_three_kinds_beside_the_paper(compared):
+def test_section_compares_all_three_kinds_with_the_paper(compared):
     paper = next(table for table in compared.tables if "paper" in table.head[1])
     assert paper.rows[0][1:4] == ("0.72", "0.38", "0.37")
     assert len(compared.findings) == 4 and compared.pictures[0].path.exists()
@@ -247,7 +247,7 @@ def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
     assert first(paper[6]) - first(si[3]) == pytest.approx(13.8155, abs=0.011)  # two decimals in both cells
 
 
-def test_the_gain_of_the_mean_is_told_at_every_size_and_speed(study):
+def test_mean_gain_section_has_every_size_and_speed(study):
     made = mean_gain.section(study)
     assert {row[0] for row in made.tables[0].rows} >= {"20, by push", "20, random"}
     assert len(made.findings) == 2 and made.pictures[0].path.exists()

@@ -36,7 +36,7 @@ def test_every_speed_has_as_many_pushes_each_long_enough_for_a_window() -> None:
         assert travel_for(np.array([speed]))[0] - braking > 0.2 * speed
 
 
-def test_sets_share_slider_or_table_and_no_two_share_their_draws() -> None:
+def test_sets_share_slider_or_table_but_not_their_noise() -> None:
     one, other_surface, other_shape = (
         learning_spec(QUICK, *pair) for pair in (("rect1", "abs"), ("rect1", "pu"), ("ellip1", "abs"))
     )
@@ -47,7 +47,7 @@ def test_sets_share_slider_or_table_and_no_two_share_their_draws() -> None:
     assert len({pair_number(*pair) for pair in FULL.pairs}) == 16
 
 
-def test_a_recording_is_made_anew_from_its_seed_and_can_be_kept(tmp_path: Path) -> None:
+def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path) -> None:
     small = replace(QUICK, pushes=6, speeds=(0.05, 0.1))
     kept = learning_set(small, "rect1", "abs", tmp_path)
     again = learning_set(small, "rect1", "abs")
@@ -67,7 +67,7 @@ def test_repetitions_of_one_push_differ_and_go_where_it_was_sent() -> None:
     assert np.all(low < cell.mean) and np.all(cell.mean < high)
 
 
-def test_a_push_that_was_hardly_seen_has_no_mean() -> None:
+def test_push_with_too_few_repetitions_has_no_mean() -> None:
     cell = made_up_grid().cells[0]
     few = replace(cell, outcomes=cell.outcomes[: FEWEST - 1])
     assert np.isnan(few.mean).all() and np.isnan(few.sd).all() and np.isnan(few.intervals[0]).all()
@@ -81,7 +81,7 @@ def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
         np.testing.assert_array_equal(grid.mean[row, column], cell.mean)
 
 
-def test_the_section_tells_which_speeds_lack_windows(tmp_path: Path) -> None:
+def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
     missing = made_up_corpus()
     slow = {pair: replace(s, table=s.table.take(s.table.inputs[:, 0] < 0.06)) for pair, s in missing.sets.items()}
     told = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).findings[0]

@@ -45,7 +45,7 @@ def test_the_truth_has_next_to_no_divergence_and_a_wider_model_a_known_one() -> 
     assert np.median(found.sd_ratio[1]) == pytest.approx(2.0, abs=0.05)
 
 
-def test_an_estimate_is_the_mean_over_seeds_with_pushes_drawn_anew() -> None:
+def test_estimate_is_the_mean_over_seeds_with_resampled_pushes() -> None:
     values = np.array([[1.0, 2.0, 9.0], [3.0, 4.0, 5.0]])
     weights = push_bootstrap(np.arange(3))
     assert estimate(values, mean_of, weights).value == 4.0
@@ -63,7 +63,7 @@ def test_pushes_that_are_alike_in_blocks_leave_a_wider_interval_than_independent
     np.testing.assert_array_equal(divergences(grid, [answer(grid.typical_inputs)]).weights, weights[0])
 
 
-def test_a_difference_draws_the_same_pushes_for_both() -> None:
+def test_difference_resamples_the_same_pushes_for_both() -> None:
     values = np.random.default_rng(0).gamma(1.0, size=(2, 30))
     difference = estimate(values, mean_of, push_bootstrap(np.arange(30)), values + 1.0)
     assert (difference.low, difference.high) == (pytest.approx(-1.0), pytest.approx(-1.0))
@@ -96,7 +96,7 @@ def test_verdicts_on_the_median(ends: tuple[float, float], verdict: str) -> None
     assert good(Estimate(float(np.mean(ends)), *ends)) == verdict
 
 
-def test_the_section_has_what_the_paper_has_and_its_figures_beside(made: Section) -> None:
+def test_section_has_the_papers_figures_next_to_ours(made: Section) -> None:
     rows = {row[0]: row for row in made.tables[0].rows}
     assert rows["GP"][-2:] == ("22.63", "5.74") and rows["VHGP"][-2:] == ("15.32", "5.34")
     assert len({len(row) for row in (made.tables[0].head, *made.tables[0].rows)}) == 1
@@ -105,7 +105,7 @@ def test_the_section_has_what_the_paper_has_and_its_figures_beside(made: Section
     json.dumps(made.data, allow_nan=False)
 
 
-def test_windows_of_the_grids_speed_are_learnt_from_alone_where_there_are_enough(tmp_path: Path) -> None:
+def test_trains_on_the_grids_speed_alone_if_there_are_enough_windows(tmp_path: Path) -> None:
     few = made_up_study(tmp_path)
     assert [t.name for t in trainings(few)] == ["all speeds"]
     slow = replace(few, simulated=made_up_corpus(40, 3, speeds=(0.02, 0.3)))
@@ -115,7 +115,7 @@ def test_windows_of_the_grids_speed_are_learnt_from_alone_where_there_are_enough
     np.testing.assert_allclose(alone.pushes.table.inputs[:, 0], 0.02, rtol=0.2)
 
 
-def test_a_grid_that_was_hardly_seen_is_told_not_judged(tmp_path: Path) -> None:
+def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     unseen = made_up_grid(replace(PLAN, repetitions=3))
     made = section(replace(study, grids={"plywood": unseen}))

@@ -74,7 +74,7 @@ def test_growth_along_the_path_not_the_spread_chooses_and_the_dip_chooses_the_th
     assert kinds.p[3].min() <= 0.05 < kinds.p[:3].min()
 
 
-def test_pushes_that_hardly_move_the_slider_are_none_of_the_three() -> None:
+def test_pushes_that_hardly_move_the_slider_are_not_chosen() -> None:
     """A grazing push has a huge spread relative to its way; it is passed over."""
     grazing = 0.1 * rays(2e-3)
     assert kinds_of(grid_of(rays(1e-4), grazing)) is None
@@ -84,7 +84,7 @@ def test_pushes_that_hardly_move_the_slider_are_none_of_the_three() -> None:
     assert kinds.dropped == 1
 
 
-def test_pushes_whose_tip_slides_off_are_none_of_the_three() -> None:
+def test_pushes_whose_tip_slides_off_are_not_chosen() -> None:
     """One repetition in sixty that stops early is let pass, one in ten is not; a slider that still turns goes on."""
     few, many = rays(1e-4), rays(1e-4)
     few[0, -8:] = few[0, -9]
@@ -94,14 +94,14 @@ def test_pushes_whose_tip_slides_off_are_none_of_the_three() -> None:
     assert to_the_end(many)
 
 
-def test_pushes_that_begin_at_a_corner_are_none_of_the_three() -> None:
+def test_pushes_that_begin_at_a_corner_are_not_chosen() -> None:
     """The outermost contacts of the grid."""
     paths = (rays(1e-4), rays(3e-4))
     assert kinds_of(grid_of(*paths, fraction=0.9)) is not None
     assert kinds_of(grid_of(*paths, fraction=0.9945)) is None and kinds_of(grid_of(*paths, fraction=0.0055)) is None
 
 
-def test_a_path_that_runs_into_the_reset_is_left_out() -> None:
+def test_drops_a_path_that_runs_into_the_reset() -> None:
     """A slider that jumps further than the tip could push it was put back, not pushed."""
     paths = rays(1e-4)
     paths[7, -1, 0] += 0.02
@@ -117,7 +117,7 @@ def test_relative_spread_and_growth_of_rays_are_what_they_were_made_with() -> No
     assert growth(rays(3e-4, 4000, power=0.0)) == pytest.approx(half, abs=0.05)
 
 
-def test_the_interval_of_a_spread_holds_the_truth_as_often_as_it_says() -> None:
+def test_interval_of_a_spread_covers_the_truth_as_often_as_stated() -> None:
     """95 % intervals from 60 repetitions, 100 times over."""
     truth, hits = np.sqrt(2.0) * 3e-4 / WAY, 0
     for seed in range(100):
@@ -179,7 +179,7 @@ def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
     assert has_modes(p, power) == verdict
 
 
-def test_the_section_tells_all_three_of_a_grid_that_has_them(tmp_path: Path) -> None:
+def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -> None:
     """Findings, one row a push, a picture, numbers that JSON can hold."""
     grid = grid_of(rays(6e-4), drawn_together(1e-4), fanned_out(1e-3), rays(4e-4, apart_by=4e-3))
     made = section(study_of(tmp_path, grid))
@@ -189,7 +189,7 @@ def test_the_section_tells_all_three_of_a_grid_that_has_them(tmp_path: Path) -> 
     assert json.loads(json.dumps(dict(made.data), allow_nan=False))["chosen"]["convergent"]["angle"] == 0.1
 
 
-def test_alike_pushes_are_not_told_apart(tmp_path: Path) -> None:
+def test_equal_pushes_are_not_distinguished(tmp_path: Path) -> None:
     """Ten pushes of one spread, straight: the half that did not choose the extremes says that they are chance."""
     made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
     assert not {finding.verdict for finding in made.findings} & {"holds", "holds in part"}
@@ -201,7 +201,7 @@ def test_a_wide_push_that_draws_together_does_not_end_closer(tmp_path: Path) -> 
     assert [finding.verdict for finding in made.findings[:2]] == ["holds", "does not hold"]
 
 
-def test_a_grid_that_moves_nothing_is_no_crash(tmp_path: Path) -> None:
+def test_grid_that_moves_nothing_is_not_decided(tmp_path: Path) -> None:
     """Nothing to choose from: not decided, with a note."""
     made = section(study_of(tmp_path, grid_of(0.01 * rays(1e-4))))
     assert [finding.verdict for finding in made.findings] == ["not decided"]

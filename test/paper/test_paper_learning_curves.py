@@ -71,11 +71,11 @@ def test_the_circle_is_easiest_if_every_other_shape_is_harder_in_both_figures(fa
     assert circle(CORPUS, round_is(factor, nats), PAIRS).verdict == verdict
 
 
-def test_the_sentence_tells_the_difference_to_each_shape():
+def test_sentence_has_the_difference_to_each_shape():
     assert "square NMSE 0.150" in circle(CORPUS, round_is(0.5, -1.0, noise=0.0), PAIRS).sentence
 
 
-def test_folds_of_a_set_are_no_sets_of_their_own():
+def test_folds_of_one_set_do_not_count_as_sets():
     """One surface among three gives the whole gap: five folds of each do not make that sure."""
     one = made_up(lambda shape, u, n: 0.3 - (0.29 if (shape, u) == ("ellip1", "pu") else 0.0), noise=0.001)
     assert circle(CORPUS, one, PAIRS).verdict == "not decided"
@@ -127,7 +127,7 @@ def test_a_curve_that_falls_but_ends_early_decides_nothing():
     assert saturation(CORPUS, falling(0.3, 0.5, (100, 200)), PAIRS).verdict == "not decided"
 
 
-def test_the_gain_is_told_per_doubling_whatever_the_ratio_of_sizes():
+def test_gain_is_per_doubling_for_any_ratio_of_sizes():
     assert "lowers the NMSE by 30.0" in saturation(CORPUS, falling(0.3, 0.5, (100, 800)), PAIRS).sentence
 
 
@@ -136,7 +136,7 @@ def test_the_gain_of_one_set_has_an_interval_by_push():
     assert finding.verdict == "holds" and "one set, all folds, interval by push" in finding.sentence
 
 
-def test_a_gain_that_differs_from_set_to_set_is_not_made_sure_by_folds():
+def test_interval_of_the_gain_reflects_differences_between_sets():
     def level(shape: str, u: str, n: int) -> float:
         return 0.3 if n == 500 else 0.3 * (1.0 - (0.3 if (shape, u) == ("rect1", "pu") else 0.0))
 

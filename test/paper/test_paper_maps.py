@@ -127,9 +127,7 @@ def peaks_at(places: list[Place], reach: Estimate) -> Peaks:
         ([(0.9, 1.0)], (0.6, 0.85), "does not hold"),
     ],
 )
-def test_what_is_uncertain_about_a_peak_does_not_help_the_claim(
-    places: list[Place], ends: tuple[float, float], verdict: str
-) -> None:
+def test_uncertain_peak_does_not_help_the_claim(places: list[Place], ends: tuple[float, float], verdict: str) -> None:
     """All places must lie near, and the whole interval of what the paper's push reaches counts."""
     assert peak_findings(peaks_at(places, Estimate(0.95, *ends)), 9)[0].verdict == verdict
 
@@ -147,11 +145,11 @@ def test_what_is_uncertain_about_a_peak_does_not_help_the_claim(
         ("not decided", "not decided", "not decided"),
     ],
 )
-def test_what_one_source_cannot_decide_holds_in_part_at_most(one: Verdict, other: Verdict, verdict: str) -> None:
+def test_undecided_source_makes_a_claim_hold_at_most_in_part(one: Verdict, other: Verdict, verdict: str) -> None:
     assert agreed(one, other) == verdict
 
 
-def test_a_peak_tells_as_few_places_as_hold_95_percent_of_the_draws() -> None:
+def test_peak_lists_the_fewest_places_with_95_percent_of_the_draws() -> None:
     axes, shown = (np.array([0.0, 0.5, 1.0]), np.array([-1.0, 0.0, 1.0])), np.zeros((3, 3))
     drawn = np.zeros((100, 3, 3))
     drawn[:90, 1, 1] = drawn[90:96, 0, 2] = drawn[96:, 2, 0] = 1.0
@@ -164,7 +162,7 @@ def test_a_peak_tells_as_few_places_as_hold_95_percent_of_the_draws() -> None:
     assert found.near([(0.0, 1.0)], (0.1, 0.1)) == [False, False]
 
 
-def test_pushes_that_were_hardly_seen_are_never_the_largest() -> None:
+def test_pushes_with_too_few_repetitions_are_never_the_largest() -> None:
     grid = grid_of(bumps(((0.0, -1.5), (0.5, 0.0), (0.5, 0.0))), spoilt=2)
     assert np.isnan(grid.mean[0, 0]).all()
     model = model_of(bumps(as_the_paper_says()))
@@ -199,7 +197,7 @@ def test_the_map_shown_is_the_mean_of_the_draws_maps() -> None:
     np.testing.assert_allclose(averaged([one, other]).mean, 0.5 * (one.mean + other.mean))
 
 
-def test_neighbouring_pushes_are_drawn_together() -> None:
+def test_neighbouring_pushes_are_resampled_together() -> None:
     cells = grid_of(bumps(as_the_paper_says())).cells
     weights = block_weights(cells)
     names = [(round(cell.fraction, 6), round(cell.angle, 6)) for cell in cells]
@@ -220,7 +218,7 @@ def test_likeness_of_two_maps() -> None:
     assert by_blocks(lambda w: correlation(one, one, w), np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 0.0]])).low == 1.0
 
 
-def test_what_noise_adds_to_a_maximum_is_taken_off() -> None:
+def test_removes_the_bias_of_a_noisy_maximum() -> None:
     rng = np.random.default_rng(0)
     seen = rng.standard_normal(300)  # truth: all zero
     found = unbiased(float(seen.max()), (seen + rng.standard_normal((500, 300))).max(axis=1))
@@ -269,7 +267,7 @@ def test_the_pushes_drawn_are_those_of_the_largest_outputs() -> None:
     assert chosen[1] == pytest.approx((0.7, -0.75))
 
 
-def test_places_are_told_one_by_one_or_as_a_mirrored_box() -> None:
+def test_places_are_listed_one_by_one_or_as_a_mirrored_range() -> None:
     assert region([(0.5, -0.0)]) == "c = 0.50, 0°"
     assert (
         region([(0.9, 0.0), (0.1, 0.0), (0.8, 0.5)]) == "c = 0.80 to 0.90, 0° to 29° (3 pushes, mirrored onto c ≥ 0.5)"
@@ -289,14 +287,14 @@ def test_the_section_has_both_figures_and_speaks_of_measured_sets_only_in_words(
     json.dumps(made.data, allow_nan=False)
 
 
-def test_a_study_that_saw_hardly_any_push_decides_nothing(tmp_path: Path) -> None:
+def test_too_few_known_pushes_decide_nothing(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     few = tuple(replace(cell, outcomes=cell.outcomes[:2]) for cell in study.reference_grid.cells)
     made = section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))
     assert [finding.verdict for finding in made.findings] == ["not decided"]
 
 
-def test_models_are_asked_only_within_their_training_data(tmp_path: Path) -> None:
+def test_maps_are_nan_outside_the_training_data(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     model = square_maps(study, study.simulated)[0]
     assert np.isnan(model.mean[0, 0]).all()  # no made-up push is at 1.5 rad

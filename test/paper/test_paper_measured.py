@@ -168,9 +168,7 @@ def test_the_sets_are_kept_as_tables_that_can_be_trained_from(corpus: Corpus, sc
     assert "48 recordings" in (scratch / "import.txt").read_text()
 
 
-def test_what_was_imported_is_not_imported_again_until_a_file_changes(
-    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_imports_a_file_again_only_after_a_change(copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "mit"
     shutil.copytree(copy / "abs", folder)
     (first,) = measured_corpora(folder, Work(tmp_path / "work", cores=1), tmp_path / "scratch")
@@ -194,7 +192,7 @@ def test_a_push_that_lies_in_a_folder_and_in_an_archive_counts_once(copy: Path, 
     assert len(found.sets[PAIRS[0]].table) == len(own_windows(*PAIRS[0]))
 
 
-def test_what_cannot_show_a_learning_curve_is_left_out_and_named(copy: Path, tmp_path: Path) -> None:
+def test_skips_and_names_sets_too_small_for_a_learning_curve(copy: Path, tmp_path: Path) -> None:
     folder = tmp_path / "mit"
     shutil.copytree(copy / "abs", folder)
     name, content = next(iter(mit_files("ellip1", "abs").items()))
@@ -210,7 +208,7 @@ def test_what_cannot_show_a_learning_curve_is_left_out_and_named(copy: Path, tmp
     assert "ellip2" not in found.notes[0], "an accelerated push belongs to no table"
 
 
-def test_a_folder_with_nothing_usable_is_an_error_that_tells_what_would_be(copy: Path, tmp_path: Path) -> None:
+def test_folder_with_nothing_usable_is_an_error_that_names_what_is_accepted(copy: Path, tmp_path: Path) -> None:
     work = Work(tmp_path / "work", cores=1)
     (tmp_path / "empty").mkdir()
     with pytest.raises(

@@ -70,14 +70,14 @@ def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: py
     assert "no push has several modes" in made.findings[2].sentence
 
 
-def test_the_section_is_whole(with_modes: Section) -> None:
+def test_section_has_findings_tables_and_picture(with_modes: Section) -> None:
     for table in with_modes.tables:
         assert {len(row) for row in table.rows} == {len(table.head)}
     assert with_modes.pictures[0].path.stat().st_size > 10_000
     json.dumps(with_modes.data, allow_nan=False)
 
 
-def test_a_grid_that_was_hardly_seen_is_told_not_judged(tmp_path: Path) -> None:
+def test_grid_with_too_few_repetitions_is_not_decided(tmp_path: Path) -> None:
     made = made_up_section(tmp_path, made_up_grid(replace(PLAN, repetitions=3)))
     assert [finding.verdict for finding in made.findings] == ["not decided"]
 
@@ -109,7 +109,7 @@ def test_held_out_density_of_two_gaussians_is_that_of_the_mixture() -> None:
     assert two.mean() == pytest.approx(-0.5 * np.log(2.0 * np.pi * np.e) - np.log(2.0), abs=0.03)
 
 
-def test_what_is_given_away_is_the_difference_of_densities() -> None:
+def test_loss_is_the_difference_of_densities() -> None:
     grid = made_up_grid(PLAN)
     sizes = np.array([len(cell.outcomes) for cell in grid.seen])
     of = shape(np.concatenate([cell.outcomes for cell in grid.seen]), sizes)
@@ -135,7 +135,7 @@ def test_densities_of_a_model_are_those_of_its_moments_and_of_its_quadrature() -
         log_densities(pushes, Fit("analytical", 40, "none", 0), inputs, rows)
 
 
-def test_a_mean_over_pushes_leaves_out_what_is_not_known() -> None:
+def test_mean_over_pushes_skips_nan() -> None:
     weights = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 2.0]])
     found = mean_over_pushes(np.array([[1.0, np.nan], [3.0, 5.0]]), weights)
     assert found.value == 3.0 and 1.0 <= found.low < found.high <= 4.0
@@ -179,5 +179,5 @@ def test_verdicts_on_gaussians(certain: int, ends: tuple[float, float], verdict:
     ("ends", "verdict"),
     [((0.0, 0.1), "holds"), ((0.1, 0.3), "holds in part"), ((0.2, 0.5), "not decided"), ((0.4, 0.5), "does not hold")],
 )
-def test_verdicts_on_what_is_given_away(ends: tuple[float, float], verdict: str) -> None:
+def test_verdicts_on_the_loss(ends: tuple[float, float], verdict: str) -> None:
     assert good_gaussian(Estimate(float(np.mean(ends)), *ends)) == verdict

@@ -158,7 +158,7 @@ def test_the_verdict_on_the_span(everywhere: tuple[float, float], near: tuple[fl
     assert span_finding(reach, {"all": 30, "near": 20}).verdict == verdict
 
 
-def test_what_models_have_learnt_of_the_noise() -> None:
+def test_learned_noise_has_the_size_of_the_truth() -> None:
     mean, sd = np.full((3, 4, 3), 2.0), np.full((3, 4, 3), 0.5)
     mean[0, 0] = np.nan
     sd[1] = 1.0
@@ -191,7 +191,7 @@ def test_a_grid_on_one_surface_has_no_shape_to_compare(tmp_path: Path) -> None:
     assert made.findings[2].verdict == "not decided" and len(made.pictures) == 2
 
 
-def test_a_grid_that_was_hardly_seen_decides_nothing(tmp_path: Path) -> None:
+def test_grid_with_too_few_repetitions_decides_nothing(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
     few = tuple(replace(cell, outcomes=cell.outcomes[:2]) for cell in study.reference_grid.cells)
     made = section(replace(study, grids={"plywood": replace(study.reference_grid, cells=few)}))

@@ -120,7 +120,7 @@ def test_departure_is_in_units_of_the_slowest_outcomes_variance() -> None:
 # --- models ---------------------------------------------------------------------------------------------------------
 
 
-def test_pushes_of_the_held_out_fold_are_not_learnt_from() -> None:
+def test_held_out_fold_is_not_in_the_training_rows() -> None:
     """Push k of any speed belongs to one fold; fewer rows lie within more."""
     table = windows_at(1, 0.0)
     some, more = (training_rows(table, Bracket("gp", 1, n, False, 2)) for n in (10, 20))
@@ -144,7 +144,7 @@ def test_a_model_of_slow_pushes_knows_fast_ones_only_where_the_world_is_quasi_st
     assert nmse_at(2.0, False, 1, 4) > 1.0
 
 
-def test_where_inertia_matters_a_model_that_is_told_the_speed_does_better() -> None:
+def test_speed_as_an_input_helps_where_inertia_matters() -> None:
     """The turn reverses with speed: without the speed there is no telling."""
     assert nmse_at(2.0, True, 5, 4) < 0.5 * nmse_at(2.0, False, 5, 4)
 
@@ -152,7 +152,7 @@ def test_where_inertia_matters_a_model_that_is_told_the_speed_does_better() -> N
 # --- verdicts -------------------------------------------------------------------------------------------------------
 
 
-def test_each_bracket_is_judged_on_its_own_speeds_the_slow_ones_or_one() -> None:
+def test_each_bracket_is_scored_on_its_own_speeds_the_slow_ones_or_one() -> None:
     """Errors that differ by speed tell which pushes were counted."""
     judged = told([{0: 0.1, 1: 0.3, 2: 0.5, 3: 0.7, 4: 0.9}] * 5)
     assert judged.same("vhgp")[:, 0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5], rel=0.05)
@@ -220,7 +220,7 @@ def test_verdict_on_the_speed_as_an_input(ends: tuple[float, float], verdict: st
     assert lower(Estimate(float(np.mean(ends)), *ends)) == verdict
 
 
-def test_draws_without_any_such_push_are_passed_over() -> None:
+def test_skips_draws_without_any_such_push() -> None:
     """Few pushes: a draw may hold none of a speed."""
     draws: Array = np.array([0.3, 0.2, np.nan, 0.4])
     assert estimated(draws).high < 0.41
@@ -239,7 +239,7 @@ def test_the_section_of_a_small_study(tmp_path: Path) -> None:
     assert content["departure"][0]["value"] == 0.0
 
 
-def test_too_few_windows_are_told_not_a_crash(tmp_path: Path) -> None:
+def test_too_few_windows_are_not_decided(tmp_path: Path) -> None:
     """Three pushes a speed are nothing to learn from."""
     made = section(
         replace(paper_studies.made_up_study(tmp_path), plan=replace(FEW, speeds=(0.075, 0.1), speed_pushes=3))

@@ -50,7 +50,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_each_claim_has_figure_number_interval_and_verdict(made: Path) -> None:
+def test_each_claim_has_verdict_and_numbers(made: Path) -> None:
     content = json.loads((made / "paper.json").read_text())
     assert set(content["sections"]) == CLAIMS
     for key, section in content["sections"].items():
@@ -60,7 +60,7 @@ def test_each_claim_has_figure_number_interval_and_verdict(made: Path) -> None:
             assert re.search(r"\d", finding["sentence"]), finding
 
 
-def test_the_page_stands_alone_and_warns_that_it_is_quick(made: Path) -> None:
+def test_page_is_self_contained_and_warns_that_it_is_quick(made: Path) -> None:
     page = (made / "paper.html").read_text()
     for key in CLAIMS:
         assert f'<h2 id="{key}">' in page
@@ -70,7 +70,7 @@ def test_the_page_stands_alone_and_warns_that_it_is_quick(made: Path) -> None:
     assert "Made with --quick" in page
 
 
-def test_what_the_paper_does_not_claim_is_listed_apart(made: Path) -> None:
+def test_questions_beyond_the_paper_have_their_own_table(made: Path) -> None:
     page = (made / "paper.html").read_text()
     paper, ours = re.findall(r'<table class="verdicts">.*?</table>', page, re.DOTALL)
     assert "claim of the paper" in paper and "question beyond the paper" in ours
@@ -81,7 +81,7 @@ def test_what_the_paper_does_not_claim_is_listed_apart(made: Path) -> None:
     assert ours.count("<tr><td>") == sum(finding["origin"] == "beyond the paper" for finding in findings) > 0
 
 
-def test_no_word_of_the_page_is_not_a_number(made: Path) -> None:
+def test_page_contains_no_nan(made: Path) -> None:
     page = (made / "paper.html").read_text()
     assert "nan" not in re.sub(r"base64,[^\"]+", "", page).lower().split()
 
@@ -93,7 +93,7 @@ def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
             assert not ("simulated:" in table["caption"] and "measured:" in table["caption"])
 
 
-def test_made_again_it_reads_what_it_kept_and_says_the_same(made: Path) -> None:
+def test_second_report_reads_the_cache_and_is_the_same(made: Path) -> None:
     before, kept = json.loads((made / "paper.json").read_text())["sections"], kept_results(made)
     assert kept
     report(made)
@@ -114,7 +114,7 @@ def kept_results(out: Path) -> dict[Path, int]:
         (["--model", "x.pushmodel"], "--model"),
     ],
 )
-def test_a_wrong_option_is_named(
+def test_names_a_wrong_option(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], named: str
 ) -> None:
     assert main(["report", "paper", "--quick", "--out", str(tmp_path), *options]) == 1

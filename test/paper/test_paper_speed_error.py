@@ -83,7 +83,7 @@ def test_the_rank_correlation_knows_no_units_of_speed_s_spread():
         ((0.5, 0.5, 0.5, 0.5), "not decided"),
     ],
 )
-def test_models_told_the_speed_must_be_ahead_at_every_high_speed(vhgp, verdict):
+def test_models_with_speed_must_lead_at_every_high_speed(vhgp, verdict):
     assert captured(CORPUS, windows((0.5,) * 4, vhgp), [0, 1, 2, 3]).verdict == verdict
 
 
@@ -93,7 +93,7 @@ def test_levelled_outcomes_have_the_same_spread_at_every_speed():
     assert within_nmse(level.at(3), ("vhgp",)).value == pytest.approx(within_nmse(windows().at(3), ("vhgp",)).value)
 
 
-def test_slow_pushes_alone_say_nothing_about_high_speed():
+def test_slow_pushes_alone_decide_nothing_about_high_speed():
     assert captured(CORPUS, windows(), [0]).verdict == "not decided"
 
 
@@ -123,7 +123,7 @@ def test_left_and_right_do_not_cancel_in_the_bias_across():
     assert bias(replace(held, predicted=short), "analytical", 1).low > 0.0
 
 
-def test_speeds_that_scatter_about_a_command_are_one_group():
+def test_speeds_near_one_command_form_one_group():
     command = np.repeat([0.02, 0.05, 0.4], 20)
     measured = command * np.random.default_rng(0).uniform(0.97, 1.03, 60)
     group = speed_groups(np.array([f"p{k}" for k in range(60)]), measured)

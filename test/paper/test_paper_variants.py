@@ -116,7 +116,7 @@ def test_a_gain_within_its_interval_does_not_suffice() -> None:
         (on_both(NUGGET, -0.05), 0.5, "not decided"),
     ],
 )
-def test_another_default_is_earned_by_the_rule(gains, noise: float, verdict: str) -> None:
+def test_default_changes_only_by_the_rule(gains, noise: float, verdict: str) -> None:
     assert rule_finding(made_up(gains, noise)).verdict == verdict
 
 
@@ -138,7 +138,7 @@ def test_states_which_variants_the_random_split_alone_accepts(gains, told: str) 
     assert told in rule_finding(made_up(gains)).sentence
 
 
-def test_a_gain_must_be_sure_enough_for_three_that_try() -> None:
+def test_gain_interval_is_widened_for_three_variants() -> None:
     """An interval that ends just below zero by itself, and not once it is widened."""
     gain = made_up(on_both(MATERN, 0.002), noise=0.01).gain(500, "push", MATERN)
     half = (gain.high - gain.low) / 2.0
@@ -148,7 +148,7 @@ def test_a_gain_must_be_sure_enough_for_three_that_try() -> None:
         assert accepted(sure) == chosen
 
 
-def test_fewer_folds_at_the_largest_size_are_told() -> None:
+def test_states_fewer_folds_at_the_largest_size() -> None:
     found = made_up(on_both(MATERN, 0.05) | {(1000, "push", MATERN): 0.05})
     fewer = replace(found, fits={cell: 3 if cell[0] == 1000 else 5 for cell in found.fits})
     assert "3 folds at 1000 windows (of 5 at smaller sizes)" in rule_finding(fewer).sentence
@@ -209,7 +209,7 @@ def test_the_choice_reaches_the_model() -> None:
     assert len(set(told)) == len(CHOICES)
 
 
-def test_all_kernels_are_judged_on_the_same_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_kernels_are_scored_on_the_same_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jobs, "SIZES", (30,))
     found = jobs.variant_scores(replace(QUICK, seeds=1), Work(tmp_path, cores=1), corpus(20))
     assert {name for name, _ in found} == set(CHOICES)

@@ -86,7 +86,7 @@ def test_no_calls_give_no_results(pieces, tmp_path: Path) -> None:
     assert Work(tmp_path / "kept", cores=1).run("nothing", pieces.squared, []) == []
 
 
-def test_a_call_made_before_is_read_from_disk(pieces, tmp_path: Path) -> None:
+def test_a_repeated_call_is_read_from_disk(pieces, tmp_path: Path) -> None:
     log = tmp_path / "log"
     Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, [(2, str(log)), (3, str(log))])
     again = Work(tmp_path / "kept", cores=1).run("squares", pieces.squared, [(3, str(log)), (4, str(log))])
@@ -94,7 +94,7 @@ def test_a_call_made_before_is_read_from_disk(pieces, tmp_path: Path) -> None:
     assert lines(log) == [2, 3, 4]
 
 
-def test_another_folder_knows_nothing_of_it(pieces, tmp_path: Path) -> None:
+def test_another_folder_has_a_separate_cache(pieces, tmp_path: Path) -> None:
     log = tmp_path / "log"
     for folder in ("one", "other"):
         Work(tmp_path / folder, cores=1).run("squares", pieces.squared, [(2, str(log))])
@@ -110,7 +110,7 @@ def test_the_watch_sees_the_begin_and_every_piece_kept_ones_too(pieces, tmp_path
 
 
 @pytest.mark.parametrize(("cores", "end"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGKILL)])
-def test_what_was_done_before_an_interruption_is_kept(pieces, tmp_path: Path, cores: int, end: signal.Signals) -> None:
+def test_results_before_an_interruption_are_kept(pieces, tmp_path: Path, cores: int, end: signal.Signals) -> None:
     log, count = tmp_path / "log", 8
     process = started(tmp_path, log, cores, count)
     try:
@@ -201,7 +201,7 @@ def test_a_change_of_a_source_that_matters_changes_the_fingerprint(copied_packag
         "push_predictor_paper/report.py",
     ],
 )
-def test_a_change_of_looks_does_not(copied_packages: Path, name: str) -> None:
+def test_a_change_of_layout_keeps_the_fingerprint(copied_packages: Path, name: str) -> None:
     before = fresh_fingerprint()
     (copied_packages / name).write_text((copied_packages / name).read_text() + "\nANOTHER = 1\n")
     assert fresh_fingerprint() == before
@@ -260,7 +260,7 @@ def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_
     assert os.getpid() not in {pid for _, pid in places}
 
 
-def test_what_a_cluster_has_done_is_read_from_disk_at_home(cluster, pieces, tmp_path: Path) -> None:
+def test_results_of_a_cluster_are_read_from_disk_locally(cluster, pieces, tmp_path: Path) -> None:
     import joblib
 
     log = tmp_path / "log"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.stats import binomtest
 
@@ -26,39 +28,42 @@ PAPER_SETS = 16
 def section(study: Study) -> Section:
     """Training data by pair and speed; precision of mean and standard deviation from repetitions."""
     counts = speed_counts(study.plan, study.simulated)
-    picture = draw(
-        study.out / "data.png",
-        (10.0, 3.4),
-        lambda figure: paint_data(
-            figure, counts, study.simulated.sets[study.simulated.reference], study.reference_grid
-        ),
-    )
     return Section(
         key="data",
         title="The data",
         findings=(_learning_finding(study, counts), _grid_finding(study.reference_grid)),
         tables=(*(_corpus_table(corpus) for corpus in study.corpora), _grid_table(study)),
-        pictures=(
-            Picture(
-                picture,
-                "Windows per speed, inputs of the reference set, repetitions seen over the grid",
-                "Left: share of pushes at each speed with at least one window of 0.2 s, all simulated sets, 95 % "
-                "Wilson intervals. Middle: contact and angle of every window of the reference set. Right: share of "
-                "the repetitions of each push of the grid with a first window.",
-            ),
-        ),
+        pictures=(_picture(study, counts),),
         notes=(*NOTES, *(note for corpus in study.corpora for note in corpus.notes)),
-        data={
-            "sets": {
-                corpus.title: {"/".join(pair): _counts(corpus, pair) for pair in corpus.sets}
-                for corpus in study.corpora
-            },
-            "speeds": [
-                {"speed": c.speed, "pushes": c.pushes, "with_window": c.with_window, "windows": c.windows}
-                for c in counts
-            ],
-        },
+        data=_json(study, counts),
     )
+
+
+def _picture(study: Study, counts: list[SpeedCount]) -> Picture:
+    reference = study.simulated.sets[study.simulated.reference]
+    path = draw(
+        study.out / "data.png",
+        (10.0, 3.4),
+        lambda figure: paint_data(figure, counts, reference, study.reference_grid),
+    )
+    return Picture(
+        path,
+        "Pushes with a window by speed, inputs of the reference set, repetitions with a window over the grid",
+        "Left: share of pushes at each speed with at least one window of 0.2 s, all simulated sets, 95 % Wilson "
+        "intervals. Middle: contact and angle of every window of the reference set. Right: share of the repetitions of "
+        "each push of the grid with a first window.",
+    )
+
+
+def _json(study: Study, counts: list[SpeedCount]) -> dict[str, Any]:
+    return {
+        "sets": {
+            corpus.title: {"/".join(pair): _counts(corpus, pair) for pair in corpus.sets} for corpus in study.corpora
+        },
+        "speeds": [
+            {"speed": c.speed, "pushes": c.pushes, "with_window": c.with_window, "windows": c.windows} for c in counts
+        ],
+    }
 
 
 NOTES = (

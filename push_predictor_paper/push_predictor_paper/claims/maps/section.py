@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.canvas import Picture, draw
 from push_predictor.types import Array
 from push_predictor_paper.claims.maps.agreement import (
+    Likenesses,
     agreement_findings,
     agreement_json,
     agreement_table,
@@ -18,6 +20,7 @@ from push_predictor_paper.claims.maps.agreement import (
 from push_predictor_paper.claims.maps.peaks import (
     NAMED,
     PART,
+    Peaks,
     model_peaks,
     peak_cells,
     peak_findings,
@@ -73,13 +76,17 @@ def section(study: Study) -> Section:
             _difference_picture(study, _differences(grid, answer)),
         ),
         notes=(*NOTES, _other_sign(grid), *_measured_notes(study)),
-        data={
-            "repetitions": {name: peak_json(peaks.repeated[k]) for k, name in enumerate(OUTPUTS)},
-            "vhgp": {name: peak_json(peaks.learnt[k]) for k, name in enumerate(OUTPUTS)},
-            "handedness_deg": [estimate.json() for estimate in peaks.handedness],
-            "agreement": agreement_json(alike),
-        },
+        data=_json(peaks, alike),
     )
+
+
+def _json(peaks: Peaks, alike: Likenesses) -> dict[str, Any]:
+    return {
+        "repetitions": {name: peak_json(peaks.repeated[k]) for k, name in enumerate(OUTPUTS)},
+        "vhgp": {name: peak_json(peaks.learnt[k]) for k, name in enumerate(OUTPUTS)},
+        "handedness_deg": [estimate.json() for estimate in peaks.handedness],
+        "agreement": agreement_json(alike),
+    }
 
 
 NOTES = (
