@@ -1,4 +1,5 @@
-"""How good a model is: metrics, splits, intervals, validation against recordings.
+"""Evaluation of models: metrics, splits, confidence intervals, validation against recordings.
 
-Import `metrics`, `validation`, `offline`, `splits`, `push_scores` and `estimate`; `alarm` and `report` have folders.
+Import `metrics`, `validation`, `offline`, `splits`, `push_scores` and `estimate`. `alarm` detects that a model no
+longer fits; `report` writes the page.
 """

@@ -1,4 +1,4 @@
-"""Kullback-Leibler divergence of Gaussians: how far a model's distribution is from that of repeated pushes, nats."""
+"""Kullback-Leibler (KL) divergence of Gaussians, nats: from repeated pushes to a model's prediction."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ def gaussian_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> A
 
 
 def kl_of_mean(mean: Array, model_mean: Array, model_sd: Array) -> Array:
-    """What of `gaussian_kl` comes of the distance of the means; the rest comes of the deviations."""
+    """The part of `gaussian_kl` due to the difference of the means; the rest is due to the standard deviations."""
     return np.asarray(0.5 * ((mean - model_mean) / model_sd) ** 2)
 
 
 def printed_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
-    """The same by the formula printed in Bauza and Rodriguez 2017, section VI: its log term is half what it should be.
+    """The KL divergence as printed in Bauza and Rodriguez 2017, section VI, where the log term is half too small.
 
-    It is no divergence: it is negative, -0.077 at the least, where the model is right but 1.4 times as wide.
+    It is not a divergence: for a correct model with 1.4 times the standard deviation it reaches its minimum of -0.077.
     """
     return gaussian_kl(mean, sd, model_mean, model_sd) - 0.5 * np.log(model_sd / sd)
 
 
 def expected_kl(count: int, model_count: int | None = None) -> float:
-    """What the truth itself scores on average: KL of mean and sd (ddof 1) of `count` > 1 draws of a Gaussian from it.
+    """Expected KL divergence of a correct model: from mean and sd (ddof 1) of `count` > 1 samples to the true Gaussian.
 
-    model_count > 3: the model knows the truth no better than by mean and sd of so many other draws.
+    model_count > 3: the model is itself estimated from that many other samples.
     """
     freedom = 0.5 * (count - 1)
     known = np.log(freedom) - digamma(freedom)

@@ -1,4 +1,4 @@
-"""A figure with its 95 % interval by drawing whole pushes anew."""
+"""A statistic with its 95 % confidence interval from resampling whole pushes."""
 
 from __future__ import annotations
 
@@ -11,50 +11,50 @@ from push_predictor.evaluation.push_scores import PooledScores, PushScores
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.types import Array
 
-Figure = Callable[[PooledScores], Array]  # (d,) of d draws
+Figure = Callable[[PooledScores], Array]  # returns (d,) for d bootstrap samples
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure and its 95 % interval; low and high are NaN where the data do not tell."""
+    """A statistic and its 95 % interval; low and high are NaN if the data do not determine it."""
 
     value: float
     low: float
     high: float
 
     def text(self, form: str = ".2f") -> str:
-        """For a sentence: 0.12 (0.10 to 0.14)."""
-        return f"{self._told(self.value, form)} ({self._ends(form)})"
+        """Text for a sentence: 0.12 (0.10 to 0.14)."""
+        return f"{self._text(self.value, form)} ({self._ends(form)})"
 
     def cell(self, form: str = ".2f") -> str:
-        """For a table: the interval beneath the figure."""
-        return f"{self._told(self.value, form)}\n{self._ends(form)}"
+        """Text for a table cell: the interval on a second line."""
+        return f"{self._text(self.value, form)}\n{self._ends(form)}"
 
     def json(self) -> dict[str, float | None]:
-        """For the JSON: null where nothing is known."""
+        """Values for the JSON: None if undetermined."""
         return {name: (v if np.isfinite(v) else None) for name, v in vars(self).items()}
 
     def _ends(self, form: str) -> str:
-        return f"{self._told(self.low, form)} to {self._told(self.high, form)}"
+        return f"{self._text(self.low, form)} to {self._text(self.high, form)}"
 
     @staticmethod
-    def _told(value: float, form: str) -> str:
+    def _text(value: float, form: str) -> str:
         return format(value, form).replace("-", "−") if np.isfinite(value) else "–"
 
 
 def of_draws(value: float, draws: Array) -> Estimate:
-    """A figure with the central 95 % of its draws (d,)."""
+    """An estimate from a value and its bootstrap samples (d,)."""
     low, high = np.quantile(draws, [0.025, 0.975])
     return Estimate(float(value), float(low), float(high))
 
 
-def by_push(push_scores: PushScores, figure: Figure) -> Estimate:
-    """A figure of the pushes of a push_scores, by drawing whole pushes anew."""
-    return of_draws(float(figure(push_scores.totals())[0]), figure(push_scores.resampled()))
+def by_push(scores: PushScores, figure: Figure) -> Estimate:
+    """A statistic of these pushes with its interval from resampling whole pushes."""
+    return of_draws(float(figure(scores.totals())[0]), figure(scores.resampled()))
 
 
 def difference_by_push(first: PushScores, second: PushScores, figure: Figure) -> Estimate:
-    """The second's figure less the first's, of the same pushes drawn together."""
+    """The second's statistic minus the first's, with the interval from resampling the same pushes for both."""
     weights = push_bootstrap(first.push_id)
     value = figure(second.totals())[0] - figure(first.totals())[0]
     return of_draws(float(value), figure(second.totals(weights)) - figure(first.totals(weights)))

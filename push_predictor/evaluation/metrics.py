@@ -1,4 +1,4 @@
-"""NMSE, NLPD and coverage, the same offline and online (docs/reference/json.md).
+"""The metrics NMSE, NLPD and coverage, the same offline and online (docs/reference/json.md).
 
 NLPD is the negative log predictive density in SI units (m, m, rad); totals are sums over the three outputs.
 """
@@ -14,7 +14,7 @@ COVERAGE_LEVELS = (0.5, 0.9, 0.95)
 
 
 def nmse(mean: Array, outcomes: Array, training_mean: Array) -> Array:
-    """Normalised squared error (k,) of predictions (n, k): over the deviation from the training mean (k,)."""
+    """Squared error (k,) of predictions (n, k), divided by that of the training mean (k,)."""
     error = np.sum((outcomes - mean) ** 2, axis=0)
     spread = np.sum((outcomes - training_mean) ** 2, axis=0)
     return np.asarray(np.divide(error, spread, out=np.full(error.shape, np.nan), where=spread > 0.0))
@@ -39,6 +39,6 @@ def standardised(mean: Array, covariance: Array, outcomes: Array) -> Array:
 
 
 def coverage(mean: Array, variance: Array, outcomes: Array, level: float) -> Array:
-    """Share (k,) of outcomes inside the central Gaussian interval that should hold `level` of them."""
+    """Share (k,) of outcomes inside the central Gaussian interval of that level."""
     half = ndtri(0.5 + level / 2.0) * np.sqrt(variance)
     return np.asarray(np.mean(np.abs(outcomes - mean) <= half, axis=0))

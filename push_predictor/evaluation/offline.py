@@ -1,4 +1,4 @@
-"""Validating models on a recording read from disk: the offline counterpart of push_validator."""
+"""Validate models on a recording from disk, as push_validator does online."""
 
 from __future__ import annotations
 
@@ -22,39 +22,39 @@ from push_predictor.recordings.windows.stream_faults import describe_recording_f
 
 
 def recorded_windows(
-    model: PushModel, path: Path, rig: Rig | None = None, tell: Callable[[str], None] | None = None
+    model: PushModel, path: Path, rig: Rig | None = None, report: Callable[[str], None] | None = None
 ) -> tuple[list[PushWindow], PushTable]:
-    """The windows of a recording, as long as the model's training windows. Raises RecordingError if there is none.
+    """Find the windows of a recording, with the model's duration. Raises RecordingError if there is none.
 
-    tell: gets every fault of the streams that a good system does not have, in words.
+    report receives a sentence for each fault of the streams.
     """
     recording = read_recording(path, rig=rig)
     finder = WindowFinder(require_rig(recording), window_options(model))
     windows = finder.find(recording)
-    if tell is not None:
+    if report is not None:
         for fault in describe_recording_faults(recording, finder.counts):
-            tell(fault)
+            report(fault)
     if not windows:
         raise RecordingError(f"{path}: no push was found in {len(recording.slider)} slider poses")
     return windows, windows_to_table(windows)
 
 
 def window_options(model: PushModel) -> WindowOptions:
-    """Windows of the length that a learnt model was trained on; 0.2 s for the analytical one."""
+    """Windows with the training duration of a learnt model; 0.2 s for the analytical model."""
     if not model.predictor.learnt:
         return WindowOptions()
     return WindowOptions(duration=float(model.training.duration[0]))
 
 
 def recording_rig(path: Path) -> Rig:
-    """The rig that a recording names. Raises RigError that tells how to give it, RecordingError if it is none."""
+    """The rig of a recording. Raises RigError that states how to give it, RecordingError for an unreadable file."""
     if (rig := recorded_rig(open_bag(path))) is None:
         raise RigError(f"{path}: the recording has no {RECORD_NAME} record; {HOW_TO_GIVE}")
     return rig
 
 
 def rig_difference(model: PushModel, rig: Rig) -> str:
-    """In words, in what the slider or pusher that a model was trained with differ from a rig; empty if in nothing."""
+    """A sentence on how a rig differs from that of the model's training, empty if it does not."""
     trained = model.rig
     if not _same(trained.outline.vertices, rig.outline.vertices) or trained.outline.semi_axes != rig.outline.semi_axes:
         return f"model {model.name!r} was trained with the outline of {trained.shape!r}, the rig is {rig.shape!r}"
@@ -71,17 +71,17 @@ def training_overlap(model: PushModel, table: PushTable) -> str:
 
 
 def validate_recording(
-    model: PushModel, path: Path, rig: Rig | None = None, tell: Callable[[str], None] | None = None
+    model: PushModel, path: Path, rig: Rig | None = None, report: Callable[[str], None] | None = None
 ) -> tuple[list[PushWindow], Comparison]:
-    """Predict every window of a recording, as a server of the model would; tell as for `recorded_windows`."""
-    windows, table = recorded_windows(model, path, rig, tell)
+    """Predict every window of a recording, as predict_server does; report as for `recorded_windows`."""
+    windows, table = recorded_windows(model, path, rig, report)
     check_table(model, table)
     prediction = tabulate(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 
 def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
-    """Write the HTML report of several models, the first the main one, on one recording; returns page and metrics."""
+    """Write the HTML report of models on a recording, the main model first; return page and metrics."""
     windows, table = recorded_windows(models[0], path)
     for model in models:
         check_table(model, table)
@@ -91,7 +91,7 @@ def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tupl
 
 
 def _same(first: object, second: object) -> bool:
-    """Equal to a micrometre."""
+    """Whether values agree to a micrometre."""
     a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     return a.shape == b.shape and bool(np.allclose(a, b, rtol=0.0, atol=1e-6))
 
@@ -104,9 +104,9 @@ def report_windows(
     name: str,
     more: Mapping[str, str] | None = None,
 ) -> Path:
-    """The same for windows that were predicted already, by a server for instance; more: further facts for the page."""
+    """Write the report for windows with given predictions; more: further facts for the page."""
     from push_predictor.evaluation.report.page import (
-        write_validation_report,  # matplotlib: only where pictures are made
+        write_validation_report,  # imports matplotlib
     )
 
     table = windows_to_table(windows)

@@ -1,4 +1,4 @@
-"""A model against observed pushes: the numbers that `evaluate`, `validate` and push_validator report alike."""
+"""Compare predictions with observed pushes: the scores that evaluate, validate and push_validator report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from push_predictor.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What was predicted for n windows, beside what was observed.
+    """Predictions and observations of n windows.
 
     mean, observed (n, 3); covariance (n, 3, 3); exact_log_density (n, 3), None where the predictive is Gaussian;
     push_id (n,); training_mean (3,), the reference of the NMSE.
@@ -34,7 +34,7 @@ class Comparison:
 
     @property
     def variance(self) -> Array:
-        """The diagonals (n, 3) of the covariances."""
+        """Predicted variances (n, 3)."""
         return np.asarray(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
@@ -45,7 +45,7 @@ def compare(model: PushModel, table: PushTable) -> Comparison:
 
 
 def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
-    """Set predictions (n, 3), (n, 3, 3) that were made already, by a service perhaps, beside a table's outcomes."""
+    """Combine given predictions (n, 3), (n, 3, 3), for instance from a service, with a table's outcomes."""
     return Comparison(
         model.name,
         len(model.training),
@@ -59,9 +59,9 @@ def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: A
 
 
 def metrics_json(comparison: Comparison) -> dict[str, object]:
-    """The metrics of docs/reference/json.md, with 95 % intervals of the totals from resampling whole pushes.
+    """The scores of docs/reference/json.md, with 95 % intervals of the totals from resampling whole pushes.
 
-    A number that these windows do not determine (none was seen) is null.
+    A number that these windows do not determine is None.
     """
     c = comparison
     count, nothing = len(c.observed), np.full(3, np.nan)
@@ -87,9 +87,9 @@ def pit(comparison: Comparison) -> Array:
 
 
 def trained_on(model: PushModel, table: PushTable) -> list[str]:
-    """The pushes of a table that the model was trained on: its figures on them are not held out.
+    """The pushes of a table that were used to train the model: scores on them are optimistic.
 
-    A push was trained on if one of its windows was, or if it began at the very time at which a training push did.
+    These are the pushes with a training window, and those that began at the time of a training push.
     """
     known = {row.tobytes() for row in np.column_stack([model.training.inputs, model.training.outcomes])}
     rows = np.column_stack([table.inputs, table.outcomes])
@@ -106,7 +106,7 @@ def by_push(push: np.ndarray, rows: Array) -> Array:
 
 
 def _timed(push_id: str) -> str | None:
-    """The part of an id that the window finder made of the time of first touch, None for other ids."""
+    """The part of an id that the window finder derived from the time of first contact, None for other ids."""
     name = push_id.rpartition("/")[2]
     return name if name.startswith(TIMED_ID) else None
 
@@ -115,7 +115,7 @@ def _intervals(c: Comparison, nlpd: Array) -> dict[str, object]:
     pushes, push = np.unique(c.push_id, return_inverse=True)
     if len(pushes) < 2:
         return {"level": 0.95, "by": "push", "nmse": None, "nlpd": None}
-    weights = push_bootstrap(pushes)  # by push, not by row: 1000 draws of a day's windows would not fit in memory
+    weights = push_bootstrap(pushes)  # by push, not by row: 1000 samples of a day's windows do not fit in memory
     error, spread = (c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2
     nmse_draws = np.sum((weights @ by_push(push, error)) / (weights @ by_push(push, spread)), axis=1)
     nlpd_draws = (weights @ by_push(push, nlpd.sum(axis=1))) / (weights @ np.bincount(push))

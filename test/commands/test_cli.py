@@ -1,4 +1,4 @@
-"""The command line: every sub-command on a small simulated recording, its JSON, its errors, its exit status."""
+"""The command line: every sub-command on a small simulated recording, its JSON, errors and exit status."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 def assert_one_line(outcome: Outcome, command: str, words: Sequence[str]) -> None:
-    """Exit status 1, and one line on stderr that names what is wrong."""
+    """Assert exit status 1 and one line on stderr that names the fault."""
     assert outcome.status == 1 and outcome.out == ""
     lines = without_progress(outcome.err)
     assert len(lines) == 1 and lines[0].startswith(f"push_predictor {command}: "), outcome.err
@@ -139,7 +139,7 @@ def test_every_command_has_help_with_an_example_and_json(command: str, run):
         ["info", "x", "--wrong"],
     ],
 )
-def test_a_wrong_call_exits_with_2_and_shows_how_it_is_called(call: list[str], run):
+def test_wrong_call_exits_with_2_and_prints_the_usage(call: list[str], run):
     outcome = run(*call)
     assert outcome.status == 2 and outcome.out == ""
     assert outcome.err.startswith("usage: push_predictor")
@@ -151,7 +151,7 @@ def test_version_and_the_list_of_commands(run):
     assert all(f"    {command} " in shown for command in COMMANDS)
 
 
-def test_help_needs_neither_ros_nor_scipy():
+def test_help_imports_neither_ros_nor_scipy():
     """So it is there at once."""
     code = (
         "import sys; from push_predictor.cli import build_parser; build_parser().format_help(); "
@@ -164,13 +164,13 @@ def test_help_needs_neither_ros_nor_scipy():
 # --- simulate, train -------------------------------------------------------------------------------------------------
 
 
-def test_simulate_says_what_it_made(place: Place, run):
+def test_simulate_reports_the_recording(place: Place, run):
     assert place.printed["train recording"].startswith(f"{place.path('train')}: 6 pushes, ")
     made = json.loads(place.printed["test recording"])
     assert made["recording"] == place.path("test.mcap") and made["pushes"] == 4 and made["seconds"] > 1.0
 
 
-def test_the_same_seed_makes_the_same_recording(place: Place, run):
+def test_seed_determines_the_simulated_recording(place: Place, run):
     call = ["simulate", "--shape", "rect1", "--surface", "abs", "--speed", "0.02", "0.05", "--pushes", "4"]
     for seed, same in (("2", True), ("3", False)):
         again = place.path(f"again{seed}/test.mcap")
@@ -178,7 +178,7 @@ def test_the_same_seed_makes_the_same_recording(place: Place, run):
         assert (Path(again).read_bytes() == Path(place.path("test.mcap")).read_bytes()) is same
 
 
-def test_train_says_what_it_learned_from(place: Place):
+def test_train_reports_model_windows_and_pushes(place: Place):
     assert "gp, " in place.printed["gp"] and " 6 pushes" in place.printed["gp"]
     learned = json.loads(place.printed["vhgp"])
     assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
@@ -196,7 +196,7 @@ def test_train_accepts_the_old_name_of_kind_with_a_warning(place: Place, run):
     assert old.json == new.json and not without_progress(new.err)
 
 
-def test_a_shorter_stride_gives_more_windows_to_train_on(place: Place, run):
+def test_shorter_stride_gives_more_training_windows(place: Place, run):
     out = place.path("dense.pushmodel")
     call = ["train", place.path("train"), "--kind", "analytical", "--out", out, "--json", "-"]
     assert run(*call, "--stride", "0.05").json["n_rows"] > 2 * run(*call).json["n_rows"]
@@ -205,7 +205,7 @@ def test_a_shorter_stride_gives_more_windows_to_train_on(place: Place, run):
 # --- predict ---------------------------------------------------------------------------------------------------------
 
 
-def test_predict_is_the_model(place: Place, run):
+def test_predict_equals_the_model(place: Place, run):
     model = load_model(Path(place.path("gp.pushmodel")))
     expected = model.predict_rows(np.array([[0.02, 0.1, 0.3]]), np.array([0.2]))
     found = run("predict", place.path("gp.pushmodel"), *PUSH, "--json", "-").json
@@ -216,7 +216,7 @@ def test_predict_is_the_model(place: Place, run):
     assert len(found["process_covariance"]) == 9
 
 
-def test_predict_in_words_has_a_line_for_each_output(place: Place, run):
+def test_predict_prints_a_line_for_each_output(place: Place, run):
     lines = run("predict", place.path("gp.pushmodel"), *PUSH, "--covariate", "dwell_time=3").out.splitlines()
     assert [line.split()[0] for line in lines[:3]] == OUTPUTS
     assert "training data" in lines[3]
@@ -238,7 +238,7 @@ def assert_metrics_format(metrics: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp", "analytical"])
-def test_evaluate_and_validate_give_the_metrics_of_the_library(kind: str, place: Place, run):
+def test_evaluate_and_validate_equal_the_library(kind: str, place: Place, run):
     model, recording = place.path(f"{kind}.pushmodel"), place.path("test.mcap")
     evaluated, validated = (
         run("evaluate", model, recording, "--json", "-"),
@@ -257,13 +257,13 @@ def test_evaluate_and_validate_give_the_metrics_of_the_library(kind: str, place:
     assert (validated.json["exact_nlpd"] is None) is (kind != "vhgp")
 
 
-def test_a_table_is_as_good_as_the_recording_it_was_made_from(place: Place, run):
+def test_table_gives_the_scores_of_its_recording(place: Place, run):
     model = place.path("gp.pushmodel")
     first, second = (run("evaluate", model, place.path(data), "--json", "-").json for data in ("test.mcap", "test.csv"))
     assert first == second
 
 
-def test_evaluate_warns_about_pushes_that_were_trained_on(place: Place, run):
+def test_evaluate_and_validate_warn_about_training_pushes(place: Place, run):
     model = place.path("gp.pushmodel")
     outcome = run("evaluate", model, place.path("train"), place.path("test.csv"), "--json", "-")
     assert outcome.status == 0 and outcome.json["n_pushes"] == 10
@@ -281,7 +281,7 @@ def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
     assert warned.startswith("warning: ") and "'rect1'" in warned and "'ellip1'" in warned
 
 
-def test_metrics_in_words_hold_the_numbers_of_the_json(place: Place, run):
+def test_printed_scores_equal_the_json(place: Place, run):
     call = ["validate", place.path("vhgp.pushmodel"), place.path("test.mcap")]
     metrics, words = run(*call, "--json", "-").json, run(*call).out
     assert words.startswith(f"hetero: {metrics['n_test']} windows of 4 pushes, trained on 15 windows")
@@ -289,7 +289,7 @@ def test_metrics_in_words_hold_the_numbers_of_the_json(place: Place, run):
     assert total[1:4] == [f"{metrics[key]['total']:.3f}" for key in ("nmse", "nlpd", "exact_nlpd")]
 
 
-def test_json_may_go_to_a_file_and_the_words_to_the_screen(place: Place, run, tmp_path: Path):
+def test_json_is_written_to_a_file_and_text_to_stdout(place: Place, run, tmp_path: Path):
     file, log = tmp_path / "new" / "metrics.json", tmp_path / "windows.json"
     call = ["validate", place.path("gp.pushmodel"), place.path("test.mcap")]
     outcome = run(*call, "--json", str(file), "--windows", str(log))
@@ -303,7 +303,7 @@ def test_json_may_go_to_a_file_and_the_words_to_the_screen(place: Place, run, tm
 # --- info, import, report --------------------------------------------------------------------------------------------
 
 
-def test_info_tells_recording_table_and_model(place: Place, run):
+def test_info_describes_recording_table_and_model(place: Place, run):
     recording = run("info", place.path("test.mcap"), "--json", "-").json
     assert recording["pushes"] == 4 and recording["windows"] == len(load_data([Path(place.path("test.mcap"))]))
     assert set(recording["streams"]) >= {"slider", "pusher", "wrench"}
@@ -314,7 +314,7 @@ def test_info_tells_recording_table_and_model(place: Place, run):
         assert run("info", place.path(name)).out.count("\n") > 5
 
 
-def test_info_tells_that_a_recording_is_damaged(place: Place, run, tmp_path: Path):
+def test_info_reports_a_damaged_recording(place: Place, run, tmp_path: Path):
     whole = Path(place.path("test.mcap")).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
     found = run("info", str(tmp_path / "cut.mcap"), "--json", "-")
@@ -324,7 +324,7 @@ def test_info_tells_that_a_recording_is_damaged(place: Place, run, tmp_path: Pat
         assert_one_line(found, "info", ["cut.mcap"])
 
 
-def test_import_writes_a_table_and_its_rig_which_train_reads(run, tmp_path: Path):
+def test_import_writes_a_table_and_a_rig_that_train_reads(run, tmp_path: Path):
     rng = np.random.default_rng(0)
     names = ["c", "beta", "dx", "dy", "dtheta"]
     source = tmp_path / "pushes_40.npz"
@@ -342,7 +342,7 @@ def test_import_writes_a_table_and_its_rig_which_train_reads(run, tmp_path: Path
     assert "assumed" in run("import", "mit-square", str(source), "--out", str(tmp_path / "other")).out
 
 
-def test_report_writes_a_page_with_pictures_and_the_metrics(place: Place, run, tmp_path: Path):
+def test_report_writes_a_page_and_the_metrics(place: Place, run, tmp_path: Path):
     models = [place.path("vhgp.pushmodel"), place.path("analytical.pushmodel")]
     call = ["report", "validation", "--model", *models, "--recording", place.path("test.mcap"), "--out", str(tmp_path)]
     found = run(*call, "--json", "-").json
@@ -421,7 +421,7 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (["import", "rosbag1", "{junk}.mcap", "--out", "{tmp}/o"], ["junk.mcap"]),
     ],
 )
-def test_what_fails_is_said_in_one_line_that_names_the_file_or_field(
+def test_failure_is_one_line_that_names_the_file_or_field(
     call: list[str], words: list[str], place: Place, run, tmp_path: Path
 ):
     for ending in ("csv", "mcap"):
@@ -443,11 +443,11 @@ def test_what_fails_is_said_in_one_line_that_names_the_file_or_field(
 
 
 def without_progress(*texts: str) -> list[str]:
-    """The lines on stderr but those that say that work goes on, which come on a slow machine."""
+    """The lines on stderr without progress messages, which appear on a slow machine."""
     return [line for text in texts for line in text.splitlines() if not re.fullmatch(r"[\w -]+: \d+ s", line)]
 
 
-def test_a_reader_that_goes_away_is_no_error(place: Place):
+def test_closed_pipe_is_not_an_error(place: Place):
     command = f"'{sys.executable}' -m push_predictor.cli info '{place.path('train')}' | head -c 1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=REPOSITORY, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")

@@ -1,4 +1,4 @@
-"""`push_predictor doctor`: on a sound installation, and on one that lacks something."""
+"""`push_predictor doctor` on a complete installation and on incomplete ones."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def with_module(folder: Path, name: str, code: str) -> str:
     return os.pathsep.join([str(folder), str(REPOSITORY)])
 
 
-def test_this_installation_is_sound_and_every_part_of_it_was_tried():
+def test_doctor_checks_every_part_of_this_installation():
     done = doctor("--json", "-")
     assert done.returncode == 0, done.stdout + done.stderr
     said = json.loads(done.stdout)
@@ -57,7 +57,7 @@ def test_this_installation_is_sound_and_every_part_of_it_was_tried():
     assert all(states[name] == "ok" for name in ("loop-back call", "interfaces", "model", "recording"))
 
 
-def test_without_ros_it_says_so_and_checks_the_rest(tmp_path: Path):
+def test_doctor_without_ros_names_it_and_checks_the_rest(tmp_path: Path):
     hidden = with_module(tmp_path, "sitecustomize", "import sys\nsys.modules.update(rclpy=None)\n")
     done = doctor(PYTHONPATH=hidden)
     assert done.returncode == 1
@@ -73,7 +73,7 @@ def test_without_ros_it_says_so_and_checks_the_rest(tmp_path: Path):
     ("code", "words"),
     [("import time; time.sleep(60)", "no result within"), ("import os; os.abort()", "did not finish")],
 )
-def test_a_middleware_that_hangs_or_crashes_is_a_finding(
+def test_hanging_or_crashing_middleware_is_a_finding(
     code: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("PYTHONPATH", with_module(tmp_path, "rclpy", code))
@@ -82,12 +82,12 @@ def test_a_middleware_that_hangs_or_crashes_is_a_finding(
     assert (finding.name, finding.state) == ("rclpy", "missing") and words in finding.found
 
 
-def test_security_that_was_asked_for_and_is_not_there_is_found_before_a_node_is_tried():
+def test_missing_security_is_found_before_a_node_starts():
     command = [sys.executable, "-m", "push_predictor.nodes.doctor_graph"]
     environment = {**node_environment(free_domain()), "ROS_SECURITY_ENABLE": "true"}
     done = subprocess.run(command, env=environment, cwd=REPOSITORY, capture_output=True, text=True, timeout=60.0)
-    told = [json.loads(line) for line in done.stdout.splitlines()]
-    last = [line for line in told if "state" in line][-1]
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    last = [line for line in records if "state" in line][-1]
     assert done.returncode == 1 and (last["name"], last["state"]) == ("security", "missing")
     assert "unset ROS_SECURITY_ENABLE" in last["remedy"]
 
@@ -102,19 +102,19 @@ def test_interfaces_of_another_version_are_named_by_field(monkeypatch: pytest.Mo
     assert found["state"] == "missing" and found["found"].endswith("has no srv.PredictPush.Response.skew")
 
 
-def test_interfaces_that_are_not_there_come_with_the_command_that_builds_them(monkeypatch: pytest.MonkeyPatch):
+def test_missing_interfaces_come_with_the_command_that_builds_them(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "push_predictor_interfaces", None)
     found = doctor_graph.interfaces()
     assert found["state"] == "missing" and "pip install ./push_predictor_interfaces" in found["remedy"]
 
 
-def test_a_message_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch):
+def test_missing_message_package_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor_graph, "PACKAGES", ("geometry_msgs", "no_such_msgs"))
     found = doctor_graph.messages()
     assert (found["state"], found["found"]) == ("missing", "not found: no_such_msgs")
 
 
-def test_what_is_needed_and_what_is_extra_is_what_the_package_declares():
+def test_checked_packages_equal_those_that_setup_declares():
     setup: dict[str, Any] = {}
     source = (REPOSITORY / "setup.py").read_text().replace("from setuptools import", "#")
     exec(source, {"setup": setup.update, "find_packages": lambda **how: []})
@@ -124,33 +124,33 @@ def test_what_is_needed_and_what_is_extra_is_what_the_package_declares():
         assert set(packages) <= extras[name], name
 
 
-def test_a_package_that_is_too_old_or_missing_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):
+def test_old_or_missing_package_is_named_with_the_command(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor_checks, "NEEDED", {"numpy": "99.0", "no-such-package": "1.0"})
     old, gone = (finding for finding in python_and_packages() if finding.state == "missing")
     assert (old.name, old.why, old.remedy) == ("numpy", "99.0 or newer is required", "pip install 'numpy>=99.0'")
     assert gone.name == "no-such-package" and gone.found.startswith("not found")
 
 
-def test_an_extra_that_is_not_installed_is_a_note_with_its_purpose(monkeypatch: pytest.MonkeyPatch):
+def test_missing_extra_is_a_note_with_its_purpose(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor_checks, "EXTRAS", {"report": (("no-such-package",), "the pictures")})
     (note,) = (finding for finding in python_and_packages() if finding.state == "note")
     assert (note.found, note.why) == ("not installed: no-such-package", "needed for the pictures")
 
 
-def test_a_model_that_does_not_load_is_named(tmp_path: Path):
+def test_unreadable_model_is_named(tmp_path: Path):
     (tmp_path / "bad.pushmodel").write_text("no model")
     found = model_predicts(tmp_path / "bad.pushmodel")
     assert found.state == "missing" and "bad.pushmodel" in found.found
 
 
-def test_a_recording_is_checked_if_one_is_given(tmp_path: Path):
+def test_given_recording_is_checked(tmp_path: Path):
     assert "120 pushes" in recording_reads(REPOSITORY / "bags" / "square_abs_test").found
     (tmp_path / "bad.mcap").write_bytes(b"no recording")
     found = recording_reads(tmp_path / "bad.mcap")
     assert found.state == "missing" and "bad.mcap" in found.found
 
 
-def test_executables_beside_the_interpreter_are_found_by_the_path_that_is_proposed(monkeypatch: pytest.MonkeyPatch):
+def test_proposed_path_finds_the_executables(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     note = executables()
@@ -159,7 +159,7 @@ def test_executables_beside_the_interpreter_are_found_by_the_path_that_is_propos
     assert executables().state == "ok"
 
 
-def test_no_room_for_temporary_files_is_named(monkeypatch: pytest.MonkeyPatch):
+def test_missing_disk_space_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
     assert space().state == "missing"
     monkeypatch.setattr(tempfile, "tempdir", None)
@@ -171,7 +171,7 @@ def test_no_room_for_temporary_files_is_named(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize("state", ["ok", "note", "missing"])
-def test_only_what_is_missing_is_a_failure(
+def test_only_missing_parts_are_a_failure(
     state: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ):
     finding = Finding("thing", state, "what was found", "why it matters", "mend it")

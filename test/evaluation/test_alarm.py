@@ -41,7 +41,7 @@ def fired_after(alarm: Alarm, pushes: Array) -> int | None:
 
 
 @pytest.mark.parametrize(("rate", "calibration"), [(0.1, 5), (0.1, 60)])
-def test_without_a_change_the_share_that_ever_fires_is_at_most_the_rate(rate: float, calibration: int):
+def test_false_alarm_probability_is_at_most_the_rate(rate: float, calibration: int):
     """With few calibration pushes just as with many; the union over two scores that depend leaves room."""
     runs, pushes = 1000, 60
     fired = sum(
@@ -52,7 +52,7 @@ def test_without_a_change_the_share_that_ever_fires_is_at_most_the_rate(rate: fl
     assert 0 < fired <= binom.ppf(0.999, runs, rate)
 
 
-def test_the_larger_the_change_the_sooner_it_is_told():
+def test_larger_changes_are_detected_sooner():
     delays = []
     for shift in (1.0, 2.0, 4.0):
         found = []
@@ -64,31 +64,31 @@ def test_the_larger_the_change_the_sooner_it_is_told():
     assert delays[0] > delays[1] > delays[2] and delays[0] < 80 and delays[2] <= 10, delays
 
 
-def test_a_shift_is_felt_to_either_side():
+def test_two_sided_score_detects_shifts_in_both_directions():
     for shift in (-2.0, 2.0):
         alarm = Alarm((ScoreKind("shift", 1.0, True),), scores(150, 0)[:, 1:], 0.01)
         assert fired_after(alarm, scores(100, 1, shift)[:, 1:]) is not None
 
 
-def test_residuals_that_are_smaller_than_before_are_no_reason_for_an_alarm():
+def test_smaller_residuals_give_no_alarm():
     alarm = Alarm((ScoreKind("size", 1.0, False),), scores(150, 0)[:, :1], 0.01)
     assert fired_after(alarm, scores(200, 1)[:, :1] * 0.05) is None
 
 
-def test_the_order_of_the_calibration_does_not_matter():
+def test_alarm_is_invariant_to_the_order_of_the_calibration():
     calibration, pushes = scores(80, 0), scores(120, 1, 1.5)
     alarms = [Alarm(KINDS, calibration[order], 0.01) for order in (np.arange(80), np.arange(80)[::-1])]
     states = [(fired_after(alarm, pushes), alarm.state) for alarm in alarms]
     assert states[0] == states[1]
 
 
-def test_equal_scores_are_ranked_by_lot_and_give_no_evidence():
+def test_equal_scores_are_ranked_at_random_and_give_no_evidence():
     fired = [fired_after(Alarm(KINDS, np.zeros((30, 2)), 0.05, seed), np.zeros((100, 2))) for seed in range(100)]
     assert sum(after is not None for after in fired) <= binom.ppf(0.999, 100, 0.05)
     assert len({Alarm(KINDS, np.zeros((30, 2)), 0.05, 7).add("a", np.zeros(2)) for _ in range(3)}) == 1
 
 
-def test_it_fires_once_and_again_only_after_a_reset():
+def test_alarm_fires_once_and_again_only_after_a_reset():
     alarm, pushes = Alarm(KINDS, scores(100, 0), 0.01), scores(60, 1, 4.0)
     first = fired_after(alarm, pushes)
     state = alarm.state
@@ -101,7 +101,7 @@ def test_it_fires_once_and_again_only_after_a_reset():
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
-def test_a_score_that_is_no_number_is_refused_by_name(wrong: float):
+def test_rejects_a_score_that_is_not_finite_by_name(wrong: float):
     with pytest.raises(RequestError, match=r"score shift: .* finite"):
         Alarm(KINDS, scores(10, 0), 0.01).add("push", np.array([1.0, wrong]))
     with pytest.raises(RequestError, match="score size"):
@@ -109,18 +109,22 @@ def test_a_score_that_is_no_number_is_refused_by_name(wrong: float):
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, -0.1, np.nan])
-def test_a_rate_that_is_no_probability_is_refused(rate: float):
+def test_rejects_a_rate_that_is_not_a_probability(rate: float):
     with pytest.raises(RequestError, match="false_alarm_rate"):
         Alarm(KINDS, scores(10, 0), rate)
 
 
-def test_the_json_keeps_what_was_there_and_tells_of_the_alarm():
+def test_alarm_is_added_to_the_json_without_other_changes():
     alarm = Alarm(KINDS, scores(100, 0), 0.01)
     quiet = json.loads(with_alarm('{"model": "m"}', alarm_json(alarm.state)))
     assert quiet["model"] == "m" and quiet["alarm"]["fired"] is False and quiet["alarm"]["push_id"] is None
     after = fired_after(alarm, scores(60, 1, 4.0))
-    told = alarm_json(alarm.state)
-    assert (told["fired"], told["pushes"], told["push_id"]) == (True, after, f"push-{(after or 0) - 1}")
+    alarm_field = alarm_json(alarm.state)
+    assert (alarm_field["fired"], alarm_field["pushes"], alarm_field["push_id"]) == (
+        True,
+        after,
+        f"push-{(after or 0) - 1}",
+    )
     assert alarm_json(None, "too few pushes") == {"fired": False, "off": "too few pushes"}
 
 
@@ -153,19 +157,19 @@ def alarm_of(model: PushModel, table: PushTable):
 
 
 @pytest.mark.parametrize("kind", ["analytical", "gp"])
-def test_pushes_like_those_trained_on_give_no_alarm_and_a_change_does(kind: str, models: dict[str, PushModel]):
+def test_alarm_fires_after_a_change_and_not_on_pushes_like_the_training(kind: str, models: dict[str, PushModel]):
     assert not alarm_of(models[kind], made_up(120, 1)).fired
     state = alarm_of(models[kind], made_up(120, 2, friction=0.6))
     assert state.fired and state.fired_after is not None and state.fired_after < 60
     assert state.fired_by in ("contact_friction: change of the contact friction", "size of the residual")
 
 
-def test_pushes_of_more_or_fewer_windows_than_those_trained_on_are_judged_alike(models: dict[str, PushModel]):
+def test_number_of_windows_of_a_push_does_not_raise_an_alarm(models: dict[str, PushModel]):
     for windows in (1, 6):
         assert not alarm_of(models["analytical"], made_up(100, 3, windows=windows)).fired
 
 
-def test_training_pushes_are_judged_as_if_they_had_not_been_seen(models: dict[str, PushModel]):
+def test_training_pushes_are_scored_by_cross_validation(models: dict[str, PushModel]):
     training, new = models["gp"].training, made_up(200, 4)
     prediction = models["gp"].predict_rows(new.inputs, new.duration)
     fresh = standardised(prediction.mean, prediction.covariance, new.outcomes).std(axis=0)
@@ -174,7 +178,7 @@ def test_training_pushes_are_judged_as_if_they_had_not_been_seen(models: dict[st
     )
 
 
-def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushModel]):
+def test_alarm_is_equal_for_pushes_one_by_one_and_all_at_once(models: dict[str, PushModel]):
     """Fast pushes among them, whose integration takes its steps from the longest."""
     model, table = models["analytical"], made_up(6, 5, friction=0.45)
     velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
@@ -189,7 +193,7 @@ def test_pushes_one_by_one_or_all_at_once_are_the_same(models: dict[str, PushMod
     assert monitor.state.fired_at == whole.fired_at
 
 
-def test_a_push_that_is_played_again_is_no_news(models: dict[str, PushModel]):
+def test_repeated_push_is_ignored(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 6)
     monitor, prediction = AlarmMonitor(calibrate(model)), model.predict_rows(table.inputs, table.duration)
     for _ in range(3):
@@ -197,7 +201,7 @@ def test_a_push_that_is_played_again_is_no_news(models: dict[str, PushModel]):
     assert monitor.state.pushes == 10
 
 
-def test_a_push_without_a_covariate_is_left_out_and_named(models: dict[str, PushModel]):
+def test_push_without_a_covariate_is_skipped_and_named(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 7)
     heading = table.covariates["slider_heading"].copy()
     heading[4] = np.nan
@@ -208,7 +212,7 @@ def test_a_push_without_a_covariate_is_left_out_and_named(models: dict[str, Push
     assert "push 7-0001" in reason and "finite" in reason
 
 
-def test_a_model_of_too_few_pushes_has_no_alarm():
+def test_model_with_too_few_pushes_has_no_alarm():
     model = train_model(made_up(9, 0), square_rig(), "analytical", name="few")
     with pytest.raises(RequestError, match=r"training pushes of the model: 9 .* at least 10"):
         calibrate(model)

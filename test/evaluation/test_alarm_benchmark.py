@@ -9,7 +9,7 @@ def row(change: int | None, fired: int | None) -> Row:
     return Row(0, "rect1 on abs", 300, change, fired, "dy" if fired else None, 2.0)
 
 
-def test_an_alarm_before_the_change_is_false_and_one_after_it_has_a_delay() -> None:
+def test_alarm_before_the_change_is_false_and_after_it_has_a_delay() -> None:
     assert (row(None, None).false, row(None, 7).false, row(100, 100).false, row(100, 101).false) == (
         False,
         True,
@@ -20,7 +20,7 @@ def test_an_alarm_before_the_change_is_false_and_one_after_it_has_a_delay() -> N
     assert row(None, 7).delay is None
 
 
-def test_the_table_counts_recordings_with_their_intervals() -> None:
+def test_table_counts_recordings_with_intervals() -> None:
     text = markdown_of(
         [*[row(None, None)] * 9, row(None, 7), row(100, 120), row(100, 110), row(100, 50), row(100, None)]
     )

@@ -27,12 +27,12 @@ def kl_by_integration(mean: float, sd: float, model_mean: float, model_sd: float
 @pytest.mark.parametrize(
     "case", [(0.0, 1.0, 0.0, 1.0), (0.3, 0.5, -0.2, 1.7), (1.0, 2.0, 0.5, 0.9), (0.0, 1.0, 3.0, 1.0)]
 )
-def test_it_is_the_integral_of_its_definition(case: tuple[float, float, float, float]) -> None:
+def test_kl_equals_the_integral_of_its_definition(case: tuple[float, float, float, float]) -> None:
     closed = float(gaussian_kl(*(np.array(v) for v in case)))
     assert closed == pytest.approx(kl_by_integration(*case), rel=1e-12, abs=1e-12)
 
 
-def test_it_is_zero_for_the_same_and_positive_for_any_other() -> None:
+def test_kl_is_zero_for_equal_gaussians_and_positive_otherwise() -> None:
     rng = np.random.default_rng(0)
     mean, sd, other, other_sd = (
         rng.normal(size=99),
@@ -44,16 +44,16 @@ def test_it_is_zero_for_the_same_and_positive_for_any_other() -> None:
     assert (gaussian_kl(mean, sd, other, other_sd) > 0.0).all()
 
 
-def test_the_unit_drops_out() -> None:
+def test_kl_is_independent_of_units() -> None:
     values = [np.array(v) for v in (0.3, 0.5, -0.2, 1.7)]
     assert gaussian_kl(*(1e3 * v for v in values)) == pytest.approx(float(gaussian_kl(*values)), rel=1e-13)
 
 
-def test_the_part_of_the_means_is_what_equal_deviations_leave() -> None:
+def test_kl_of_means_equals_kl_with_equal_deviations() -> None:
     assert kl_of_mean(ZERO, 2.0 * ONE, ONE) == pytest.approx(float(gaussian_kl(ZERO, ONE, 2.0 * ONE, ONE)[0]))
 
 
-def test_the_printed_formula_is_that_of_the_paper_and_no_divergence() -> None:
+def test_printed_formula_is_that_of_the_paper_and_not_a_divergence() -> None:
     mean, sd, model_mean, model_sd = 0.3, 0.5, -0.2, 1.7
     paper = 0.5 * (np.log(model_sd / sd) + (sd**2 + (mean - model_mean) ** 2) / model_sd**2 - 1.0)
     assert printed_kl(*(np.array(v) for v in (mean, sd, model_mean, model_sd))) == pytest.approx(paper, abs=1e-15)
@@ -62,13 +62,13 @@ def test_the_printed_formula_is_that_of_the_paper_and_no_divergence() -> None:
 
 
 @pytest.mark.parametrize("n", [10, 100])
-def test_the_truth_itself_scores_what_is_expected(n: int) -> None:
+def test_expected_kl_of_the_true_distribution(n: int) -> None:
     draws = np.random.default_rng(n).standard_normal((40_000, n))
     kl = gaussian_kl(draws.mean(axis=1), draws.std(axis=1, ddof=1), ZERO, ONE)
     assert kl.mean() == pytest.approx(expected_kl(n), abs=4.0 * kl.std() / 200.0)
 
 
-def test_one_half_from_the_other_scores_what_is_expected() -> None:
+def test_expected_kl_between_two_halves_of_a_sample() -> None:
     one, two = np.random.default_rng(1).standard_normal((2, 40_000, 25))
     moments = [each for half in (one, two) for each in (half.mean(axis=1), half.std(axis=1, ddof=1))]
     kl = gaussian_kl(*moments)

@@ -23,22 +23,22 @@ def pushes(sizes: list[int]) -> PushTable:
     return PushTable(np.full((n, 3), 0.1), np.full(n, 0.2), np.zeros((n, 3)), push_id)
 
 
-def test_predicting_the_training_mean_scores_one_per_output() -> None:
+def test_training_mean_has_an_nmse_of_one_per_output() -> None:
     mean = np.array([1e-3, 0.0, 0.01])
     assert nmse(np.tile(mean, (400, 1)), OUTCOMES, mean) == pytest.approx(np.ones(3))
     assert nmse(OUTCOMES, OUTCOMES, mean) == pytest.approx(np.zeros(3))
 
 
-def test_an_outcome_that_does_not_vary_has_no_nmse() -> None:
+def test_nmse_of_a_constant_outcome_is_nan() -> None:
     assert np.isnan(nmse(np.ones((3, 1)), np.zeros((3, 1)), np.zeros(1))[0])
 
 
-def test_nlpd_is_the_negative_log_density() -> None:
+def test_nlpd_equals_the_negative_log_density() -> None:
     mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
     assert gaussian_nlpd(mean, variance, OUTCOMES) == pytest.approx(-norm.logpdf(OUTCOMES, 0.0, SD))
 
 
-def test_units_move_nlpd_by_the_logarithm_of_their_ratio() -> None:
+def test_units_shift_nlpd_by_the_logarithm_of_their_ratio() -> None:
     scale = np.array([1e3, 1e3, 1.0])
     mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
     in_si = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
@@ -46,20 +46,20 @@ def test_units_move_nlpd_by_the_logarithm_of_their_ratio() -> None:
     assert in_mm - in_si == pytest.approx(np.full(400, 2.0 * np.log(1000.0)))
 
 
-def test_the_joint_density_is_the_product_where_outputs_are_independent() -> None:
+def test_joint_density_of_independent_outputs_is_the_product() -> None:
     mean, variance = np.zeros((400, 3)), np.tile(SD**2, (400, 1))
     product = gaussian_nlpd(mean, variance, OUTCOMES).sum(axis=1)
     assert joint_nlpd(mean, np.tile(np.diag(SD**2), (400, 1, 1)), OUTCOMES) == pytest.approx(product)
 
 
-def test_the_joint_density_of_correlated_outputs() -> None:
+def test_joint_density_of_correlated_outputs_equals_scipy() -> None:
     root = np.diag(SD) @ np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [-0.3, 0.2, 1.0]])
     covariance = root @ root.T
     expected = -multivariate_normal(np.zeros(3), covariance).logpdf(OUTCOMES)
     assert joint_nlpd(np.zeros((400, 3)), np.tile(covariance, (400, 1, 1)), OUTCOMES) == pytest.approx(expected)
 
 
-def test_standardised_residuals_of_a_right_model_have_unit_covariance() -> None:
+def test_standardised_residuals_of_a_correct_model_have_unit_covariance() -> None:
     root = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, 0.0], [0.1, -0.4, 0.2]])
     outcomes = np.random.default_rng(1).standard_normal((20_000, 3)) @ root.T
     z = standardised(np.zeros_like(outcomes), np.tile(root @ root.T, (len(outcomes), 1, 1)), outcomes)
@@ -67,7 +67,7 @@ def test_standardised_residuals_of_a_right_model_have_unit_covariance() -> None:
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
-def test_a_right_model_covers_what_it_says(level: float) -> None:
+def test_coverage_of_a_correct_model_equals_the_level(level: float) -> None:
     outcomes = np.random.default_rng(2).standard_normal((20_000, 2))
     shares = coverage(np.zeros_like(outcomes), np.ones_like(outcomes), outcomes, level)
     assert shares == pytest.approx(np.full(2, level), abs=0.012)
@@ -83,14 +83,14 @@ def test_every_split_keeps_pushes_whole(sizes: list[int], seed: int) -> None:
 
 
 @given(sizes=st.lists(st.integers(1, 9), min_size=5, max_size=30))
-def test_folds_hold_equally_many_pushes(sizes: list[int]) -> None:
+def test_folds_have_equal_numbers_of_pushes(sizes: list[int]) -> None:
     table = pushes(sizes)
     folds = push_folds(table, 5)
     counts = [len(set(table.push_id[folds == k].tolist())) for k in range(5)]
     assert max(counts) - min(counts) <= 1
 
 
-def test_the_split_by_push_tests_every_row_once_and_learns_from_no_push_it_tests() -> None:
+def test_split_by_push_tests_every_row_once_and_never_trains_on_tested_pushes() -> None:
     table = pushes([3, 1, 4, 1, 5, 9, 2, 6])
     splits = [split_by_push(table, fold) for fold in range(FOLDS)]
     assert np.sort(np.concatenate([s.test for s in splits])).tolist() == list(range(len(table)))
@@ -99,7 +99,7 @@ def test_the_split_by_push_tests_every_row_once_and_learns_from_no_push_it_tests
         assert not set(table.push_id[s.training].tolist()) & set(table.push_id[s.test].tolist())
 
 
-def test_pushes_are_dealt_in_the_order_of_their_numbers_whatever_the_order_of_rows() -> None:
+def test_folds_do_not_depend_on_the_order_of_rows() -> None:
     """As docs/results/measured.md tells: default_rng(0).permutation(pushes) % 5, push 9 before push 10."""
     numbers = np.random.default_rng(3).permutation(np.repeat(np.arange(23), 2))
     n = len(numbers)
@@ -113,7 +113,7 @@ def test_pushes_are_dealt_in_the_order_of_their_numbers_whatever_the_order_of_ro
 
 
 @pytest.mark.parametrize("rows, tested", [(3500, 1000), (100, 30)])
-def test_the_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
+def test_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: int) -> None:
     table = pushes([rows])
     order = np.random.default_rng(0).permutation(rows)
     for seed in range(3):
@@ -124,13 +124,13 @@ def test_the_random_split_tests_the_same_rows_for_every_seed(rows: int, tested: 
         assert set(split.first(5).tolist()) < set(split.first(9).tolist()), "smaller sets lie within larger ones"
 
 
-def test_a_bootstrap_draws_as_many_pushes_as_there_are() -> None:
+def test_bootstrap_draws_as_many_pushes_as_there_are() -> None:
     table = pushes([1, 5, 2, 7])
     first_rows = [table.push_id.tolist().index(push) for push in table.pushes]
     assert np.all(push_bootstrap(table.push_id)[:, first_rows].sum(axis=1) == 4)
 
 
-def test_tables_keep_the_covariates_that_all_of_them_have() -> None:
+def test_concatenated_tables_keep_common_covariates() -> None:
     one, other = pushes([2]), pushes([3])
     one.covariates.update(a=np.zeros(2), b=np.ones(2))
     other.covariates.update(b=np.zeros(3))

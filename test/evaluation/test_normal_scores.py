@@ -1,4 +1,4 @@
-"""Normal scores: what ranks alone decide."""
+"""Normal scores depend on ranks only."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ FEW_VALUES = st.integers(-3, 3).map(float)  # so that many are equal
 
 
 @given(arrays(np.float64, array_shapes(min_dims=1, max_dims=2, min_side=1, max_side=20), elements=FEW_VALUES))
-def test_they_are_those_of_the_ranks_with_equal_values_sharing_theirs(values: Array):
+def test_normal_scores_are_those_of_average_ranks(values: Array):
     np.testing.assert_allclose(normal_scores(values), ndtri((rankdata(values, axis=0) - 0.5) / len(values)))
 
 
-def test_a_column_with_nan_has_no_scores_the_others_have_theirs():
+def test_column_with_nan_has_no_scores():
     scores = normal_scores(np.array([[1.0, 1.0], [np.nan, 2.0], [3.0, np.inf]]))
     assert np.isnan(scores[:, 0]).all()
     np.testing.assert_allclose(scores[:, 1], ndtri([1 / 6, 1 / 2, 5 / 6]), atol=1e-15)
 
 
-def test_only_the_order_matters():
+def test_normal_scores_depend_on_order_only():
     values = np.random.default_rng(0).standard_normal((30, 3))
     assert np.array_equal(normal_scores(values), normal_scores(np.exp(values)))

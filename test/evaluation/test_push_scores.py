@@ -1,4 +1,4 @@
-"""Sums by push: they pool over folds, resample by whole pushes, and come to the figures that the rows come to."""
+"""Scores by push: pooling over folds, resampling of whole pushes, agreement with the scores by row."""
 
 from __future__ import annotations
 
@@ -33,30 +33,30 @@ def rows_of(c: Comparison, rows: np.ndarray) -> Comparison:
     return replace(c, **fields, exact_log_density=None if c.exact_log_density is None else c.exact_log_density[rows])
 
 
-def test_the_totals_of_a_tally_are_those_of_the_json() -> None:
+def test_totals_equal_the_json() -> None:
     c = comparison()
-    totals, told = push_scores(c).totals(), metrics_json(c)
+    totals, expected_json = push_scores(c).totals(), metrics_json(c)
     for name in ("nmse", "nlpd", "exact_nlpd"):
-        assert getattr(totals, name)[0] == pytest.approx([told[name][output] for output in OUTPUTS], rel=1e-12)
+        assert getattr(totals, name)[0] == pytest.approx([expected_json[name][output] for output in OUTPUTS], rel=1e-12)
     for k, level in enumerate(COVERAGE_LEVELS):
-        told_shares = [told["coverage"][str(level)][output] for output in OUTPUTS]
-        assert totals.coverage[0, :, k] == pytest.approx(told_shares, rel=1e-12)
+        json_shares = [expected_json["coverage"][str(level)][output] for output in OUTPUTS]
+        assert totals.coverage[0, :, k] == pytest.approx(json_shares, rel=1e-12)
 
 
-def test_the_resampled_totals_span_the_interval_of_the_json() -> None:
+def test_resampled_totals_give_the_interval_of_the_json() -> None:
     c = comparison()
-    draws, told = push_scores(c).resampled(), metrics_json(c)["interval"]
+    draws, expected_json = push_scores(c).resampled(), metrics_json(c)["interval"]
     for name in ("nmse", "nlpd"):
         low, high = np.quantile(getattr(draws, name).sum(axis=1), [0.025, 0.975])
-        assert [low, high] == pytest.approx([told[name]["low"], told[name]["high"]], rel=1e-12)
+        assert [low, high] == pytest.approx([expected_json[name]["low"], expected_json[name]["high"]], rel=1e-12)
 
 
-def test_without_an_exact_density_the_gaussian_one_is_exact() -> None:
+def test_gaussian_density_is_exact_without_another() -> None:
     t = push_scores(comparison(exact=False))
     np.testing.assert_array_equal(t.exact_nlpd, t.nlpd)
 
 
-def test_folds_pooled_are_all_rows_at_once() -> None:
+def test_pooled_folds_equal_all_rows_at_once() -> None:
     c = comparison()
     fold = np.unique(c.push_id, return_inverse=True)[1] % 2
     parts, whole = pooled([push_scores(rows_of(c, fold == k)) for k in (1, 0)]), push_scores(c)
@@ -73,14 +73,14 @@ def test_each_fold_keeps_its_own_training_mean() -> None:
     np.testing.assert_allclose(pooled([push_scores(first), push_scores(moved)]).totals().nmse[0], expected)
 
 
-def test_a_push_seen_with_several_seeds_stays_one_push() -> None:
+def test_push_of_several_seeds_is_one_push() -> None:
     one, other = comparison(seed=1), comparison(seed=2)
     both = pooled([push_scores(one), push_scores(other)])
     assert both.push_id.tolist() == sorted(set(one.push_id.tolist()))
     assert both.windows.sum() == 2 * sum(SIZES)
 
 
-def test_a_push_drawn_twice_counts_as_if_it_had_been_made_twice() -> None:
+def test_push_drawn_twice_counts_twice() -> None:
     c = comparison()
     t = push_scores(c)
     weights = np.array([2.0, 0.0, 1.0, 3.0, 0.0, 0.0])
@@ -90,7 +90,7 @@ def test_a_push_drawn_twice_counts_as_if_it_had_been_made_twice() -> None:
         np.testing.assert_allclose(getattr(drawn, name), getattr(expected, name), rtol=1e-12)
 
 
-def test_two_models_of_the_same_pushes_are_resampled_alike() -> None:
+def test_models_of_the_same_pushes_share_their_bootstrap_samples() -> None:
     t = push_scores(comparison())
     np.testing.assert_array_equal(t.resampled().nmse, t.totals(push_bootstrap(t.push_id)).nmse)
     np.testing.assert_array_equal(t.resampled(seed=5).nlpd, t.totals(push_bootstrap(t.push_id, 5)).nlpd)

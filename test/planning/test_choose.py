@@ -1,4 +1,4 @@
-"""Choosing pushes: by made-up repertoires and predictors whose best push is known."""
+"""Choice of pushes from synthetic repertoires and predictors whose best push is known."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AT_ORIGIN = np.zeros(3)
 
 
 def made_up(means, sds) -> Repertoire:
-    """Pushes told apart by their contact 0, 0.01, ...; sds (n, 3) or (n,)."""
+    """Pushes with contacts 0, 0.01, ... as labels; sds (n, 3) or (n,)."""
     means, sds = np.array(means, dtype=np.float64), np.array(sds, dtype=np.float64)
     sds = sds if sds.ndim == 2 else np.tile(sds[:, None], 3)
     inputs = np.column_stack([np.full(len(means), 0.02), 0.01 * np.arange(len(means)), np.zeros(len(means))])
@@ -50,28 +50,28 @@ def moving(sd: float, domain=lambda inputs: np.ones(len(inputs), dtype=bool), as
 # --- the next push -------------------------------------------------------------------------------------------------
 
 
-def test_predictable_push_beats_one_that_aims_better_and_scatters():
+def test_predictable_push_wins_over_a_better_aimed_noisy_push():
     goal = Goal(np.array([0.010, 0.0, 0.0]), 0.002, 0.05)
     pushes = made_up([[0.010, 0.0, 0.0], [0.011, 0.0, 0.01]], [0.002, 0.0002])
     choice = choose_push(pushes, AT_ORIGIN, goal, 0.9)
     assert number(choice) == 1 and choice.probability > 0.99
 
 
-def test_without_scatter_the_nearest_mean_wins():
+def test_nearest_mean_wins_without_noise():
     goal = Goal(np.array([0.010, 0.0, 0.0]), 0.002, 0.05)
     means = [[0.0112, 0.0, 0.0], [0.0103, 0.0002, 0.005], [0.0103, 0.0002, 0.02]]
     choice = choose_push(made_up(means, [0.0, 0.0, 0.0]), AT_ORIGIN, goal)
     assert number(choice) == 1 and choice.probability == 1.0
 
 
-def test_goal_reached_asks_for_no_push():
+def test_no_push_is_chosen_at_the_goal():
     pushes = made_up([[0.01, 0.0, 0.0]], [0.0])
     assert choose_push(pushes, np.array([0.0011, 0.0, 0.09]), Goal(np.zeros(3), 0.0012, 0.1)) is None
     assert choose_push(pushes, np.array([0.0013, 0.0, 0.09]), Goal(np.zeros(3), 0.0012, 0.1)) is not None
     assert choose_push(pushes, np.array([0.0011, 0.0, 0.11]), Goal(np.zeros(3), 0.0012, 0.1)) is not None
 
 
-def test_probability_is_that_of_the_gaussian():
+def test_probability_equals_that_of_the_gaussian():
     sd, turn_sd, distance, turn = 0.001, 0.02, 0.0015, 0.03
     pushes = made_up([[0.01, 0.002, 0.1]], [[sd, sd, turn_sd]])
     choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.01, 0.002, 0.1]), distance, turn))
@@ -81,7 +81,7 @@ def test_probability_is_that_of_the_gaussian():
     assert anyhow.probability == pytest.approx(1.0 - np.exp(-0.5 * (distance / sd) ** 2), abs=0.015)
 
 
-def test_correlated_scatter_counts_as_such():
+def test_probability_accounts_for_correlated_noise():
     """Of two pushes with the same variances the one that scatters on the goal's diagonal stays within it."""
     pushes = made_up([[0.01, 0.0, 0.0], [0.01, 0.0, 0.0]], [0.0015, 0.0015])
     covariance = pushes.covariance.copy()
@@ -92,27 +92,27 @@ def test_correlated_scatter_counts_as_such():
     assert number(aligned) == 1 and aligned.probability == pytest.approx(along, abs=0.03)
 
 
-def test_a_push_is_chosen_for_what_the_next_one_can_do():
+def test_push_is_chosen_with_one_step_lookahead():
     """Push 0 comes nearest, but what it leaves no push can mend; 1 and 2 after each other reach the goal."""
     pushes = made_up([[0.010, 0.0, 0.0], [0.006, 0.0, 0.0], [0.005, 0.0, 0.0]], [0.0, 0.0, 0.0])
     choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.011, 0.0, 0.0]), 0.0004, 0.05))
     assert number(choice) in (1, 2) and choice.expected == pytest.approx(2.0)
 
 
-def test_the_first_of_two_pushes_is_a_predictable_one():
+def test_first_of_two_pushes_is_a_predictable_one():
     pushes = made_up([[0.006, 0.0, 0.0], [0.0061, 0.0, 0.0], [0.005, 0.0, 0.0]], [0.002, 0.0001, 0.0001])
     choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.011, 0.0, 0.0]), 0.0006, 0.05))
     assert number(choice) in (1, 2) and choice.expected < 2.05
 
 
-def test_far_away_the_longest_way_is_made():
+def test_longest_push_is_chosen_far_from_the_goal():
     pushes = made_up([[0.01, 0.0, 0.0], [0.02, 0.0, 0.0], [-0.02, 0.0, 0.0]], [0.0, 0.0, 0.0])
     choice = choose_push(pushes, AT_ORIGIN, Goal(np.array([0.1, 0.0, 0.0]), 0.002, 0.05))
     assert number(choice) == 1 and choice.probability == 0.0
     assert choice.expected == pytest.approx(1.0 + 2.0 + 0.08 / 0.02)
 
 
-def test_a_probability_that_no_push_has_is_not_pretended():
+def test_reported_probability_can_be_below_the_requested_one():
     """The likelier push reaches with 0.4 only; that of the pair that is sure is taken if 0.9 is asked for."""
     pushes = made_up([[0.010, 0.0, 0.0], [0.006, 0.0, 0.0], [0.004, 0.0, 0.0]], [0.001, 0.0, 0.0])
     goal = Goal(np.array([0.010, 0.0, 0.0]), 0.001, 0.05)
@@ -122,7 +122,7 @@ def test_a_probability_that_no_push_has_is_not_pretended():
 
 
 @pytest.mark.parametrize("probability", [0.3, 0.9])
-def test_choice_turns_and_moves_with_slider_and_goal(probability):
+def test_choice_is_equivariant_under_rotation_and_translation(probability):
     rng = np.random.default_rng(1)
     pushes = made_up(rng.normal(size=(300, 3)) * [0.01, 0.01, 0.1], rng.uniform(0.0002, 0.002, 300))
     slider, goal = np.array([0.01, -0.02, 0.3]), np.array([0.022, -0.013, 0.25])
@@ -140,14 +140,14 @@ def test_choice_turns_and_moves_with_slider_and_goal(probability):
     np.testing.assert_allclose(there.covariance[:2, :2], along @ here.covariance[:2, :2] @ along.T, atol=1e-15)
 
 
-def test_a_square_whose_sides_look_alike_takes_the_nearest_heading():
+def test_symmetric_goal_accepts_the_nearest_equivalent_heading():
     pushes = made_up([[0.01, 0.0, 0.1]], [0.0001])
     pose = np.array([0.01, 0.0, 0.1 + np.pi / 2.0])
     assert choose_push(pushes, AT_ORIGIN, Goal(pose, 0.001, 0.02, symmetry=4)).probability == 1.0
     assert choose_push(pushes, AT_ORIGIN, Goal(pose, 0.001, 0.02)).probability == 0.0
 
 
-def test_heading_is_taken_the_short_way_round():
+def test_rotation_to_the_goal_is_the_shortest():
     goal = Goal(np.array([0.0, 0.0, -3.1]), 0.001, 0.05)
     np.testing.assert_allclose(goal.ahead(np.array([0.0, 0.0, 3.1])), [0.0, 0.0, 2.0 * np.pi - 6.2], atol=1e-12)
     assert goal.reached(goal.ahead(np.array([0.0, 0.0, 3.16])))
@@ -162,12 +162,12 @@ def test_heading_is_taken_the_short_way_round():
         ({"symmetry": 0}, "goal symmetry"),
     ],
 )
-def test_goal_that_is_none_is_refused(change, field):
+def test_rejects_an_invalid_goal_by_field(change, field):
     with pytest.raises(RequestError, match=field):
         Goal(**{"pose": np.zeros(3), "distance": 0.001, "turn": 0.1, **change})
 
 
-def test_bad_request_is_refused():
+def test_rejects_an_invalid_request_by_field():
     pushes, goal = made_up([[0.01, 0.0, 0.0]], [0.0]), Goal(np.ones(3), 0.001, 0.1)
     for probability in (0.0, 1.0, np.nan):
         with pytest.raises(RequestError, match="probability"):
@@ -179,7 +179,7 @@ def test_bad_request_is_refused():
 # --- what pushes do ------------------------------------------------------------------------------------------------
 
 
-def test_windows_follow_each_other():
+def test_outcome_of_several_windows_is_their_sum_without_noise():
     """The middle of edge 0, whose inward normal is +x: four windows go four times as far."""
     does = repertoire(moving(1e-4), SQUARE, np.array([[0.02, 0.125, 0.0]]), (1, 4))
     np.testing.assert_array_equal(does.pushes.windows, [1, 4])
@@ -187,12 +187,12 @@ def test_windows_follow_each_other():
 
 
 @pytest.mark.parametrize(("persistent_fraction", "power"), [(0.0, 1), (1.0, 2)])
-def test_scatter_adds_up_as_it_lasts(persistent_fraction, power):
+def test_noise_accumulates_with_the_persistent_fraction(persistent_fraction, power):
     does = repertoire(moving(1e-4), SQUARE, np.array([[0.02, 0.125, 0.0]]), (1, 4), persistent_fraction)
     np.testing.assert_allclose(does.covariance[:, 1, 1], [1e-8, 4.0**power * 1e-8], rtol=1e-6)
 
 
-def test_the_tip_takes_back_what_scatters_along_the_normal():
+def test_contact_with_the_tip_removes_noise_along_the_normal():
     def predict(inputs):
         answer = moving(0.0)(inputs)
         return replace(answer, covariance=np.tile(np.diag([1e-6, 1e-8, 0.0]), (len(inputs), 1, 1)))
@@ -202,7 +202,7 @@ def test_the_tip_takes_back_what_scatters_along_the_normal():
     np.testing.assert_allclose(does.covariance[0, 1, 1], 3e-8, rtol=1e-6)
 
 
-def test_all_sides_of_a_square_are_one():
+def test_all_sides_of_a_square_are_equivalent():
     lines = push_grid([0.02], np.array([0.1, 0.35, 0.6, 0.85]), np.array([0.3]))
     does = repertoire(moving(1e-4), SQUARE, lines, (3,), 0.4)
     for side in range(4):
@@ -211,7 +211,7 @@ def test_all_sides_of_a_square_are_one():
         )
 
 
-def test_pushes_outside_the_domain_are_never_chosen():
+def test_pushes_outside_the_domain_are_dropped():
     """Only they would reach the goal at once."""
     known = moving(1e-5, lambda inputs: np.abs(inputs[:, 2]) < 0.5)
     lines = push_grid([0.02], np.array([0.125]), np.array([-0.2, 0.2, 0.7]))
@@ -221,7 +221,7 @@ def test_pushes_outside_the_domain_are_never_chosen():
     assert abs(choose_push(does, AT_ORIGIN, goal).push.inputs[0, 2]) < 0.5
 
 
-def test_a_push_that_leaves_the_domain_on_its_way_is_kept_short():
+def test_push_that_leaves_the_domain_later_is_kept_with_fewer_windows():
     """Driving across the edge the tip comes to contacts above 0.13, which the model does not know."""
     across = np.array([[0.02, 0.12, -0.9]])
     known = moving(1e-6, lambda inputs: inputs[:, 1] < 0.13)
@@ -236,20 +236,20 @@ def test_a_push_that_leaves_the_domain_on_its_way_is_kept_short():
     assert 1 in lengths and 4 not in lengths
 
 
-def test_the_model_is_asked_for_pushes_only():
+def test_model_is_called_with_pushing_angles_only():
     asked: list[np.ndarray] = []
     predict = moving(2e-3, asked=asked)
     repertoire(predict, SQUARE, push_grid([0.02], np.linspace(0.0, 0.99, 40), np.linspace(-1.4, 1.4, 9)), (1, 2, 5))
     assert max(np.abs(inputs[:, 2]).max() for inputs in asked) < np.pi / 2.0
 
 
-def test_nothing_left_is_an_error():
+def test_empty_repertoire_is_an_error():
     nowhere = moving(0.0, lambda inputs: np.zeros(len(inputs), dtype=bool))
     with pytest.raises(RequestError, match="domain"):
         repertoire(nowhere, SQUARE, np.array([[0.02, 0.125, 0.0]]), (1, 2))
 
 
-def test_a_tip_that_passes_the_slider_by_pushes_no_more():
+def test_push_ends_when_the_tip_passes_the_slider():
     """It drives along the edge and past the corner, 18 mm away; the slider gives way no further than it has to."""
 
     def still(inputs):

@@ -1,4 +1,4 @@
-"""Sequences of pushes with the uncertainty carried through the pose: mechanics, symmetry, limits, refusals."""
+"""Rollouts of push sequences: mechanics, symmetry, uncertainty, limits, rejected requests."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
 
 @pytest.mark.parametrize("shape", ["rect1", "hex", "ellip2", "ellip1"])
 @pytest.mark.parametrize("contact, angle, duration", [(0.1, 0.1, 3.0), (0.2, 0.5, 3.0), (0.02, 0.0, 1.5)])
-def test_without_noise_windows_end_to_end_are_the_whole_push(shape, contact, angle, duration) -> None:
+def test_rollout_without_noise_equals_the_integrated_push(shape, contact, angle, duration) -> None:
     model, step = model_with(CERTAIN, shape), [0.02, contact, angle, duration]
     rolled = rollout(model, AT_REST, CERTAIN, [step], particles=2, persistence=INDEPENDENT)
     np.testing.assert_allclose(rolled.mean[0], after_one_push(model, step), atol=2e-7)
     np.testing.assert_allclose(rolled.covariance[0], 0.0, atol=1e-20)
 
 
-def test_every_step_starts_where_the_slider_then_is() -> None:
+def test_each_step_starts_at_the_current_pose_of_the_slider() -> None:
     model, steps = model_with(CERTAIN), [[0.02, 0.1, 0.2, 0.6], [0.02, 0.6, -0.3, 0.4]]
     rolled = rollout(model, AT_REST, CERTAIN, steps, particles=1, persistence=INDEPENDENT)
     first, second = (after_one_push(model, step) for step in steps)
@@ -87,7 +87,7 @@ def test_every_step_starts_where_the_slider_then_is() -> None:
     np.testing.assert_allclose(rolled.mean[1], expected, atol=1e-8)
 
 
-def test_one_window_is_the_prediction() -> None:
+def test_rollout_of_one_window_equals_the_prediction() -> None:
     model, particles = model_with(NOISY), 40_000
     model = replace(model, predictor=replace(model.predictor, covariance=np.diag(SD) @ CORRELATED @ np.diag(SD)))
     rolled = rollout(model, AT_REST, CERTAIN, [[0.02, 0.1, 0.2, 0.2]], particles)
@@ -100,7 +100,7 @@ def test_one_window_is_the_prediction() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.03)
 
 
-def test_the_root_of_a_covariance_keeps_deviations_with_their_outputs_in_any_unit() -> None:
+def test_covariance_root_is_independent_of_units() -> None:
     covariance, units = np.diag(SD) @ CORRELATED @ np.diag(SD), np.diag([1e3, 1e3, 180.0 / np.pi])
     root = root_of(covariance[None])[0]
     np.testing.assert_allclose(root @ root.T, covariance, rtol=1e-12)
@@ -108,7 +108,7 @@ def test_the_root_of_a_covariance_keeps_deviations_with_their_outputs_in_any_uni
     np.testing.assert_allclose(root / SD[:, None], (root / SD[:, None]).T, rtol=1e-9)
 
 
-def test_a_rollout_moves_and_turns_with_the_slider() -> None:
+def test_rollout_is_equivariant_under_translation_and_rotation() -> None:
     model, where = model_with(NOISY), np.array([0.3, -0.1, 2.0])
     here, there = (rollout(model, pose, CERTAIN, [PUSH, PUSH], 50) for pose in (AT_REST, where))
     np.testing.assert_allclose(there.samples[:, :2], rotate(here.samples[:, :2], where[2]) + where[:2], atol=1e-12)
@@ -116,7 +116,7 @@ def test_a_rollout_moves_and_turns_with_the_slider() -> None:
     np.testing.assert_allclose(there.covariance, covariance_in_world(here.covariance, np.full(2, 2.0)), atol=1e-15)
 
 
-def test_an_uncertain_start_is_carried_along() -> None:
+def test_uncertainty_of_the_start_is_propagated() -> None:
     """A slider whose heading is off goes off sideways by the way it is pushed; without noise that is all."""
     model, sd = model_with(CERTAIN), np.array([1e-3, 2e-3, 0.02])
     rolled = rollout(model, AT_REST, np.diag(sd**2), [PUSH], 6000)
@@ -128,13 +128,13 @@ def test_an_uncertain_start_is_carried_along() -> None:
     np.testing.assert_allclose((rolled.covariance[0] - expected) / np.outer(scale, scale), 0.0, atol=0.05)
 
 
-def test_uncertainty_grows_from_push_to_push() -> None:
+def test_uncertainty_grows_with_each_push() -> None:
     rolled = rollout(model_with(NOISY), AT_REST, CERTAIN, [PUSH] * 4, 2000)
     spread = np.linalg.det(rolled.covariance)
     assert np.all(np.diff(spread) > 0.0) and np.all(np.diff(rolled.covariance[:, 2, 2]) > 0.0)
 
 
-def test_the_slider_ends_where_the_tip_is() -> None:
+def test_slider_touches_the_tip_at_the_end() -> None:
     """Deviations along the normal do not add up: a slider that went too far is touched later in the next window."""
     along = np.diag([2e-4, 0.0, 0.0]) ** 2
     model, straight = model_with(along), [0.02, 0.125, 0.0, 4.0]
@@ -146,7 +146,7 @@ def test_the_slider_ends_where_the_tip_is() -> None:
 
 @pytest.mark.parametrize("edge", [0, 1, 2, 3])
 @pytest.mark.parametrize("end", [0.0, 1.0])
-def test_at_a_corner_the_contact_belongs_to_the_edge_it_slid_along(edge: int, end: float) -> None:
+def test_contact_at_a_corner_belongs_to_the_edge_it_slid_along(edge: int, end: float) -> None:
     """A tip that is nearly round the corner faces the other edge more squarely."""
     outline, towards = shape_outline("rect1"), -1.0 if end else 1.0
     contact = outline.contact_on_edge(edge, end + 0.002 * (0.5 - end))
@@ -157,7 +157,7 @@ def test_at_a_corner_the_contact_belongs_to_the_edge_it_slid_along(edge: int, en
     assert later.touch.inputs[0, 2] == pytest.approx(1.2 * towards)
 
 
-def test_a_slider_that_the_tip_has_passed_stays() -> None:
+def test_slider_does_not_move_after_the_tip_has_passed() -> None:
     model = model_with(CERTAIN)
     off, later = ([0.02, 0.24, -1.3, duration] for duration in (3.0, 5.0))
     poses = [rollout(model, AT_REST, CERTAIN, [step], 1) for step in (off, later)]
@@ -166,7 +166,7 @@ def test_a_slider_that_the_tip_has_passed_stays() -> None:
     assert rollout(model, AT_REST, CERTAIN, [PUSH], 1).in_contact[0] == 1.0
 
 
-def test_pushes_of_one_mode_may_lead_to_two() -> None:
+def test_unimodal_steps_can_lead_to_two_modes() -> None:
     """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     short, long = (
@@ -179,7 +179,7 @@ def test_pushes_of_one_mode_may_lead_to_two() -> None:
     assert 0.3 < np.mean(long.samples[turned > 0.9, 2] > 0.0) < 0.7
 
 
-def test_a_heading_is_averaged_on_the_circle() -> None:
+def test_mean_heading_is_circular() -> None:
     heading = np.pi + 0.1 * np.random.default_rng(0).standard_normal(2000)
     mean, covariance = pose_moments(np.column_stack([np.zeros((2000, 2)), heading]))
     assert abs(mean[2]) == pytest.approx(np.pi, abs=0.01)
@@ -188,14 +188,14 @@ def test_a_heading_is_averaged_on_the_circle() -> None:
     assert np.all(np.abs(rolled.samples[:, 2]) <= np.pi) and rolled.covariance[0, 2, 2] < 0.01
 
 
-def test_the_same_seed_gives_the_same_samples_and_another_one_others() -> None:
+def test_seed_determines_the_samples() -> None:
     model = model_with(NOISY)
     one, again, other = (rollout(model, AT_REST, NOISY, [PUSH], 20, seed).samples for seed in (5, 5, 6))
     np.testing.assert_array_equal(one, again)
     assert not np.any(one == other)
 
 
-def test_no_step_leaves_the_samples_of_the_start() -> None:
+def test_rollout_without_steps_returns_the_start_samples() -> None:
     rolled = rollout(model_with(NOISY), np.array([1.0, 2.0, 0.5]), NOISY, np.empty((0, 4)), 5000)
     assert rolled.mean.shape == (0, 3) and rolled.covariance.shape == (0, 3, 3)
     np.testing.assert_allclose(rolled.samples.std(axis=0), SD, rtol=0.05)
@@ -204,13 +204,13 @@ def test_no_step_leaves_the_samples_of_the_start() -> None:
 # --- persistence ----------------------------------------------------------------------------------------------------
 
 
-def test_deviations_correlate_over_the_way_as_told() -> None:
-    told = Persistence(np.array([0.3, 0.0, 0.1]), np.array([0.5, 0.9, 0.0]), np.array([4e-3, 2e-3, 1e-3]))
-    deviations = Deviations(told, np.full(40_000, 3e-3), np.random.default_rng(0))
+def test_deviates_have_the_given_correlation_over_distance() -> None:
+    given = Persistence(np.array([0.3, 0.0, 0.1]), np.array([0.5, 0.9, 0.0]), np.array([4e-3, 2e-3, 1e-3]))
+    deviations = Deviations(given, np.full(40_000, 3e-3), np.random.default_rng(0))
     drawn = np.array([deviations.next() for _ in range(4)])
     np.testing.assert_allclose(np.mean(drawn**2, axis=1), 1.0, atol=0.05)
     for lag in (1, 3):
-        expected = told.correlation(np.array([3e-3 * lag]))[0]
+        expected = given.correlation(np.array([3e-3 * lag]))[0]
         np.testing.assert_allclose(np.mean(drawn[0] * drawn[lag], axis=0), expected, atol=0.03)
 
 
@@ -224,26 +224,26 @@ def pushes_with(persistence: Persistence, pushes: int, windows: int) -> tuple[Ar
     return residuals, PushTable(inputs, np.full(n, 0.2), np.zeros((n, 3)), push_id)
 
 
-def test_persistence_is_found_in_residuals() -> None:
-    told = Persistence(np.array([0.3, 0.0, 0.5]), np.array([0.4, 0.8, 0.0]), np.full(3, 8e-3))
-    found = fit_persistence(*pushes_with(told, 1500, 8))
+def test_fit_recovers_persistence_from_residuals() -> None:
+    given = Persistence(np.array([0.3, 0.0, 0.5]), np.array([0.4, 0.8, 0.0]), np.full(3, 8e-3))
+    found = fit_persistence(*pushes_with(given, 1500, 8))
     way = np.array([4e-3, 8e-3, 16e-3, 28e-3])
-    np.testing.assert_allclose(found.correlation(way), told.correlation(way), atol=0.05)
+    np.testing.assert_allclose(found.correlation(way), given.correlation(way), atol=0.05)
 
 
-def test_independent_windows_show_no_persistence() -> None:
+def test_fit_finds_no_persistence_in_independent_windows() -> None:
     found = fit_persistence(*pushes_with(INDEPENDENT, 1500, 6))
     np.testing.assert_allclose(found.correlation(np.array([4e-3, 2e-2])), 0.0, atol=0.05)
 
 
-def test_few_pushes_show_little_and_pushes_of_one_window_nothing() -> None:
-    told = Persistence(np.full(3, 0.95), np.zeros(3), np.ones(3))
-    many, few = (fit_persistence(*pushes_with(told, pushes, 10)) for pushes in (1000, 5))
+def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
+    given = Persistence(np.full(3, 0.95), np.zeros(3), np.ones(3))
+    many, few = (fit_persistence(*pushes_with(given, pushes, 10)) for pushes in (1000, 5))
     assert np.all(many.correlation(np.array([4e-3])) > 0.85) and np.all(few.correlation(np.array([4e-3])) <= 0.5)
-    np.testing.assert_array_equal(fit_persistence(*pushes_with(told, 30, 1)).correlation(np.array([4e-3])), 0.0)
+    np.testing.assert_array_equal(fit_persistence(*pushes_with(given, 30, 1)).correlation(np.array([4e-3])), 0.0)
 
 
-def test_what_lasts_widens_the_end_of_a_long_push() -> None:
+def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     turned = [
         rollout(model_with(NOISY), AT_REST, CERTAIN, [[0.02, 0.05, 0.0, 3.0]], 1000, persistence=each).covariance[0]
@@ -264,14 +264,14 @@ def learnt() -> PushModel:
 @pytest.mark.parametrize(
     "duration, count", [(0.2, 1), (0.18, 1), (0.22, 1), (0.4, 2), (0.9, 5), (1.0, 5), (0.85, 4), (3.1, 16)]
 )
-def test_a_push_is_cut_into_windows_that_the_model_knows(learnt, duration, count) -> None:
+def test_push_is_divided_into_windows_of_the_training_duration(learnt, duration, count) -> None:
     windows = windows_of(learnt, duration)
     assert windows.count == count and windows.duration * count == pytest.approx(duration)
     assert windows.asked == 0.2 and windows.scale == pytest.approx(windows.duration / 0.2)
     assert 0.9 - 1e-9 <= windows.scale <= 1.1 + 1e-9
 
 
-def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
+def test_displacement_scales_with_duration_within_the_tolerance(learnt) -> None:
     short, long = (rollout(learnt, AT_REST, CERTAIN, [[0.02, 0.1, 0.1, duration]], 200) for duration in (0.2, 0.22))
     np.testing.assert_allclose(long.samples, 1.1 * short.samples, rtol=1e-9)
 
@@ -302,13 +302,13 @@ def test_within_the_tolerance_a_longer_window_goes_further(learnt) -> None:
         ({"slider_mean": [1e300, 0.0, 0.0]}, r"slider_mean: \[1e\+300"),
     ],
 )
-def test_what_cannot_be_rolled_out_is_refused_in_words(learnt, change, message) -> None:
+def test_rejects_invalid_steps_by_name(learnt, change, message) -> None:
     asked = {"slider_mean": AT_REST, "slider_covariance": CERTAIN, "steps": [PUSH], "particles": 10, **change}
     with pytest.raises(RequestError, match=message):
         rollout(learnt, **asked)
 
 
-def test_a_covariance_from_single_precision_is_one() -> None:
+def test_accepts_a_covariance_in_single_precision() -> None:
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
     near_isotropic = np.diag(np.array([1.0e-6, 1.1e-6, 1e-4], dtype=np.float32))
     matrix = (turn @ near_isotropic @ turn.T).astype(np.float64)
@@ -317,7 +317,7 @@ def test_a_covariance_from_single_precision_is_one() -> None:
     rollout(model_with(CERTAIN), AT_REST, matrix, np.empty((0, 4)), 5)
 
 
-def test_a_model_that_nobody_uses_any_more_is_not_kept_for_its_persistence() -> None:
+def test_persistence_cache_does_not_keep_a_model_alive() -> None:
     model = model_with(NOISY)
     persistence_of(model)
     there = weakref.ref(model)
@@ -326,7 +326,7 @@ def test_a_model_that_nobody_uses_any_more_is_not_kept_for_its_persistence() -> 
     assert there() is None
 
 
-def test_a_rollout_that_is_not_wanted_any_more_stops_between_windows() -> None:
+def test_cancelled_rollout_stops_between_windows() -> None:
     asked = []
 
     def check_cancelled() -> None:
@@ -339,7 +339,7 @@ def test_a_rollout_that_is_not_wanted_any_more_stops_between_windows() -> None:
     assert len(asked) == 3
 
 
-def test_a_singular_covariance_of_the_start_is_accepted() -> None:
+def test_accepts_a_singular_start_covariance() -> None:
     axis = np.array([1e-3, -2e-3, 1e-2])
     samples = rollout(model_with(CERTAIN), AT_REST, np.outer(axis, axis), np.empty((0, 4)), 50).samples
     np.testing.assert_allclose(np.cross(samples, axis), 0.0, atol=1e-9)
@@ -360,7 +360,7 @@ class Attentive:
         return np.tile([1e-3, 0.0, 0.1], (len(push.inputs), 1)), covariance, covariance
 
 
-def test_covariates_of_the_pose_are_those_of_each_sample() -> None:
+def test_pose_covariates_are_those_of_each_sample() -> None:
     predictor = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))
     model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
     start = np.array([0.1, 0.2, 3.1])
@@ -372,7 +372,7 @@ def test_covariates_of_the_pose_are_those_of_each_sample() -> None:
     np.testing.assert_allclose(second["slider_heading"], 3.2 - 2.0 * np.pi)
 
 
-def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each_sample() -> None:
+def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
     table = rows(100)
     table = replace(table, covariates={"slider_heading": np.random.default_rng(1).uniform(-3.0, 3.0, 100)})
     base = train_model(table, square_rig(), "gp", name="learnt")
@@ -396,7 +396,7 @@ def test_a_model_whose_friction_has_a_grain_is_rolled_out_by_the_heading_of_each
     assert moved[0] != pytest.approx(moved[1], abs=1e-5)
 
 
-def test_a_covariate_that_no_pose_tells_is_refused_by_name() -> None:
+def test_rejects_a_covariate_that_the_pose_does_not_give_by_name() -> None:
     predictor = Attentive(("slider_heading", "elapsed_time"))
     model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
     with pytest.raises(RequestError, match=r"made.*this one needs elapsed_time$"):
@@ -406,7 +406,7 @@ def test_a_covariate_that_no_pose_tells_is_refused_by_name() -> None:
 # --- what the benchmark measures by ---------------------------------------------------------------------------------
 
 
-def test_the_energy_distance_of_equal_laws_is_zero_and_grows_with_their_distance() -> None:
+def test_energy_distance_is_zero_for_equal_distributions_and_grows_with_their_distance() -> None:
     rng = np.random.default_rng(0)
     draws = [rng.standard_normal((400, 3)) for _ in range(41)]
     same = np.array([EnergyDistance(one, draws[0], 0.5).value() for one in draws[1:]])
@@ -415,7 +415,7 @@ def test_the_energy_distance_of_equal_laws_is_zero_and_grows_with_their_distance
     assert same.max() < shifted[0] < shifted[1] < shifted[2] and shifted[2] == pytest.approx(60.0, rel=0.1)
 
 
-def test_repeats_drawn_twice_are_not_compared_with_themselves() -> None:
+def test_bootstrap_does_not_compare_a_repetition_with_itself() -> None:
     rng = np.random.default_rng(1)
     samples, truth = rng.standard_normal((50, 3)), rng.standard_normal((30, 3))
     distance, weight = EnergyDistance(samples, truth, 1.0), np.tile([2.0, 0.0], 15)

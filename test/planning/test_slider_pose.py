@@ -1,4 +1,4 @@
-"""From poses in the world to the slider's pose after the push: contact, symmetries, covariance, refusals."""
+"""Prediction of the slider's pose in the world: contact, symmetries, covariance, rejected requests."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def refusal(push: WorldPush, predictor: PushModel | None = None) -> str:
 
 @pytest.mark.parametrize("shape", OUTLINES)
 @pytest.mark.parametrize("angle", [-1.2, 0.0, 0.4])
-def test_it_is_what_the_model_says_of_the_contact_that_was_meant(shape: str, angle: float) -> None:
+def test_prediction_equals_that_of_the_model_at_the_contact(shape: str, angle: float) -> None:
     model = model_of(shape)
     for contact in np.arange(24) / 24.0 + 0.02:  # every edge of every outline
         push = push_at(shape, contact, angle)
@@ -102,14 +102,14 @@ def test_it_is_what_the_model_says_of_the_contact_that_was_meant(shape: str, ang
         assert after.in_domain == bool(expected.in_domain[0])
 
 
-def test_a_push_through_the_centre_moves_the_slider_with_the_tip() -> None:
+def test_push_through_the_centre_moves_the_slider_with_the_tip() -> None:
     after = slider_after(model_of("rect1"), push_at("rect1", 0.125, 0.0, pose=(0.0, 0.0, 0.0)))
     assert np.all(np.abs(after.pose - [SPEED * DURATION, 0.0, 0.0]) < 1e-9)
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(sorted(OUTLINES)), st.floats(0.0, 0.999), st.floats(-1.3, 1.3), METRES, METRES, ANGLES)
-def test_turning_and_shifting_the_world_turns_and_shifts_the_outcome(
+def test_prediction_is_equivariant_under_rotation_and_translation(
     shape: str, contact: float, angle: float, x: float, y: float, turn: float
 ) -> None:
     edge, fraction = OUTLINES[shape].edge(np.array([contact]))
@@ -127,7 +127,7 @@ def test_turning_and_shifting_the_world_turns_and_shifts_the_outcome(
 
 
 @pytest.mark.parametrize("angle", [-0.5, 0.2])
-def test_the_four_sides_of_a_square_are_one(angle: float) -> None:
+def test_four_sides_of_a_square_are_equivalent(angle: float) -> None:
     """A slider turned by a quarter looks the same, and a push that stays where it is meets another side of it."""
     push, model = push_at("rect1", 0.05, angle), model_of("rect1", "vhgp")
     first = slider_after(model, push)
@@ -140,7 +140,7 @@ def test_the_four_sides_of_a_square_are_one(angle: float) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.0, 0.999), st.floats(-1.3, 1.3), ANGLES)
-def test_the_covariance_is_that_of_samples_carried_into_the_world(contact: float, angle: float, turn: float) -> None:
+def test_covariance_equals_that_of_transformed_samples(contact: float, angle: float, turn: float) -> None:
     model = model_of("ellip2")
     push = push_at("ellip2", contact, angle, pose=(1.0, 2.0, turn))
     after = slider_after(model, push)
@@ -154,7 +154,7 @@ def test_the_covariance_is_that_of_samples_carried_into_the_world(contact: float
     np.testing.assert_allclose(axes @ after.covariance @ axes.T, in_push_frame, rtol=1e-6, atol=1e-16)
 
 
-def test_a_covariance_off_the_diagonal_is_carried_over() -> None:
+def test_off_diagonal_covariance_is_transformed() -> None:
     """Made-up predictions with a full covariance, whatever the models of today know."""
 
     class Correlated(PushModel):
@@ -169,7 +169,7 @@ def test_a_covariance_off_the_diagonal_is_carried_over() -> None:
     np.testing.assert_allclose(slider_after(model, push).covariance, expected, atol=1e-20)
 
 
-def test_a_served_model_answers_as_its_table_does() -> None:
+def test_tabulated_model_gives_the_prediction_of_its_table() -> None:
     tabulated = tabulate(model_of("rect1", "gp"))
     assert isinstance(tabulated, TabulatedModel) and tabulated.tabulated
     push = push_at("rect1", 0.1, 0.3)
@@ -194,7 +194,7 @@ def same(one: SliderAfter, other: SliderAfter) -> None:
     np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-6)
 
 
-def test_at_a_corner_the_edge_that_faces_the_tip_is_pushed() -> None:
+def test_push_at_a_corner_uses_the_edge_that_faces_the_tip() -> None:
     """Edge 2 of the square faces +x and ends at this corner; edge 3 faces +y and begins there."""
     model, driving = model_of("rect1"), np.radians(225.0)
     end_of_2, start_of_3 = (
@@ -210,7 +210,7 @@ def test_at_a_corner_the_edge_that_faces_the_tip_is_pushed() -> None:
 
 
 @pytest.mark.parametrize("towards", [0.1, 0.7, 0.9, 1.4])
-def test_at_a_corner_the_other_edge_is_pushed_where_the_nearer_is_not(towards: float) -> None:
+def test_push_at_a_corner_uses_the_other_edge_if_the_nearer_is_not_pushed(towards: float) -> None:
     """Driving along -x pushes on edge 2 and slides along edge 3, whichever is nearer to the tip."""
     model = model_of("rect1")
     expected = model.predict_rows(np.array([[SPEED, 0.75 - 1e-12, 0.0]]), np.array([DURATION])).mean[0]
@@ -219,14 +219,14 @@ def test_at_a_corner_the_other_edge_is_pushed_where_the_nearer_is_not(towards: f
 
 
 @pytest.mark.parametrize("driving", [0.0, np.pi / 4.0, np.pi / 2.0])
-def test_at_a_corner_moving_off_is_refused(driving: float) -> None:
+def test_rejects_a_tip_that_moves_away_from_a_corner(driving: float) -> None:
     assert "degrees from it" in refusal(at_corner(np.pi / 4.0, driving))
 
 
 # --- replayed windows -------------------------------------------------------------------------------------------
 
 
-def test_recorded_windows_get_the_prediction_that_the_validator_shows() -> None:
+def test_recorded_windows_get_the_prediction_of_the_validator() -> None:
     """The tip's line at a window's start leads to the window's contact and to the same outcome."""
     recording, tabulated = read_recording(BAGS / "square_abs_test"), tabulate(model_of("rect1", "vhgp"))
     windows = find_windows(recording, recording.rig)[::4]
@@ -262,7 +262,7 @@ def leaning(covariate: str) -> PushModel:
 
 
 @pytest.mark.parametrize("name", TOLD)
-def test_what_the_poses_tell_need_not_be_brought(name: str) -> None:
+def test_covariates_known_from_the_poses_can_be_omitted(name: str) -> None:
     model, push = leaning(name), push_at("rect1", 0.1, -0.5, gap=4e-4, pose=(0.4, -0.3, 7.0))
     assert model.needs == (name,)
     heading = float(np.arctan2(push.velocity[1], push.velocity[0]))
@@ -279,14 +279,14 @@ def test_what_the_poses_tell_need_not_be_brought(name: str) -> None:
 
 @pytest.mark.parametrize("name", TOLD)
 @pytest.mark.parametrize("off", [0.01, -0.01, np.nan, np.inf])
-def test_a_covariate_that_contradicts_the_poses_is_refused(name: str, off: float) -> None:
+def test_rejects_a_covariate_that_contradicts_the_poses(name: str, off: float) -> None:
     push = push_at("rect1", 0.1, 0.0, pose=(0.0, 0.0, 0.0))
     message = refusal(replace(push, covariates={name: off}))
     assert message.startswith(f"covariate {name}: {off!r} is not accepted, give ")
     assert "which follows from the poses, or omit it" in message
 
 
-def test_what_the_poses_do_not_tell_must_be_brought() -> None:
+def test_other_covariates_are_required() -> None:
     model, push = leaning("elapsed_time"), push_at("rect1", 0.1, -0.5)
     assert refusal(push, model).startswith("covariate elapsed_time: 'missing'")
     early, late = (slider_after(model, replace(push, covariates={"elapsed_time": t})).pose for t in (0.0, 3.0))
@@ -309,16 +309,16 @@ def test_what_the_poses_do_not_tell_must_be_brought() -> None:
         ({"covariates": {"topic:/warmth": np.inf}}, "covariate topic:/warmth: inf"),
     ],
 )
-def test_bad_values_are_refused_by_field(change: dict, begins: str) -> None:
+def test_rejects_invalid_values_by_field(change: dict, begins: str) -> None:
     assert refusal(replace(push_at("rect1", 0.1, 0.0), **change)).startswith(begins)
 
 
-def test_a_learnt_model_refuses_a_duration_that_it_never_saw() -> None:
+def test_learnt_model_rejects_a_duration_outside_its_training() -> None:
     assert "duration: 3.0" in refusal(replace(push_at("rect1", 0.1, 0.0), duration=3.0), model_of("rect1", "gp"))
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
+def test_rejects_a_tip_without_contact_and_states_the_gap(shape: str) -> None:
     model = model_of(shape)
     assert slider_after(model, push_at(shape, 0.1, 0.2, gap=0.99 * MAX_GAP)) is not None
     message = refusal(push_at(shape, 0.1, 0.2, gap=0.0123), model)
@@ -327,7 +327,7 @@ def test_a_tip_that_does_not_touch_is_refused_with_its_gap(shape: str) -> None:
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_contact_from_inside_is_refused(shape: str) -> None:
+def test_rejects_a_tip_inside_the_slider(shape: str) -> None:
     model = model_of(shape)
     assert slider_after(model, push_at(shape, 0.1, 0.2, gap=-0.99 * MAX_DEPTH)) is not None
     assert "it is 0.004 m inside the outline" in refusal(push_at(shape, 0.1, 0.2, gap=-0.004), model)
@@ -337,13 +337,13 @@ def test_contact_from_inside_is_refused(shape: str) -> None:
 
 
 @pytest.mark.parametrize(("degrees", "shown"), [(90.0, "90.0"), (-100.0, "-100.0"), (135.0, "135.0"), (180.0, "180.0")])
-def test_a_tip_that_moves_away_or_along_is_refused_with_its_angle(degrees: float, shown: str) -> None:
+def test_rejects_a_tip_that_moves_away_or_along_and_states_the_angle(degrees: float, shown: str) -> None:
     message = refusal(push_at("rect1", 0.1, np.radians(degrees) * (1.0 + 1e-12), pose=(0.0, 0.0, 0.0)))
     assert message.startswith("pusher_velocity: (")
     assert f"it is {shown} degrees from it" in message or (degrees == 180.0 and "-180.0 degrees from it" in message)
 
 
-def test_an_outline_with_a_notch_is_touched_where_the_tip_is() -> None:
+def test_concave_outline_is_touched_at_the_tip() -> None:
     """A tip between two arms is outside, though the outline is around it."""
     vertices = np.array([[-0.04, -0.04], [0.06, -0.04], [0.06, -0.02], [0.0, -0.02], [0.0, 0.02], [0.06, 0.02]])
     vertices = np.vstack([vertices, [[0.06, 0.04], [-0.04, 0.04]]])

@@ -1,4 +1,4 @@
-"""The alarm: evidence that a model no longer fits, valid after every push.
+"""The alarm: sequential evidence that a model no longer fits, valid after every push.
 
 Import `evidence` and `scores`.
 """

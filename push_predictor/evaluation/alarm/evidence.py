@@ -1,10 +1,10 @@
-"""An alarm that may be read after every push: it is ever false with at most a chosen probability.
+"""An alarm that can be checked after every push: without a change it fires with probability at most `rate`.
 
-Each push gives scores. Under exchangeability with the calibration pushes the rank of a new score among all scores so
-far, ties broken at random, makes p values that are independent and uniform (Vovk, Gammerman and Shafer 2005, section
-7.1: conformal transducers). On each score bets are laid that these p values are too often near 0 (or near 1): a test
-martingale, a mixture over the bets and over the push at which the change began. A weighted union over the scores takes
-no account of how these depend on each other:
+Each push gives several scores. If it is exchangeable with the calibration pushes, the rank of a new score among all
+scores so far, with ties broken at random, gives p values that are independent and uniform (Vovk, Gammerman and Shafer
+2005, section 7.1: conformal transducers). Each score bets that these p values are too often near 0 (or near 1). The
+capital is a test martingale, a mixture over the bets and over the push at which the change began. The weighted union
+over the scores holds however they depend on each other:
 
     P(max over scores of weight * martingale ever reaches 1 / rate) <= sum of weights * rate = rate    (Ville)
 """
@@ -22,16 +22,16 @@ from push_predictor.errors import RequestError
 from push_predictor.types import Array
 
 DEFAULT_RATE = 0.01
-POWERS = (0.2, 0.4, 0.6, 0.8)  # of the bets e p^(e - 1)
-PATIENCE = 50.0  # pushes; a change is expected early, but never ruled out: P(not begun by t) = (1 + t / this)^-1/2
-SMALLEST = 1e-12  # p value; a bet on less would be lost in rounding
-SIZE = "size of the residual"  # the score that measures how large the errors are
-MOST_KEPT = 20_000  # scores of each kind that a new one is ranked among; beyond that the oldest new ones are dropped
+POWERS = (0.2, 0.4, 0.6, 0.8)  # exponents e of the bets e p^(e - 1)
+PATIENCE = 50.0  # pushes; prior of the change: P(not begun by push t) = (1 + t / PATIENCE)^-1/2
+SMALLEST = 1e-12  # p value; smaller ones are rounding errors
+SIZE = "size of the residual"  # name of the score that measures how large the errors are
+MOST_KEPT = 20_000  # scores of each kind that are ranked; beyond that the oldest new ones are dropped
 
 
 @dataclass(frozen=True)
 class ScoreKind:
-    """What a score is called, its share of the false alarms (all sum to one), and whether low values count too."""
+    """Name of a score, its share of the false alarms (they sum to one), and whether low values count too."""
 
     name: str
     weight: float
@@ -40,10 +40,11 @@ class ScoreKind:
 
 @dataclass(frozen=True)
 class AlarmState:
-    """What the alarm has seen.
+    """The state of an alarm.
 
-    log10_evidence: of the present; it fires at `threshold`. strongest: the score that has it. fired_at: the push
-    (None: not yet), fired_after: how many pushes had been seen then, fired_evidence: the evidence then, of which score.
+    log10_evidence: current evidence, the alarm fires at `threshold`; strongest: the score with this evidence.
+    fired_at: the push at which it fired (None: not yet); fired_after: number of pushes until then; fired_evidence,
+    fired_by: evidence and score at that push.
     """
 
     false_alarm_rate: float
@@ -59,15 +60,15 @@ class AlarmState:
 
     @property
     def fired(self) -> bool:
-        """Whether it has fired."""
+        """Whether the alarm has fired."""
         return self.fired_at is not None
 
 
 class Alarm:
-    """Feed it the scores of one push after the other; it fires at most once, until it is reset.
+    """A sequential test on the scores of pushes. It fires at most once until it is reset.
 
-    kinds: the k scores of a push. calibration (n, k): scores of pushes that the model fits. seed: breaks ties.
-    Raises RequestError for a rate outside (0, 1), and for scores that are not finite.
+    kinds: the k scores of a push. calibration (n, k): scores of pushes that the model fits. seed: for random ties.
+    Raises RequestError for a rate outside (0, 1) and for scores that are not finite.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Alarm:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all pushes but those of the calibration: it may fire again."""
+        """Forget all pushes except the calibration, so that the alarm can fire again."""
         self._rng = np.random.default_rng(self._seed)
         self._rank = [_Ranking(column) for column in self._calibration.T]
         self._bets = [_Bets(kind.two_sided) for kind in self.kinds]
@@ -89,7 +90,7 @@ class Alarm:
         self._fired: tuple[str, int, float, str] | None = None
 
     def add(self, push_id: str, scores: Array) -> bool:
-        """Take the scores (k,) of a push; answers whether the alarm fires at this very push."""
+        """Add the scores (k,) of a push; return whether the alarm fires at this push."""
         self._check(scores)
         chance = 1.0 - self._rng.random(len(self.kinds))
         for ranking, bets, score, u in zip(self._rank, self._bets, scores.tolist(), chance.tolist(), strict=True):
@@ -103,12 +104,12 @@ class Alarm:
 
     @property
     def threshold(self) -> float:
-        """Log10 of the evidence at which it fires."""
+        """Log10 of the evidence at which the alarm fires."""
         return float(-np.log10(self.rate))
 
     @property
     def state(self) -> AlarmState:
-        """What it has seen so far."""
+        """The state after all pushes so far."""
         seen = (self.rate, self.threshold, self._pushes, *self._evidence(), len(self._calibration))
         return AlarmState(*seen, *(self._fired or ()))
 
@@ -124,14 +125,14 @@ class Alarm:
 
 
 def checked_rate(rate: float) -> float:
-    """The rate, if it is one. Raises RequestError."""
+    """Return the rate. Raises RequestError unless it is in (0, 1)."""
     if not 0.0 < rate < 1.0:
         raise RequestError("false_alarm_rate", rate, "a number above 0 and below 1")
     return float(rate)
 
 
 def alarm_json(state: AlarmState | None, off: str = "") -> dict[str, object]:
-    """The field `alarm` of the JSON of `validate`. state: None where no alarm could be kept, off: why."""
+    """The field `alarm` of the JSON of `validate`; state None: no alarm is possible, for the reason `off`."""
     if state is None:
         return {"fired": False, "off": off}
     return {
@@ -159,7 +160,7 @@ def alarm_sentence(alarm: Mapping[str, Any]) -> str:
 
 
 def with_alarm(text: str, alarm: Mapping[str, object]) -> str:
-    """The JSON text of a validation with the field `alarm` in it."""
+    """The JSON text of a validation with the field `alarm` added."""
     return json.dumps({**json.loads(text), "alarm": dict(alarm)}, indent=2, allow_nan=False) + "\n"
 
 
@@ -172,14 +173,14 @@ def _finding(score: str) -> str:
 
 
 class _Ranking:
-    """Scores so far, in order, so that a new one is ranked in no time."""
+    """The scores so far in sorted order, which makes ranking a new one fast."""
 
     def __init__(self, calibration: Array) -> None:
         self._sorted = np.sort(calibration)
         self._new: list[float] = []
 
     def p_value(self, score: float, chance: float) -> float:
-        """Share of the scores, the new one among them, that are above it; chance: of those equal to it, the share."""
+        """Share of the scores, including the new one, that exceed it; ties count with the fraction `chance`."""
         low, high = np.searchsorted(self._sorted, score, "left"), np.searchsorted(self._sorted, score, "right")
         above, equal = len(self._sorted) - high, high - low
         p_value = (above + chance * (equal + 1)) / (len(self._sorted) + 1)
@@ -195,7 +196,7 @@ class _Ranking:
 
 
 class _Bets:
-    """The martingale of one score: capital that waits, and capital that is on the bets, each since its own push."""
+    """The test martingale of one score: capital in reserve, and capital in bets that start at different pushes."""
 
     def __init__(self, two_sided: bool) -> None:
         count = len(POWERS) * (2 if two_sided else 1)
@@ -203,8 +204,8 @@ class _Bets:
         self._log_running = np.full(count, -np.inf)
 
     def add(self, p_value: float) -> None:
-        """Start bets with a part of what waits, and settle all by a p value."""
-        log_started = np.log((_waiting(self._seen) - _waiting(self._seen + 1)) / self._count)
+        """Start bets with part of the reserve and settle all bets with a p value."""
+        log_started = np.log((_reserve(self._seen) - _reserve(self._seen + 1)) / self._count)
         self._seen += 1
         tails = (p_value, 1.0 - p_value) if self._two_sided else (p_value,)
         won = np.concatenate([_log_bets(max(tail, SMALLEST)) for tail in tails])
@@ -212,12 +213,12 @@ class _Bets:
 
     @property
     def log10(self) -> float:
-        """Log10 of all capital; it began with 1."""
-        everything = np.append(self._log_running, np.log(_waiting(self._seen)))
+        """Log10 of the total capital, which starts at 1."""
+        everything = np.append(self._log_running, np.log(_reserve(self._seen)))
         return float(np.logaddexp.reduce(everything) / np.log(10.0))
 
 
-def _waiting(pushes: int) -> float:
+def _reserve(pushes: int) -> float:
     return float((1.0 + pushes / PATIENCE) ** -0.5)
 
 

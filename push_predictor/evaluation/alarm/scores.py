@@ -1,8 +1,8 @@
-"""The scores of a push by which the alarm judges it, and those of the training pushes, to which it compares them.
+"""The scores of a push that the alarm tests, and those of the training pushes for comparison.
 
-A training push is judged by the model without its fold of pushes, with hyperparameters as they are
-(push_predictor.models.gaussian_process.cross_validation). So its residuals are those of a push that the model has not
-seen, but for a slightly smaller training set.
+A training push is scored by cross-validation: by the model without its fold of pushes, with unchanged hyperparameters
+(push_predictor.models.gaussian_process.cross_validation). So its residuals are those of a new push, up to a slightly
+smaller training set.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array
 
 FOLDS = 10
-FEWEST_PUSHES = 10  # of the calibration; below that no evidence would come of hundreds of pushes
-MEAN_SIZE = 0.9247  # of the cube root of the mean of three squared standard normals
-SIZE_WEIGHT, OUTPUT_WEIGHT = 0.3, 0.2  # shares of the false alarms; the mechanisms have the rest
+FEWEST_PUSHES = 10  # calibration pushes; with fewer even hundreds of pushes give no evidence
+MEAN_SIZE = 0.9247  # mean of the cube root of the mean of three squared standard normals
+SIZE_WEIGHT, OUTPUT_WEIGHT = 0.3, 0.2  # shares of the false-alarm rate; the mechanisms share the rest
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What an alarm needs to know about a model.
+    """The scores of a model's training pushes, to which the alarm compares new pushes.
 
-    kinds (k,) and scores (n, k) of its n training pushes. mechanisms: of the library, those that can be computed from
-    what the training windows hold. alike (k,): correlation between windows of one push, of what each score is made of.
+    kinds (k,) and scores (n, k) of the n training pushes. mechanisms: those of the library that can be computed from
+    the training windows. window_correlation (k,): correlation of each score's terms between windows of a push.
     """
 
     kinds: tuple[ScoreKind, ...]
     scores: Array
     mechanisms: tuple[Mechanism, ...]
     physics: AnalyticalPush
-    alike: Array
+    window_correlation: Array
 
 
 class AlarmMonitor:
-    """The alarm of one model: takes windows and what was predicted for them, push after push.
+    """The alarm of one model, fed with windows and their predictions push by push.
 
-    A push that was seen already, as in a replay that is played again, is no news and is not counted. skipped: pushes
-    that could not be judged, and why. Raises RequestError for a rate outside (0, 1).
+    A push that was counted before, for instance in a repeated replay, is ignored. skipped: pushes that cannot be
+    scored, with the reason. Raises RequestError for a rate outside (0, 1).
     """
 
     def __init__(self, calibration: Calibration, rate: float = DEFAULT_RATE, seed: int = 0) -> None:
@@ -67,7 +67,7 @@ class AlarmMonitor:
         self.skipped: list[str] = []
 
     def add(self, windows: PushTable, mean: Array, covariance: Array) -> str | None:
-        """Take whole pushes, predicted mean (n, 3), covariance (n, 3, 3); answers the push at which it fires."""
+        """Add whole pushes with predicted mean (n, 3) and covariance (n, 3, 3); return the push at which it fires."""
         fired = None
         scores = _scores_by_push(self._calibration, windows, mean, covariance)
         for push in windows.pushes:
@@ -85,14 +85,14 @@ class AlarmMonitor:
 
     @property
     def state(self) -> AlarmState:
-        """What the alarm has seen so far."""
+        """The state of the alarm after all pushes so far."""
         return self._alarm.state
 
 
 def alarm_state(
     calibration: Calibration, windows: PushTable, mean: Array, covariance: Array, rate: float = DEFAULT_RATE
 ) -> AlarmState:
-    """The alarm after all pushes of a table, in the order of its rows: what push_validator says in the end."""
+    """The state of the alarm after all pushes of a table in row order, as push_validator reports it."""
     monitor = AlarmMonitor(calibration, rate)
     monitor.add(windows, mean, covariance)
     return monitor.state
@@ -111,7 +111,7 @@ def recording_alarm(
 
 
 def calibrate(model: PushModel) -> Calibration:
-    """The scores of a model's training pushes. Raises RequestError where they are fewer than FEWEST_PUSHES."""
+    """Score a model's training pushes by cross-validation. Raises RequestError for fewer than FEWEST_PUSHES."""
     table = model.training
     if len(table.pushes) < FEWEST_PUSHES:
         raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
@@ -120,7 +120,7 @@ def calibrate(model: PushModel) -> Calibration:
     blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, model.base.predictor.physics, np.empty(0))
     rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
     parts = _parts(blank, table, mean, covariance)
-    known = replace(blank, alike=np.array([_alike(*part, rows) for part in parts]))
+    known = replace(blank, window_correlation=np.array([_window_correlation(*part, rows) for part in parts]))
     return replace(known, scores=np.array([_scores(known, [(a[r], b[r]) for a, b in parts]) for r in rows]))
 
 
@@ -131,10 +131,10 @@ def held_out_moments(model: PushModel) -> tuple[Array, Array]:
 
 
 def _scores_by_push(calibration: Calibration, windows: PushTable, mean: Array, covariance: Array) -> dict[str, Array]:
-    """Scores (k,) of each push, NaN where a covariate is missing.
+    """Scores (k,) of each push, NaN if a covariate is missing.
 
-    Computed for many pushes at once, which takes little longer than for one; long windows, whose integration takes its
-    steps from the longest, push by push, lest a score depend on what it is computed with.
+    Pushes are scored together, which takes little longer than for one. Pushes with long windows are scored one by one:
+    the longest window sets the integration step, and a score must not depend on other pushes.
     """
     far = windows.inputs[:, 0] * windows.duration > FEWEST_STEPS * LONGEST_STEP
     alone = set(windows.push_id[far].tolist())
@@ -155,7 +155,7 @@ def _computable(mechanism: Mechanism, table: PushTable) -> bool:
 
 
 def _kinds(mechanisms: Sequence[Mechanism]) -> tuple[ScoreKind, ...]:
-    outputs = [f"{name}{way}" for way in ("", " by the side of the push") for name in OUTPUTS]
+    outputs = [f"{name}{side}" for side in ("", " by the side of the push") for name in OUTPUTS]
     named = [f"{m.name}: {parameter.name}" for m in mechanisms for parameter in m.parameters]
     share = (1.0 - SIZE_WEIGHT - OUTPUT_WEIGHT) / max(len(named), 1)
     rest = [ScoreKind(name, OUTPUT_WEIGHT / len(outputs), True) for name in outputs]
@@ -163,9 +163,9 @@ def _kinds(mechanisms: Sequence[Mechanism]) -> tuple[ScoreKind, ...]:
 
 
 def _parts(calibration: Calibration, table: PushTable, mean: Array, covariance: Array) -> list[tuple[Array, Array]]:
-    """What each score is made of: by window how far it points its way (n,), and how far chance would, (n,)."""
+    """The terms of each score: the window's residual along its direction (n,), and that direction's norm (n,)."""
     z = standardised(mean, covariance, table.outcomes)
-    size = np.cbrt(np.mean(z**2, axis=1)) - MEAN_SIZE  # nearly normal, so that few or many windows make little odds
+    size = np.cbrt(np.mean(z**2, axis=1)) - MEAN_SIZE  # nearly normal, so that the number of windows matters little
     side = np.sign(table.inputs[:, 2])
     generic = np.concatenate([np.eye(3)[None] * np.ones((len(z), 1, 1)), np.eye(3)[None] * side[:, None, None]], axis=2)
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
@@ -177,8 +177,8 @@ def _parts(calibration: Calibration, table: PushTable, mean: Array, covariance: 
     return [(size, np.ones(len(z))), *zip(along.T, reach.T, strict=True)]
 
 
-def _alike(along: Array, reach: Array, rows: Sequence[np.ndarray]) -> float:
-    """Correlation between the windows of a push, by moments over the pushes (0 where none has two windows)."""
+def _window_correlation(along: Array, reach: Array, rows: Sequence[np.ndarray]) -> float:
+    """Correlation between windows of a push, by the method of moments; 0 if no push has two windows."""
     together = sum(float(along[r].sum() ** 2 - np.sum(along[r] ** 2)) for r in rows)
     pairs = sum(float(reach[r].sum() ** 2 - np.sum(reach[r] ** 2)) for r in rows)
     alone = float(np.sum(along**2)) / max(float(np.sum(reach**2)), np.finfo(float).tiny)
@@ -186,10 +186,10 @@ def _alike(along: Array, reach: Array, rows: Sequence[np.ndarray]) -> float:
 
 
 def _scores(calibration: Calibration, parts: Sequence[tuple[Array, Array]]) -> Array:
-    """Of one push: the sum over its windows, over the standard deviation that the sum of as many would have."""
+    """Scores of one push: the sum over its windows divided by the standard deviation of that sum."""
     scores = np.zeros(len(parts))
     for k, (along, reach) in enumerate(parts):
         square = float(np.sum(reach**2))
-        spread = square + calibration.alike[k] * (float(reach.sum()) ** 2 - square)
+        spread = square + calibration.window_correlation[k] * (float(reach.sum()) ** 2 - square)
         scores[k] = 0.0 if spread == 0.0 else along.sum() / np.sqrt(spread)
     return scores
