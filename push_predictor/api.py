@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.metrics_text import metrics_lines
 from push_predictor.evaluation.offline import validate_recording, window_options
@@ -102,6 +103,7 @@ class Validation:
         return "\n".join(metrics_lines(self.metrics))
 
 
+@one_blas_thread()
 def validate(model: PushModel, recording: AnyPath, *, rig: Rig | AnyPath | None = None) -> Validation:
     """Predict every window of a recording that the model was not trained on, and score the predictions.
 
@@ -110,6 +112,7 @@ def validate(model: PushModel, recording: AnyPath, *, rig: Rig | AnyPath | None 
     return Validation(*validate_recording(model, Path(recording), _rig(rig)))
 
 
+@one_blas_thread()
 def trace(
     model: PushModel,
     data: AnyPath | Sequence[AnyPath],
@@ -133,6 +136,7 @@ def trace(
     return trace_loaded(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 
+@one_blas_thread()
 def choose_push(
     model: PushModel | Repertoire, slider: Sequence[float], goal: Goal, *, probability: float = 0.9
 ) -> choose.Choice | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,37 @@ def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone():
         train(TRAINING, kind="gp", n_train=40, watch=watch)
         after = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
     assert during == {1} and before == after
+
+
+def blas_threads() -> list[int]:
+    return [pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
+
+
+@pytest.mark.parametrize(
+    ("step", "call"),
+    [
+        ("push_predictor.models.store.model_file.read_arrays", lambda model: load_model("resource/none.pushmodel")),
+        ("push_predictor.api.validate_recording", lambda model: validate(model, TEST)),
+        (
+            "push_predictor.api.model_repertoire",
+            lambda model: choose_push(model, [0.0, 0.0, 0.0], Goal([0.03, 0.0, 0.0], 0.01, None)),
+        ),
+        ("push_predictor.api.window_options", lambda model: trace(model, TEST)),
+    ],
+)
+def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pytest.MonkeyPatch, step: str, call: Any):
+    during: list[int] = []
+
+    def reached(*arguments: object) -> None:
+        during.extend(blas_threads())
+        raise PushPredictorError("reached")
+
+    monkeypatch.setattr(step, reached)
+    with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        with pytest.raises(PushPredictorError, match="reached"):
+            call(replace(model, name="fresh"))
+        assert set(during) == {1} and blas_threads() == before
 
 
 def test_the_name_is_the_first_files_stem_and_the_provenance_names_the_data(model: PushModel, tmp_path: Path):

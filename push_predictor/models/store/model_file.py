@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from push_predictor import __version__
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import ModelFileError, PushPredictorError
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
 from push_predictor.models.store.arrays_record import read_arrays
@@ -47,6 +48,7 @@ def save_model(model: PushModel, path: Path) -> None:
     write_whole(path, buffer.getvalue())
 
 
+@one_blas_thread()
 def load_model(path: str | os.PathLike[str]) -> PushModel:
     """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of a newer version."""
     path = Path(path)
