@@ -64,7 +64,7 @@ COVARIATES: dict[str, str] = {
     "previous_residual": "the residual of the previous push",
     "recording": "recording",
     "session": "session",
-    CONSTANT: "no covariate (constant)",
+    CONSTANT: "nothing (constant)",
 }
 
 

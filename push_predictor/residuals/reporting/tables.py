@@ -32,7 +32,8 @@ def effects_table(trace: Trace) -> str:
         "the analysis pushes. p: family-wise, over all candidates. Along a covariate, the value is the change over its "
         "range."
     )
-    return html.table(caption, head, rows)
+    used = [k for k in range(len(head)) if any(row[k] != html.NOTHING for row in rows)]
+    return html.table(caption, [head[k] for k in used], [[row[k] for k in used] for row in rows])
 
 
 def shifts_table(trace: Trace) -> str:

@@ -25,15 +25,14 @@ from push_predictor.residuals.reporting.phrases import (
 from push_predictor.residuals.reporting.quantities import count, estimate, in_shown_unit, p_text
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 
+FURTHER = "In addition"
 FORCE = "surface_friction"  # its size is a share of the force
 UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
 
 
 def verdict_sentence(trace: Trace, where: str = "below") -> str:
     """The verdict in a few sentences: answer, size, rivals; where: the place that lists pushes that would decide."""
-    first, _, rest = EVIDENCE[trace.verdict](trace).partition(". ")
-    joined = f" ({first.removesuffix('.')})." if first.startswith("p = ") else f": {first.removesuffix('.')}."
-    return f"{headline(trace)}{joined}{f' {rest}' if rest else ''}{_rivals(trace, where)}"
+    return f"{_joined(headline(trace), EVIDENCE[trace.verdict](trace))}{_rivals(trace, where)}"
 
 
 def headline(trace: Trace) -> str:
@@ -57,10 +56,7 @@ def worth_sentence(trace: Trace) -> str:
     """What the finding means for the motion model, and the gain on held-out pushes."""
     pushes = count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
     if trace.verdict == "measurement":
-        return (
-            "The motion model stays unchanged. Correct the measurement, then trace again. "
-            f"With corrected streams the model's negative log density {_change(trace.held_out.before, trace, 'after')}."
-        )
+        return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
     if not trace.terms:
         retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
         return f"The motion model stays unchanged: no effect on the mean motion was found.{retrain}"
@@ -70,6 +66,14 @@ def worth_sentence(trace: Trace) -> str:
             f"On {pushes} retraining changes the negative log density: it {_change(trace.held_out.before, trace)}."
         )
     return f"{_decision(trace)} {_gain(trace, pushes)}"
+
+
+def _after_correction(trace: Trace) -> str:
+    """How a correction of the streams changes the density; nothing if there were none to correct."""
+    before, after = trace.held_out.before, trace.held_out.after
+    if np.array_equal(before.mean, after.mean):
+        return ""
+    return f" With corrected streams the model's negative log density {_change(before, trace, 'after')}."
 
 
 def _decision(trace: Trace) -> str:
@@ -84,8 +88,9 @@ def _decision(trace: Trace) -> str:
 
 
 def _gain(trace: Trace, pushes: str) -> str:
+    effects = "the effect changes" if len(trace.terms) == 1 else "the effects change"
     return (
-        f"On {pushes} the effect changes the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "
+        f"On {pushes} {effects} the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "
         "The reference is the same model retrained without the effect; below zero is better."
     )
 
@@ -98,6 +103,14 @@ def _change(first: Comparison, trace: Trace, second: str = "refit") -> str:
 def _nlpd(comparison: Comparison) -> str:
     every = gaussian_nlpd(comparison.mean, comparison.variance, comparison.observed).sum(axis=1)
     return number(float(np.mean(every)) if len(every) else None)
+
+
+def _joined(claim: str, evidence: str) -> str:
+    """A claim and its evidence; a p value alone goes in brackets."""
+    first, _, rest = evidence.partition(". ")
+    first = first.removesuffix(".")
+    sentence = f"{claim} ({first})." if first.startswith("p = ") else f"{claim}: {first}."
+    return f"{sentence} {rest}".rstrip()
 
 
 # --- the claim: what changed, and with what ------------------------------------------------------------------------
@@ -164,7 +177,8 @@ def _none(trace: Trace) -> str:
 
 def _effects(trace: Trace) -> str:
     first, *others = (f"{_size(trace, k)}{_share(trace.effects[k])}" for k in range(len(trace.effects)))
-    return "".join([first, *(f" {capitalised(_claim(trace, k + 1))}: {text}" for k, text in enumerate(others))])
+    further = (f" {FURTHER}, {_joined(_claim(trace, k + 1), text)}" for k, text in enumerate(others))
+    return "".join([first, *further])
 
 
 def _size(trace: Trace, index: int) -> str:
