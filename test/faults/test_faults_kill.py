@@ -23,7 +23,7 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.online.files.window_table import put_aside
-from push_predictor.recordings import atomic_append as whole_lines
+from push_predictor.recordings import atomic_append
 from push_predictor.recordings.atomic_append import append_lines
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table_file import read_table
@@ -222,8 +222,8 @@ def test_lines_are_appended_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
         written.append(data)
         return real(descriptor, data if len(written) < 3 else data[:4])
 
-    real = whole_lines.os.write
-    monkeypatch.setattr(whole_lines.os, "write", write)
+    real = atomic_append.os.write
+    monkeypatch.setattr(atomic_append.os, "write", write)
     with pytest.raises(OSError, match=r"No space left.*lines"):
         append_lines(path, ["first line", "second line", "third line", "fourth line"])
     assert path.read_text() == "first line\nsecond line\n"

@@ -32,12 +32,12 @@ class ModelSource:
         loaded = {text: load_model(path) for text, path in self._files.items()}
         self._found = {text: (model.name, model) for text, model in loaded.items()}
         self._client = node.create_client(ListModels, "list_models")
-        self._asked: Future | None = None
+        self._request: Future | None = None
         self._next = 0.0
         self.problems: list[str] = []
         names = [model.name for model in loaded.values()]
         if repeated := sorted({name for name in names if names.count(name) > 1}):
-            raise RequestError("compare", repeated, "model files that hold models of different names")
+            raise RequestError("compare", repeated, "model files whose models have different names")
 
     def models(self) -> dict[str, PushModel] | None:
         """All wanted models by the name to request, or None while some are unknown."""
@@ -50,19 +50,19 @@ class ModelSource:
         """In words, which models are not known, empty if all are."""
         if self.models() is not None:
             return ""
-        return "; ".join(self.problems) or "Waiting for list_models of predict_server."
+        return " ".join(self.problems) or "Waiting for list_models of predict_server."
 
     def work(self) -> None:
         """Request the server's list until it settles everything. Call it often, in the executor's thread."""
         now = monotonic()
-        if self._asked is not None and self._asked.done():
-            self._take(self._asked.result())
-            self._asked, self._next = None, now + PAUSE if self.problems else inf
+        if self._request is not None and self._request.done():
+            self._take(self._request.result())
+            self._request, self._next = None, now + PAUSE if self.problems else inf
         if now < self._next or not self._client.service_is_ready():
             return
-        if self._asked is not None:  # the server went away in between
-            self._client.remove_pending_request(self._asked)
-        self._asked, self._next = self._client.call_async(ListModels.Request()), now + PATIENCE
+        if self._request is not None:  # the server went away in between
+            self._client.remove_pending_request(self._request)
+        self._request, self._next = self._client.call_async(ListModels.Request()), now + PATIENCE
 
     def _take(self, response: ListModels.Response) -> None:
         files = {name: _file_of(text) for name, text in zip(response.names, response.descriptions, strict=False)}

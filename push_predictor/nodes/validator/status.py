@@ -57,7 +57,7 @@ class StatusPublisher:
     def _problems(self, run: ValidationRun | None) -> list[str]:
         unsaved = run.journal.failure if run and run.journal else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
-        found = [*self._models.problems, self._models.missing, self._rigs.problem, unsaved, silent]
+        found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
         return [*filter(None, dict.fromkeys(found))]
 
     def _activity(self) -> str:
