@@ -101,7 +101,7 @@ class Operator:
             self.alarm = message
             print(
                 f"   ALARM after {message.pushes} pushes ({message.push_id}): the model no longer fits (evidence "
-                f"{_odds(message.log10_evidence)}; false-alarm rate at most {message.false_alarm_rate:.0%}).",
+                f"{_odds(message.log10_evidence)}; false-alarm rate at most {100.0 * message.false_alarm_rate:g} %).",
                 flush=True,
             )
 
