@@ -36,7 +36,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("kind", choices=tuple(OPTIONS_OF_KIND), metavar="KIND", help="paper or validation")
     parser.add_argument("--quick", action="store_true", help="use few pushes, to test that it runs")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
-    paper = parser.add_argument_group("report paper")
+    _add_paper_options(parser.add_argument_group("report paper"))
+    _add_validation_options(parser.add_argument_group("report validation"))
+    parser.set_defaults(run=run)
+
+
+def _add_paper_options(paper: argparse._ArgumentGroup) -> None:
     paper.add_argument(
         "--data", type=Path, metavar="FOLDER", help="measured pushes: mit_square, or files of the MIT push data set"
     )
@@ -47,7 +52,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     paper.add_argument(
         "--cluster", metavar="ADDRESS", help="address of a dask scheduler whose machines all see --out and --data"
     )
-    validation = parser.add_argument_group("report validation")
+
+
+def _add_validation_options(validation: argparse._ArgumentGroup) -> None:
     validation.add_argument(
         "--model",
         type=Path,
@@ -58,7 +65,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     validation.add_argument(
         "--recording", type=Path, metavar="RECORDING", help="a recording that was not used for training"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
