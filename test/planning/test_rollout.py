@@ -64,7 +64,6 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
     """Where the analytical model has the slider (3,) after one push from rest, integrated at once."""
     velocity, contact, angle, duration = step
     heading = np.array([heading_of(contact, angle, model)])
-    assert isinstance(model.predictor, AnalyticalPredictor)
     moved = model.predictor.physics.displacement(np.array([[velocity, contact, angle]]), np.array([duration]))
     return displaced(AT_REST[None], heading, moved)[0]
 

@@ -18,7 +18,7 @@ from push_predictor.evaluation.report.maps import fine_cells, push_map
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
@@ -56,7 +56,6 @@ def base(table: PushTable) -> PushModel:
 
 
 def extended(base: PushModel, *effects: Effect) -> PushModel:
-    assert isinstance(base.predictor, AnalyticalPredictor)
     predictor = ExtendedPredictor(base.predictor.base, base.predictor.physics, effects, np.ones(3))
     return replace(base, name="extended", predictor=predictor)
 
