@@ -95,9 +95,7 @@ def _effects(out: Path, trace: Trace) -> list[str]:
     parts = [html.heading("The effect" if len(trace.effects) == 1 else "The effects"), effects_table(trace)]
     if trace.terms:
         parts.append(shifts_table(trace))
-    for index in range(len(trace.terms)):
-        parts += map(html.figure, effect_pictures(out, trace, index))
-    return [*parts, *map(html.figure, channel_picture(out, trace))]
+    return [*parts, *map(html.figure, [*effect_pictures(out, trace), *channel_picture(out, trace)])]
 
 
 def _rivals(trace: Trace) -> list[str]:

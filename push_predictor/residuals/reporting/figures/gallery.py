@@ -21,10 +21,18 @@ WIDTH = 10.0  # inches
 BARS = "Bars: 95 % intervals from a bootstrap of pushes."
 
 
-def effect_pictures(out: Path, trace: Trace, index: int) -> list[Picture]:
-    """An effect over its covariate (over the push angle if it is constant), and its shifts as fitted and as found."""
-    effect = trace.terms[index]
+def effect_pictures(out: Path, trace: Trace) -> list[Picture]:
+    """Each effect against its covariate (against the push angle if it is constant), and its shifts."""
+    if not trace.terms:
+        return []
     analysis, held_out = analysis_rows(trace), _held_out_rows(trace)
+    every = range(len(trace.terms))
+    return [picture for k in every for picture in _of_effect(out, trace, k, analysis, held_out)]
+
+
+def _of_effect(out: Path, trace: Trace, index: int, analysis: Rows, held_out: Rows | None) -> list[Picture]:
+    """One effect, and its shifts as fitted and as found."""
+    effect = trace.terms[index]
     strength = strength_of(effect, trace.analysis)
     first = (
         _basis_picture(out / f"basis_{index}.png", trace, strength, analysis, held_out)
