@@ -1,4 +1,4 @@
-"""What all report pages share: HTML and matplotlib conventions.
+"""What all report pages share: HTML templates and conventions of figures.
 
 Import `html` and `canvas`.
 """

@@ -1,4 +1,4 @@
-"""What all pictures share: matplotlib, imported only when a picture is drawn, colours, units, saving."""
+"""Conventions of all figures: colours, units, saving. Matplotlib is imported only when a figure is drawn."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 160
-UNITS = (1e3, 1e3, 180.0 / np.pi)  # from m, m, rad to what is shown
+UNITS = (1e3, 1e3, 180.0 / np.pi)  # factors from m, m, rad to mm, mm, deg
 UNIT_NAMES = ("mm", "mm", "deg")
 SYMBOLS = (r"$\Delta x$", r"$\Delta y$", r"$\Delta\theta$")
-COLOURS = ("#0072B2", "#D55E00", "#009E73")  # Okabe and Ito: told apart by colour-blind readers
+COLOURS = ("#0072B2", "#D55E00", "#009E73")  # Okabe and Ito: distinct for colour-blind readers
 PREDICTED, OBSERVED, NEARBY, START = "#0072B2", "#D55E00", "#6b6b6b", "#b0b0b0"
 EMPTY = "#ececec"
 STYLE = {
@@ -47,7 +47,7 @@ STYLE = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A drawn picture: the file, its text for those who do not see it, and a caption."""
+    """A figure: its file, its alternative text and its caption."""
 
     path: Path
     alt: str
@@ -55,7 +55,7 @@ class Picture:
 
 
 def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None]) -> Path:
-    """Paint a figure of that size (inches) and write it as PNG; the file appears whole or not at all.
+    """Paint a figure of that size (inches), write it as PNG and return its path; no partial file remains.
 
     Raises PushPredictorError if matplotlib is not installed.
     """
@@ -72,17 +72,17 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         paint(figure)
-        figure.draw_without_rendering()  # the layout moves colour bars, whose ticks then change: laid out twice it fits
+        figure.draw_without_rendering()  # the layout moves colour bars, which changes their ticks: a second layout fits
         figure.savefig(image, format="png")
     write_whole(path, image.getvalue())
     return path
 
 
 def output_label(index: int) -> str:
-    """An output with its unit, for an axis."""
+    """The label of an axis: an output with its unit."""
     return f"{SYMBOLS[index]} ({UNIT_NAMES[index]})"
 
 
 def grid(axes: Axes) -> None:
-    """A faint grid behind the data."""
+    """Draw a faint grid behind the data."""
     axes.grid(True, linewidth=0.6)

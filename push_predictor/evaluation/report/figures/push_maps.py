@@ -101,8 +101,8 @@ def contact_label(outline: Outline) -> str:
         return f"contact along the edge, counter-clockwise (mm; all {order} edges shown as one)"
     if order > 1:
         return f"contact along the outline, counter-clockwise (mm; {order} equal parts shown as one)"
-    alike = "; equal for the models" if outline.rotational_symmetry == 0 else ""
-    return f"contact along the outline, counter-clockwise from its first vertex (mm{alike})"
+    equal = "; equal for the models" if outline.rotational_symmetry == 0 else ""
+    return f"contact along the outline, counter-clockwise from its first vertex (mm{equal})"
 
 
 def inner_corners(outline: Outline) -> Array:

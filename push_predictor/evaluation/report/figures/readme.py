@@ -34,8 +34,8 @@ def readme_picture(out_png: Path, model: PushModel, table: PushTable) -> Path:
     Raises PushPredictorError if matplotlib is not installed, TableError for a table without rows.
     """
     condition = commonest_condition(table)
-    alike = table.take(condition.rows)
-    return draw(out_png, SIZE, lambda figure: _paint(figure, model, alike, condition.velocity, condition.duration))
+    similar = table.take(condition.rows)
+    return draw(out_png, SIZE, lambda figure: _paint(figure, model, similar, condition.velocity, condition.duration))
 
 
 def _paint(figure: Figure, model: PushModel, table: PushTable, velocity: float, duration: float) -> None:
