@@ -1,8 +1,8 @@
 """How long prediction errors persist along a push, estimated from the training pushes of a model.
 
 Residuals in the windows of one push are correlated. Friction between slider and table changes only with the distance
-travelled, some of it is constant for the whole push, and the learnt function has similar errors in neighbouring windows. The
-correlation of standardised residuals over a distance s of the tip is modelled per output as
+travelled, some of it is constant for the whole push, and the learnt function has similar errors in neighbouring
+windows. The correlation of standardised residuals over a distance s of the tip is modelled per output as
 
     persistent + decaying exp(-s / decay_length),     persistent, decaying >= 0,   persistent + decaying <= 1,
 
