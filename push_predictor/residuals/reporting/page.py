@@ -161,6 +161,8 @@ def _remaining(trace: Trace) -> list[str]:
 def _remaining_sentence(trace: Trace) -> str:
     if trace.verdict == "measurement":
         return "The motion was not searched. Correct the measurement first, record or cut again, then trace again."
+    if not trace.effects:
+        return "No effect was found, so nothing was subtracted."
     if trace.remaining is None:
         return "A second search, with the effects found subtracted, found nothing more."
     strongest = effect_phrase(*trace.remaining)

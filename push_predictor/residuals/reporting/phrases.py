@@ -102,8 +102,13 @@ def listed(phrases: Sequence[str]) -> str:
 
 
 def label(phrase: str) -> str:
-    """A phrase as a label of an axis or a column: without its article, capitalised."""
-    return capitalised(phrase.removeprefix("the ").removeprefix("an ").removeprefix("a "))
+    """A phrase as the label of an axis: without its article, capitalised."""
+    return capitalised(bare(phrase))
+
+
+def bare(phrase: str) -> str:
+    """A phrase without its article, for the cell of a table."""
+    return phrase.removeprefix("the ").removeprefix("an ").removeprefix("a ")
 
 
 def capitalised(text: str) -> str:

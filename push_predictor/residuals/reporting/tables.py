@@ -13,7 +13,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
 from push_predictor.residuals.outcome import FoundEffect, Tested, Trace
 from push_predictor.residuals.reporting.figures.tested import best_of, role_of
-from push_predictor.residuals.reporting.phrases import covariate_phrase, effect_phrase, label, mechanism_phrase, unit_of
+from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, effect_phrase, mechanism_phrase, unit_of
 from push_predictor.residuals.reporting.quantities import in_shown_unit, interval_cell, p_text, shown_unit
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of
@@ -42,7 +42,7 @@ def shifts_table(trace: Trace) -> str:
     for effect, term in zip(trace.effects, trace.terms, strict=False):
         sizes = shift_sizes(trace, term, trace.analysis)
         cells = (interval_cell(in_shown_unit(size)[0]) for size in sizes)
-        rows.append([effect_phrase(effect.mechanism, effect.covariate), *cells])
+        rows.append([bare(effect_phrase(effect.mechanism, effect.covariate)), *cells])
     head = ("effect", "dx (mm)", "dy (mm)", "dtheta (deg)")
     caption = (
         "Shift of a window's outcome by each effect: root mean square over the analysis pushes. The 95 % intervals "
@@ -55,7 +55,8 @@ def tested_tables(trace: Trace) -> list[str]:
     """All candidates, smallest p first; the later ones are hidden until the reader opens them."""
     best = best_of(trace.tested)
     rows = [
-        [mechanism_phrase(t.mechanism), covariate_phrase(t.covariate), p_text(t.p_value), _mark(trace, t)] for t in best
+        [bare(mechanism_phrase(t.mechanism)), bare(covariate_phrase(t.covariate)), p_text(t.p_value), _mark(trace, t)]
+        for t in best
     ]
     head = ("mechanism", "depends on", "family-wise p", "")
     open_rows = max(AT_ONCE, 1 + max((k for k, row in enumerate(rows) if row[3]), default=0))
@@ -98,9 +99,9 @@ def detectable_table(trace: Trace) -> str:
     rows = []
     for name, size in trace.minimum_detectable.items():
         driven = size.get("driven")
-        along = covariate_phrase(str(driven["covariate"])) if isinstance(driven, Mapping) else html.NOTHING
+        along = bare(covariate_phrase(str(driven["covariate"]))) if isinstance(driven, Mapping) else html.NOTHING
         cells = [_size_cell(size), _size_cell(driven) if isinstance(driven, Mapping) else html.NOTHING, along]
-        rows.append([mechanism_phrase(name), *cells])
+        rows.append([bare(mechanism_phrase(name)), *cells])
     caption = (
         "The smallest detectable effect of each mechanism: what the search finds with 80 % probability on these pushes "
         "at this level. Along a covariate the size is per standard deviation of the covariate."
@@ -121,8 +122,8 @@ def _effect_row(effect: FoundEffect, noise: bool) -> list[str]:
     size, share = effect.parameter, effect.share_of_residual
     basis = "" if effect.basis == "constant" else f" ({effect.basis})"
     return [
-        "noise" if noise else mechanism_phrase(effect.mechanism),
-        f"{covariate_phrase(effect.covariate)}{basis}",
+        "noise" if noise else bare(mechanism_phrase(effect.mechanism)),
+        f"{bare(covariate_phrase(effect.covariate))}{basis}",
         html.NOTHING if size is None else size.name.partition(", ")[0],
         html.NOTHING if size is None else interval_cell(*in_shown_unit(size)),
         ", ".join(name for name in OUTPUTS if name in effect.outputs) or html.NOTHING,
@@ -149,7 +150,7 @@ def _cell(value: float | None) -> str:
 
 
 def _column(key: str) -> str:
-    unit, name = "deg" if key in ANGLES else unit_of(key), label(covariate_phrase(key)).lower()
+    unit, name = "deg" if key in ANGLES else unit_of(key), bare(covariate_phrase(key))
     return f"{name} ({unit})" if unit else name
 
 
