@@ -48,7 +48,7 @@ setup(
         "threadpoolctl>=3",
     ],
     extras_require={
-        "report": ["matplotlib>=3.8", "jinja2>=3.1", "joblib>=1.4", "diptest>=0.9", "rich>=13"],
+        "report": ["matplotlib>=3.8", "jinja2>=3.1", "rich>=13"],
         "live": ["rich>=13"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],

@@ -16,6 +16,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["push_predictor[report]"],
+    install_requires=["push_predictor[report]", "joblib>=1.4", "diptest>=0.9"],
     zip_safe=False,
 )

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from push_predictor_paper.statistics.unimodality import dip, p_values
 
 from benchmarks.planning.rollout_truth import repeats
-from push_predictor.evaluation.unimodality import dip, p_values
 from push_predictor.geometry.frames import rotate, to_world
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel

@@ -16,9 +16,17 @@ from push_predictor.commands.doctor_findings import Finding
 from push_predictor.errors import PushPredictorError
 
 PYTHON = ((3, 10), (3, 13))
-NEEDED = {"numpy": "1.24", "scipy": "1.10", "mcap": "1.1", "PyYAML": "5.4"}
+NEEDED = {
+    "numpy": "1.24",
+    "scipy": "1.10",
+    "mcap": "1.1",
+    "lz4": "4",
+    "zstandard": "0.22",
+    "PyYAML": "5.4",
+    "threadpoolctl": "3",
+}
 EXTRAS = {
-    "report": (("matplotlib", "jinja2", "joblib", "diptest"), "report pages, and `report paper`"),
+    "report": (("matplotlib", "jinja2"), "report pages"),
     "live": (("rich",), "progress bars and the live table of the demonstration"),
     "import": (("rosbags", "h5py"), "`import` of ROS 1 bags and of the MIT push data set"),
 }

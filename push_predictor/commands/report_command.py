@@ -89,7 +89,7 @@ def _paper(options: argparse.Namespace) -> None:
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package != "push_predictor_paper":
-            raise PushPredictorError(f"`report paper` needs {package}; pip install 'push_predictor[report]'") from None
+            raise PushPredictorError(f"`report paper` needs {package}; pip install ./push_predictor_paper") from None
         raise PushPredictorError(PAPER_IS_MISSING) from None
     from push_predictor.commands.progress_bar import ProgressBar
 

@@ -12,11 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+import joblib
 import numpy as np
 import scipy
 
 import push_predictor
-from push_predictor.errors import PushPredictorError
 
 Result = TypeVar("Result")
 LOOKS = (  # modules that change how results look, not what they are
@@ -51,17 +51,11 @@ class Work:
     """A cache of calls, and the processes that fill it. A call made before, also by another process, is read from disk.
 
     folder: of the cache; cores: calls at the same time, -1 for one per core. With `joblib.parallel_config` another back
-    end (dask, say) runs the calls; its workers must see the folder. Raises PushPredictorError if joblib is missing.
+    end (dask, say) runs the calls; its workers must see the folder.
     """
 
     def __init__(self, folder: Path, cores: int = -1, watch: Watch | None = None) -> None:
-        try:
-            import joblib
-        except ImportError as error:
-            raise PushPredictorError(
-                f"the report needs joblib ({error}); pip install 'push_predictor[report]'"
-            ) from None
-        self._joblib, self._cores, self._watch = joblib, cores, watch
+        self._cores, self._watch = cores, watch
         self.folder = folder / fingerprint()
         self._memory = joblib.Memory(self.folder, verbose=0)
 
@@ -70,9 +64,9 @@ class Work:
         if self._watch is not None:
             self._watch.begin(doing, len(calls))
         kept = self._memory.cache(function)
-        parallel = self._joblib.Parallel(n_jobs=self._cores, return_as="generator_unordered", batch_size=1)
+        parallel = joblib.Parallel(n_jobs=self._cores, return_as="generator_unordered", batch_size=1)
         results: dict[int, Result] = {}
-        pieces = (self._joblib.delayed(_numbered)(i, kept, arguments) for i, arguments in enumerate(calls))
+        pieces = (joblib.delayed(_numbered)(i, kept, arguments) for i, arguments in enumerate(calls))
         for i, result in parallel(pieces):
             results[i] = result
             if self._watch is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import contextlib
 import os
 import shutil
@@ -19,7 +18,6 @@ from joblib.externals.loky import get_reusable_executor
 from push_predictor_paper.work import Work, fingerprint
 
 import push_predictor
-from push_predictor.errors import PushPredictorError
 from push_predictor_paper import work as work_module
 
 SOURCES = [Path(module.__file__).parents[1] for module in (push_predictor, work_module)]  # what workers import from
@@ -218,19 +216,6 @@ def test_a_new_and_a_renamed_source_change_the_fingerprint(copied_packages: Path
 
 def test_results_are_kept_under_the_fingerprint(tmp_path: Path) -> None:
     assert Work(tmp_path, cores=1).folder == tmp_path / fingerprint()
-
-
-def test_without_joblib_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    known = builtins.__import__
-
-    def without_joblib(name: str, *arguments, **named):
-        if name == "joblib":
-            raise ImportError("No module named 'joblib'")
-        return known(name, *arguments, **named)
-
-    monkeypatch.setattr(builtins, "__import__", without_joblib)
-    with pytest.raises(PushPredictorError, match=r"pip install 'push_predictor\[report\]'"):
-        Work(tmp_path)
 
 
 @pytest.fixture

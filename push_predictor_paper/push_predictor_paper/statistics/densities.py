@@ -8,12 +8,12 @@ import numpy as np
 from scipy.stats import shapiro
 
 from push_predictor.evaluation.metrics import gaussian_nlpd
-from push_predictor.evaluation.unimodality import dip, holm, p_values, power, uniform_dips
 from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.types import Array, IntArray
 from push_predictor_paper.data.corpus import PushSet
 from push_predictor_paper.fits.fit import Fit, trained
+from push_predictor_paper.statistics.unimodality import dip, holm, p_values, power, uniform_dips
 
 RESOLUTION = 50  # draws of the uniform for each test: 2 % is the least family-wise p value
 FOLDS = 5

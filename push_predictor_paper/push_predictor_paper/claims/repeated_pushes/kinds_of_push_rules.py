@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.evaluation.unimodality import dip, holm, p_values
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import DRAWS, FEWEST, STEP, RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Verdict
 from push_predictor_paper.statistics.densities import RESOLUTION
+from push_predictor_paper.statistics.unimodality import dip, holm, p_values
 
 LEVEL = 0.05
 FAR, POWER = 6.0, 0.8  # two equal modes so many of their sd apart should be found so often

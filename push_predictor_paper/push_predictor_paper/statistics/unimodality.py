@@ -10,21 +10,15 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from diptest import dipstat
 
-from push_predictor.errors import PushPredictorError
 from push_predictor.types import Array
 
 ROUNDING = 1e-12  # dips closer than this are equal
 
 
 def dip(samples: Array) -> Array:
-    """Dips (b,) of samples (b, n) in any order, n >= 2. Raises PushPredictorError if diptest is not installed."""
-    try:
-        from diptest import dipstat
-    except ImportError as error:
-        raise PushPredictorError(
-            f"dip test: it needs diptest ({error}); pip install 'push_predictor[report]'"
-        ) from None
+    """Dips (b,) of samples (b, n) in any order, n >= 2."""
     ordered = np.sort(samples, axis=1)
     return np.array([dipstat(sample, sort_x=False, allow_zero=False) for sample in ordered], dtype=np.float64)
 

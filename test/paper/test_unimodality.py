@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
+from push_predictor_paper.statistics.unimodality import dip, holm, p_values, power, uniform_dips
 from scipy.optimize import linprog
 
-from push_predictor.errors import PushPredictorError
-from push_predictor.evaluation.unimodality import dip, holm, p_values, power, uniform_dips
 from push_predictor.types import Array
 
 
@@ -114,12 +111,6 @@ def test_more_draws_resolve_smaller_p_values_and_leave_large_ones_where_they_are
     assert many[:5].min() > 0.2
     assert many[5] == 1.0 / 8001.0
     assert p_values(dips[5:], 33, 2000)[0] == 1.0 / 2001.0
-
-
-def test_error_names_the_extra_without_diptest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "diptest", None)
-    with pytest.raises(PushPredictorError, match=r"pip install 'push_predictor\[report\]'"):
-        dip(np.zeros((1, 5)))
 
 
 def test_holm_equals_values_computed_by_hand() -> None:
