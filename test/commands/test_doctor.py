@@ -117,7 +117,8 @@ def test_missing_message_package_is_named(monkeypatch: pytest.MonkeyPatch):
 def test_checked_packages_equal_those_that_setup_declares():
     setup: dict[str, Any] = {}
     source = (REPOSITORY / "setup.py").read_text().replace("from setuptools import", "#")
-    exec(source, {"setup": setup.update, "find_packages": lambda **how: []})
+    file = str(REPOSITORY / "setup.py")
+    exec(source, {"__file__": file, "setup": setup.update, "find_packages": lambda **how: []})
     assert [f"{name}>={least}" for name, least in doctor_checks.NEEDED.items()] == setup["install_requires"]
     extras = {name: {row.split(">")[0] for row in rows} for name, rows in setup["extras_require"].items()}
     for name, (packages, _) in doctor_checks.EXTRAS.items():
