@@ -125,7 +125,8 @@ def _print_summary(comparisons: Sequence[Comparison]) -> None:
     scores: list[dict[str, Any]] = [metrics_json(comparison) for comparison in comparisons]
     first = scores[0]
     print(f"   Scores on {first['n_test']} windows of {first['n_pushes']} pushes that no model was trained on.")
-    print("   NMSE: 0 is perfect, 3 is the mean outcome. NLPD: lower is better (nats, SI units).")
+    print("   NMSE: 0 is perfect, 3 is no better than the mean outcome in training.")
+    print("   NLPD: lower is better (nats per window, SI units).")
     print("   In brackets: 95 % intervals from resampling whole pushes.\n")
     print(f"{'model':12s}{'NMSE':>7s}{'':17s}{'NLPD':>8s}{'':19s}{'95 % coverage: dx':>17s}{'dy':>7s}{'dtheta':>8s}")
     for score in scores:

@@ -24,7 +24,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
     parser.add_argument("--velocity", required=True, type=float, metavar="V", help="speed of the pusher in m/s")
     parser.add_argument(
-        "--contact", required=True, type=float, metavar="C", help="contact point, as a fraction of the perimeter"
+        "--contact",
+        required=True,
+        type=float,
+        metavar="C",
+        help="contact point, as a fraction of the perimeter, 0 to 1",
     )
     parser.add_argument(
         "--angle", required=True, type=float, metavar="A", help="push angle in rad, from the inward normal"

@@ -28,9 +28,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "report",
         "Write an HTML page with tables and figures. `report validation` compares models with a recording. Without "
-        "--model and --recording it simulates both: a square on ABS. `report paper` checks the claims of Bauza and "
-        "Rodriguez (2017) on simulated pushes, with --data also on measured ones. It keeps its results in DIR/work, "
-        "so an interrupted report continues there.",
+        "--model and --recording it simulates a square on ABS and trains on that. `report paper` checks the claims of "
+        "Bauza and Rodriguez (2017) on simulated pushes, with --data also on measured ones. An interrupted report "
+        "continues from its results in DIR/work.",
         "push_predictor report validation --model square_abs.pushmodel --recording bags/square_abs_test --out report",
     )
     parser.add_argument("kind", choices=tuple(OPTIONS_OF_KIND), metavar="KIND", help="paper or validation")
@@ -43,7 +43,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def _add_paper_options(paper: argparse._ArgumentGroup) -> None:
     paper.add_argument(
-        "--data", type=Path, metavar="FOLDER", help="measured pushes: mit_square, or files of the MIT push data set"
+        "--data",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of measured pushes: mit_square, or files of the MIT push data set",
     )
     paper.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"
@@ -116,7 +119,7 @@ def _parallel(cluster: str | None) -> Iterator[None]:
         import joblib
         from distributed import Client
     except ImportError as error:
-        raise PushPredictorError(f"--cluster: it needs dask ({error}); pip install 'dask[distributed]'") from None
+        raise PushPredictorError(f"--cluster needs dask ({error}); pip install 'dask[distributed]'") from None
     with Client(cluster, timeout="10s"), joblib.parallel_config(backend="dask"):
         yield
 

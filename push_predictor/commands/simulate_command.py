@@ -16,7 +16,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "Simulate random pushes and write them as a recording.",
         "push_predictor simulate --shape rect1 --surface abs --pushes 60 --speed 0.02 0.05 --seed 1 --out pushes",
     )
-    parser.add_argument("--shape", required=True, help="slider: rect1, ellip1, ellip2, ellip3 or hex")
+    parser.add_argument(
+        "--shape", required=True, help="slider: rect1 (square), ellip1 (circle), ellip2, ellip3 (ellipses) or hex"
+    )
     parser.add_argument("--surface", required=True, help="table: plywood, delrin, pu or abs")
     parser.add_argument("--pushes", required=True, type=int, metavar="N", help="number of pushes")
     parser.add_argument("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds in m/s")

@@ -42,7 +42,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="seed of the bootstrap (default %(default)s)")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="write an HTML page with figures")
     parser.add_argument(
-        "--save-model", type=Path, metavar="EXTENDED", help="write the extended model, if the trace extends it"
+        "--save-model",
+        type=Path,
+        metavar="EXTENDED",
+        help="write the extended model to this file, if the extension improves the predictions",
     )
     add_rig(parser)
     parser.set_defaults(run=run)

@@ -41,7 +41,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     kind.add_argument("--kind", choices=KINDS, help="kind of model")
     kind.add_argument("--model", dest="old_kind", choices=KINDS, help="old name of --kind")
     parser.add_argument(
-        "--n-train", type=int, metavar="N", help="draw N windows at random (default: all up to 1000, else 1000 evenly)"
+        "--n-train",
+        type=int,
+        metavar="N",
+        help="train on N random windows (default: all; of more than 1000, 1000 spread over all pushes)",
     )
     parser.add_argument(
         "--inducing",
@@ -51,7 +54,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of --n-train (default 0)")
     parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure distribution")
-    parser.add_argument("--stride", type=float, metavar="S", help="s between window starts (default: the duration)")
+    parser.add_argument(
+        "--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"
+    )
     parser.add_argument("--name", help="name of the model in the services (default: the name of the file)")
     parser.add_argument("--out", required=True, type=Path, metavar="FILE.pushmodel", help="output: the model file")
     add_rig(parser)

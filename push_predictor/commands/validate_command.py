@@ -20,7 +20,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a rosbag2 folder or an .mcap file")
     parser.add_argument(
-        "--false-alarm-rate", type=float, default=0.01, metavar="R", help="of the alarm (default %(default)s)"
+        "--false-alarm-rate",
+        type=float,
+        default=0.01,
+        metavar="R",
+        help="largest probability that the alarm fires without a change (default %(default)s)",
     )
     parser.add_argument(
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"

@@ -224,16 +224,16 @@ def test_model_with_too_few_pushes_has_no_alarm():
         ({"off": "3 training pushes are too few"}, "No alarm was computed: 3 training pushes are too few"),
         (
             {"fired": False, "pushes": 96, "log10_evidence": -0.5},
-            "No alarm: the model fits after 96 pushes (evidence of a change 0.316 : 1, alarm at 100 : 1).",
+            "No alarm after 96 pushes: no change detected (evidence of a change 0.316 : 1; the alarm needs 100 : 1).",
         ),
         (
             {"score": "size of the residual", "log10_evidence": 2.14},
-            "The model no longer fits: errors are too large (detected at push p-7, number 8; "
+            "The model no longer fits: errors are too large (detected after 8 pushes, at p-7; "
             "evidence of a change 138 : 1; false-alarm rate at most 1 %).",
         ),
         (
             {"score": "dx", "log10_evidence": 5.2},
-            "The model no longer fits: errors are biased (dx) (detected at push p-7, number 8; "
+            "The model no longer fits: errors are biased (dx) (detected after 8 pushes, at p-7; "
             "evidence of a change 10^5 : 1; false-alarm rate at most 1 %).",
         ),
     ],

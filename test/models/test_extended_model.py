@@ -311,8 +311,8 @@ def test_file_with_effects_needs_a_reader_of_its_format(bases: dict[str, PushMod
         ((0, 1), 2.0, "covariance of all effects is not positive semidefinite"),
         ((0, 1), np.nan, "covariance of all effects: a value is not finite"),
         ((0, 1), np.zeros((1, 2)), r"effects 0 and 1: covariance of shape \(1, 2\), \(1, 1\) is needed"),
-        ((1, 1), 0.0, "effects 1 and 1 of 2 share a covariance"),
-        ((0, 2), 0.0, "effects 0 and 2 of 2 share a covariance"),
+        ((1, 1), 0.0, "shared covariance of effects 1 and 1, give indices i < j below 2"),
+        ((0, 2), 0.0, "shared covariance of effects 0 and 2, give indices i < j below 2"),
     ],
 )
 def test_rejects_damaged_shared_covariance(
@@ -332,9 +332,9 @@ def _header(path: Path) -> dict[str, Any]:
 
 DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "mechanism": (lambda e: e.update(mechanism="os.system"), "effect 1: mechanism 'os.system' is not in the library"),
-    "form": (lambda e: e["form"].update(name="eval"), "effect 1: form 'eval', known are constant, linear"),
-    "drivers": (lambda e: e["form"].update(drivers=[]), r"effect 1: form 'linear' with drivers \(\)"),
-    "scale": (lambda e: e["form"].update(scale=[0.0]), "effect 1: form 'linear' with a scale of zero"),
+    "form": (lambda e: e["form"].update(name="eval"), "effect 1: form 'eval' is not accepted, give one of constant"),
+    "drivers": (lambda e: e["form"].update(drivers=[]), r"effect 1: form 'linear' does not accept the drivers \(\)"),
+    "scale": (lambda e: e["form"].update(scale=[0.0]), "effect 1: form 'linear' has a scale of zero"),
     "number": (lambda e: e.update(coefficients=[float("nan")]), r"effect 1: coefficients \[nan\], 1 finite numbers"),
     "size": (lambda e: e.update(coefficients=[1.0, 2.0]), r"effect 1: coefficients \[1.0, 2.0\], 1 finite numbers"),
     "absent": (lambda e: e.pop("outcome_scale"), "effect 1: 'outcome_scale'"),

@@ -153,9 +153,10 @@ def alarm_sentence(alarm: Mapping[str, Any]) -> str:
         return f"No alarm was computed: {alarm['off']}"
     evidence, pushes = f"evidence of a change {_odds(alarm['log10_evidence'])}", alarm["pushes"]
     if not alarm["fired"]:
-        return f"No alarm: the model fits after {pushes} pushes ({evidence}, alarm at {_odds(alarm['threshold'])})."
+        needed = _odds(alarm["threshold"])
+        return f"No alarm after {pushes} pushes: no change detected ({evidence}; the alarm needs {needed})."
     rate = f"false-alarm rate at most {100.0 * alarm['false_alarm_rate']:g} %"
-    where = f"detected at push {alarm['push_id']}, number {pushes}"
+    where = f"detected after {pushes} pushes, at {alarm['push_id']}"
     return f"The model no longer fits: {_finding(alarm['score'])} ({where}; {evidence}; {rate})."
 
 
@@ -169,7 +170,7 @@ def _odds(log10_evidence: float) -> str:
 
 
 def _finding(score: str) -> str:
-    return "errors are too large" if score == SIZE else f"errors are biased ({score})"
+    return "errors are too large" if score == SIZE else f"errors are biased ({score.replace('_', ' ')})"
 
 
 class _Ranking:

@@ -155,7 +155,7 @@ def _computable(mechanism: Mechanism, table: PushTable) -> bool:
 
 
 def _kinds(mechanisms: Sequence[Mechanism]) -> tuple[ScoreKind, ...]:
-    outputs = [f"{name}{side}" for side in ("", " by the side of the push") for name in OUTPUTS]
+    outputs = [f"{name}{side}" for side in ("", " times the sign of the push angle") for name in OUTPUTS]
     named = [f"{m.name}: {parameter.name}" for m in mechanisms for parameter in m.parameters]
     share = (1.0 - SIZE_WEIGHT - OUTPUT_WEIGHT) / max(len(named), 1)
     rest = [ScoreKind(name, OUTPUT_WEIGHT / len(outputs), True) for name in outputs]

@@ -27,7 +27,7 @@ def error_sentence(metrics: Mapping[str, Any]) -> str:
     ends = "" if interval is None else f" (95 % CI {_rounded(interval['low'])} to {_rounded(interval['high'])})"
     return (
         f"{metrics['model']} predicts these pushes with a total NMSE of {_rounded(total)}{ends}: "
-        f"0 is perfect, 3 is no better than the mean outcome."
+        f"0 is perfect, 3 is no better than the mean outcome in training."
     )
 
 

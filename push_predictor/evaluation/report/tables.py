@@ -56,7 +56,7 @@ def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         rows.append([c.model, *counts, *_cells([m["nmse"][name] for name in COLUMNS], _nmse_draws(c, row_weights(c)))])
     caption = (
         "Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than the training mean. "
-        "The total is the sum over the outputs. In brackets in all tables: 95 % intervals from resampling whole pushes."
+        "The total is the sum over the outputs. In brackets, in all tables: 95 % intervals from resampling pushes."
     )
     return html.table(caption, ("model", "training windows", "windows", "pushes", *COLUMNS), rows)
 

@@ -38,5 +38,5 @@ def correlation_of(record: Mapping[str, Any], features: Array, arrays: Mapping[s
 def _rows(found: np.ndarray, count: int) -> IntArray:
     rows = np.asarray(found, dtype=np.int64)
     if rows.ndim != 1 or np.any(rows < 0) or np.any(rows >= count):
-        raise ValueError(f"rows of the correlation are not rows out of {count}")
+        raise ValueError(f"rows of the correlation are not indices below {count}")
     return rows

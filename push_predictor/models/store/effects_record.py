@@ -52,7 +52,7 @@ def cross_of(pairs: list[Any], effects: tuple[Effect, ...], arrays: Mapping[str,
         whole[part, part] = effect.covariance
     for i, j in pairs:
         if not 0 <= i < j < len(effects):
-            raise ValueError(f"effects {i!r} and {j!r} of {len(effects)} share a covariance")
+            raise ValueError(f"shared covariance of effects {i!r} and {j!r}, give indices i < j below {len(effects)}")
         shared = np.asarray(arrays[f"effect_covariance_{i}_{j}"], dtype=np.float64)
         if shared.shape != (size := (len(effects[i].coefficients), len(effects[j].coefficients))):
             raise ValueError(f"effects {i} and {j}: covariance of shape {shared.shape}, {size} is needed")
@@ -99,13 +99,13 @@ def _effect(record: dict[str, Any], covariance: Array) -> Effect:
 def _basis(record: dict[str, Any]) -> DriverBasis:
     name, drivers = record["name"], tuple(record["drivers"])
     if name not in BASES:
-        raise ValueError(f"form {name!r}, known are {', '.join(BASES)}")
+        raise ValueError(f"form {name!r} is not accepted, give one of {', '.join(BASES)}")
     if len(drivers) != DRIVERS.get(name, 1) or not all(isinstance(driver, str) for driver in drivers):
-        raise ValueError(f"form {name!r} with drivers {drivers!r}")
+        raise ValueError(f"form {name!r} does not accept the drivers {drivers!r}, give {DRIVERS.get(name, 1)} name(s)")
     scaled = len(drivers) if name in SCALED else None
     centre, scale = _numbers(record, "centre", scaled), _numbers(record, "scale", scaled)
     if np.any(scale == 0.0):
-        raise ValueError(f"form {name!r} with a scale of zero")
+        raise ValueError(f"form {name!r} has a scale of zero")
     place, levels = float(_numbers(record, "place", 1)[0]), _numbers(record, "levels", None)
     return DriverBasis(name, drivers, tuple(centre.tolist()), tuple(scale.tolist()), place, tuple(levels.tolist()))
 

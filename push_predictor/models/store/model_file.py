@@ -122,7 +122,7 @@ def _version(predictor: dict[str, Any]) -> int:
 
 def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -> PushModel:
     if header["kind"] not in KINDS:
-        raise ValueError(f"kind {header['kind']!r}, known are {', '.join(KINDS)}")
+        raise ValueError(f"kind {header['kind']!r} is not accepted, give one of {', '.join(KINDS)}")
     rig = rig_from_record(header["rig"], source)
     training = table_of(header["covariates"], arrays)
     found = header["provenance"]

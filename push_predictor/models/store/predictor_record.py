@@ -117,7 +117,8 @@ def _physics(record: dict[str, Any], rig: Rig) -> AnalyticalPush:
     reach = float(np.abs(rig.outline.vertices).max())
     largest = max(abs(support.centre[0]), abs(support.centre[1]), support.length, rig.pusher_radius)
     if not (largest < LARGEST_RATIO * reach and support.length > reach / LARGEST_RATIO):
-        raise ValueError("support or pusher are out of all proportion to the outline")  # integration would never end
+        # The integration would never end.
+        raise ValueError("support or pusher is far too large or too small for the outline")
     return AnalyticalPush(rig.outline, rig.pusher_radius, float(record["contact_friction"]), support)
 
 

@@ -55,7 +55,7 @@ def _hyperparameters(record: dict[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = dict(record)
     family = values.pop("family", DEFAULT_CHOICE.family)
     if family not in FAMILIES:
-        raise ValueError(f"kernel family {family!r}, known are {', '.join(FAMILIES)}")
+        raise ValueError(f"kernel family {family!r} is not accepted, give one of {', '.join(FAMILIES)}")
     values = {k: np.array(v, dtype=np.float64) if isinstance(v, list) else float(v) for k, v in values.items()}
     if not all(np.all(np.isfinite(value)) for value in values.values()):
         raise ValueError("a hyperparameter is not finite")

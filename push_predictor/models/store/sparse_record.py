@@ -43,5 +43,5 @@ def sparse_regression(
 def _rows(found: np.ndarray, n: int, name: str) -> IntArray:
     rows = np.asarray(found, dtype=np.int64)
     if rows.ndim != 1 or not 0 < len(np.unique(rows)) == len(rows) <= n or rows.min() < 0 or rows.max() >= n:
-        raise ValueError(f"{name} does not contain distinct rows out of {n}")
+        raise ValueError(f"{name} does not contain distinct row indices below {n}")
     return rows

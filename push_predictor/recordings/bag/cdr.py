@@ -105,7 +105,7 @@ def frame_of(message: bytes) -> str:
 def _header_words(stamp: IntArray, frame_length: int) -> bytes:
     seconds, nanoseconds = np.divmod(np.asarray(stamp, np.int64), _NANO)
     if np.any((seconds < -(2**31)) | (seconds >= 2**31)):
-        raise ValueError("a header stamp is outside seconds of 32 bits")
+        raise ValueError("a header stamp does not fit into 32-bit seconds")
     words = np.stack([seconds, nanoseconds, np.full_like(seconds, frame_length)], axis=1)
     return words.astype("<u4").tobytes()
 

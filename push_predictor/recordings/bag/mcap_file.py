@@ -123,7 +123,7 @@ class McapFile:
             for opcode, start, end in split(content, place.whole):
                 if opcode == Opcode.MESSAGE:
                     if start + MESSAGE.size > end:
-                        raise ValueError(f"a message of {end - start} bytes")
+                        raise ValueError(f"a message has {end - start} bytes, its header alone needs {MESSAGE.size}")
                     seen += 1
                     number, _, log_time, _ = MESSAGE.unpack_from(content, start)
                     if found := wanted.get(number):

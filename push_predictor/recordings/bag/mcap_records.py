@@ -81,7 +81,7 @@ def split(data: Bytes, whole: bool = True) -> Iterator[tuple[int, int, int]]:
         yield opcode, begin, begin + length
         position = begin + length
     if whole and position != size:
-        raise ValueError(f"its records end at byte {position} of {size}")
+        raise ValueError(f"the last whole record of a chunk ends at byte {position} of {size}")
 
 
 def is_head(head: bytes) -> bool:

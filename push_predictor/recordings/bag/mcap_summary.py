@@ -81,10 +81,10 @@ def read_metadata(stream: BinaryIO, place: MetadataIndex, size: int) -> Metadata
     stream.seek(place.offset)
     opcode, length = HEAD.unpack(stream.read(HEAD.size))
     if opcode != Opcode.METADATA or HEAD.size + length != place.length:
-        raise ValueError("the metadata index points elsewhere")
+        raise ValueError("the metadata index points to a place without a metadata record")
     record = parse(Metadata, stream.read(length), 0, length)
     if record.name != place.name:
-        raise ValueError(f"a metadata record named {record.name!r}, the index calls it {place.name!r}")
+        raise ValueError(f"a metadata record is named {record.name!r}, but {place.name!r} in the index")
     return record
 
 

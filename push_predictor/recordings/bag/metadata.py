@@ -143,13 +143,13 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
 def _compression(information: Mapping[str, object], path: Path) -> str:
     """What rosbag2 compressed in addition to MCAP: 'file', 'message' or ''. Raises RecordingError if not MCAP."""
     if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", ""):
-        raise RecordingError(f"{path}: storage {storage!r}, mcap is accepted; convert it with `ros2 bag convert`")
+        raise RecordingError(f"{path}: storage {storage!r} is not accepted, give mcap: use `ros2 bag convert`")
     mode = str(information.get("compression_mode") or "none").lower()
     kind = str(information.get("compression_format") or "").lower()
     if mode == "none":
         return ""
     if mode not in ("file", "message") or kind != "zstd":
-        raise RecordingError(f"{path}: compression {kind!r} of each {mode}, zstd of each file or message is accepted")
+        raise RecordingError(f"{path}: compression {kind!r} by {mode} is not accepted, give zstd by file or message")
     return mode
 
 

@@ -37,7 +37,7 @@ def import_source(kind: str, sources: Sequence[Path], out: Path, rig: Rig | None
     cannot be read, and what is accepted.
     """
     if kind not in IMPORTERS:
-        raise ImportSourceError(f"kind {kind!r} is not known, give one of {', '.join(KINDS)}")
+        raise ImportSourceError(f"kind {kind!r} is not accepted, give one of {', '.join(KINDS)}")
     if not sources:
         raise ImportSourceError(f"import {kind}: no source was given")
     return IMPORTERS[kind]([Path(source) for source in sources], Path(out), rig)

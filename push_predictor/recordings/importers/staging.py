@@ -48,7 +48,7 @@ class Staging:
     def _claimed(self, name: str) -> Path:
         target = self.out / name
         if target in self.written:
-            raise ImportSourceError(f"{target}: two sources would write it, import them into different folders")
+            raise ImportSourceError(f"{target}: two sources have this output, import them into different folders")
         if target.exists():
             raise ImportSourceError(f"{target} exists already, remove it or give another --out")
         self.written.append(target)
