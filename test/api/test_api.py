@@ -33,6 +33,7 @@ from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.windows.push_window import windows_to_table
 
 TRAINING, TEST = BAGS / "square_abs_train", BAGS / "square_abs_test"
+FEW = BAGS / "hexagon_delrin"  # 53 windows
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def test_every_public_name_is_there_and_documented_and_others_are_refused():
 
 def test_training_reports_each_stage_with_its_share_of_the_work():
     seen: list[tuple[str, float]] = []
-    train([TRAINING], kind="gp", n_train=40, watch=lambda stage, done: seen.append((stage, done)))
+    train([FEW], kind="gp", n_train=40, watch=lambda stage, done: seen.append((stage, done)))
     stages = [stage for stage, _ in seen]
     assert [any(output in stage for stage in stages) for output in ("dx", "dy", "dtheta")] == [True] * 3
     shares = [done for _, done in seen]
@@ -70,7 +71,7 @@ def test_training_reports_each_stage_with_its_share_of_the_work():
 
 
 def test_without_a_callback_training_prints_its_progress_to_stderr(capsys: pytest.CaptureFixture[str]):
-    train(TRAINING, kind="analytical", n_train=40)
+    train(FEW, kind="analytical", n_train=40)
     captured = capsys.readouterr()
     assert "read the data" in captured.err and "100 %" in captured.err and not captured.out
 
@@ -84,7 +85,7 @@ def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone():
 
     with threadpoolctl.threadpool_limits(limits=2, user_api="blas"):
         before = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
-        train(TRAINING, kind="gp", n_train=40, watch=watch)
+        train(FEW, kind="gp", n_train=40, watch=watch)
         after = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
     assert during == {1} and before == after
 
@@ -121,14 +122,14 @@ def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pyt
 
 
 def test_the_name_is_the_first_files_stem_and_the_provenance_names_the_data(model: PushModel, tmp_path: Path):
-    table, rig = windows_to_table(find_windows(read_recording(TRAINING))).take(np.arange(60)), model.rig
+    table, rig = windows_to_table(find_windows(read_recording(FEW))).take(np.arange(50)), model.rig
     write_table(tmp_path / "monday.csv.gz", table)
     learned = train(tmp_path / "monday.csv.gz", kind="analytical", rig=rig)
     assert learned.name == "monday" and learned.provenance.sources == ("monday.csv.gz",)
 
 
 def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp_path: Path):
-    table = windows_to_table(find_windows(read_recording(TRAINING))).take(np.arange(40))
+    table = windows_to_table(find_windows(read_recording(FEW))).take(np.arange(40))
     write_table(tmp_path / "rows.csv", table)
     with pytest.raises(RigError, match="push_rig"):
         train(tmp_path / "rows.csv", kind="analytical")
@@ -142,8 +143,8 @@ def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp
     [
         ({"data": []}, RequestError, "data: .* at least one recording"),
         ({"data": "absent.mcap"}, PushPredictorError, "absent.mcap"),
-        ({"data": TRAINING, "kind": "forest"}, TrainingError, "'forest' is not accepted, give one of vhgp, gp, analyt"),
-        ({"data": TRAINING, "kind": "gp", "n_train": 0}, TrainingError, "n_train: 0 is not accepted"),
+        ({"data": FEW, "kind": "forest"}, TrainingError, "'forest' is not accepted, give one of vhgp, gp, analyt"),
+        ({"data": FEW, "kind": "gp", "n_train": 0}, TrainingError, "n_train: 0 is not accepted"),
     ],
 )
 def test_a_wrong_call_of_train_is_refused_by_field(arguments, error, message):
