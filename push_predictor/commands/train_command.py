@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.windows.push_window import WindowOptions
 
     if options.old_kind is not None:
-        warn("`train --model KIND` is now `train --kind KIND`. The old name will be removed.")
+        warn("`train --model KIND` is now `train --kind KIND`. The old name still works.")
     kind = options.kind or options.old_kind
     _check(options, kind)
     rig = load_rig_for(options.data, options.rig)

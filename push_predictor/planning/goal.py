@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from push_predictor.geometry.frames import to_body
 from push_predictor.types import Array, BoolArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Goal:
     """All poses within `distance` m and `turn` rad of pose (3: x, y m, heading rad).
 
@@ -22,10 +23,14 @@ class Goal:
     pose: Array
     distance: float
     turn: float | None
-    symmetry: int = 1
+    symmetry: int
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", np.asarray(self.pose, dtype=np.float64))
+    def __init__(
+        self, pose: Sequence[float] | Array, distance: float, turn: float | None = None, symmetry: int = 1
+    ) -> None:
+        values = {"pose": np.asarray(pose, dtype=np.float64), "distance": distance, "turn": turn, "symmetry": symmetry}
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
         if self.pose.shape != (3,) or not np.all(np.isfinite(self.pose)):
             raise RequestError("goal pose", self.pose.tolist(), "three finite numbers x, y in m, heading")
         if not 0.0 < self.distance < np.inf:

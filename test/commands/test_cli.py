@@ -191,7 +191,7 @@ def test_train_accepts_the_old_name_of_kind_with_a_warning(place: Place, run):
     call = ["train", place.path("train"), "--out", place.path("old.pushmodel"), "--json", "-"]
     old, new = run(*call, "--model", "analytical"), run(*call, "--kind", "analytical")
     assert without_progress(old.err) == [
-        "warning: `train --model KIND` is now `train --kind KIND`. The old name will be removed."
+        "warning: `train --model KIND` is now `train --kind KIND`. The old name still works."
     ]
     assert old.json == new.json and not without_progress(new.err)
 
