@@ -185,7 +185,7 @@ def test_verdict_starts_with_the_answer_then_size_and_interval(drift: Trace) -> 
     ("gain", "kept", "words"),
     [
         (Gain(-0.5, -0.6, -0.4), True, "The motion model is extended."),
-        (Gain(-0.1, -0.3, 0.1), False, "found, but not worth modelling"),
+        (Gain(-0.1, -0.3, 0.1), False, "does not improve the predictions beyond chance"),
         (Gain(-0.1, float("nan"), float("nan")), False, "too few pushes for an interval"),
     ],
 )
@@ -196,7 +196,7 @@ def test_worth_sentence_separates_found_from_worth_modelling(drift: Trace, gain:
 
 def test_verdict_explains_a_candidate_below_alpha_that_is_not_significant(nothing: Trace) -> None:
     near = replace(nothing, tested=(outcome.Tested("inertia", "velocity", 0.008),))
-    assert "share the level" in verdict_sentence(near)
+    assert "the level is divided among" in verdict_sentence(near)
 
 
 def test_every_mechanism_and_covariate_has_a_phrase() -> None:

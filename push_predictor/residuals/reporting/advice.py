@@ -13,7 +13,7 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two 
         DRIFTING,
         DRIFTING,
         "Pause for about half a session, then continue: time passes, push count and distance do not. Then alternate "
-        "short and long pushes: the distance grows faster than the count.",
+        "blocks of short and of long pushes: in long pushes the distance grows faster than the count.",
     ),
     (
         DRIFTING,
@@ -23,7 +23,7 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two 
     (
         HEADED,
         HEADED,
-        "Set the slider at many headings and push from every side at each. That separates the side, the slider's "
+        "Place the slider at many headings, and push every side at each heading. That separates the side, the slider's "
         "heading and the push direction.",
     ),
     (

@@ -20,7 +20,7 @@ CUT_AGAIN = (
     "unchanged, on the held-out pushes of the corrected recordings."
 )
 NO_STREAMS = "A push table contains no streams, so the error is reported but not corrected. Give the recording."
-NOT_JUDGED = "The measurement itself could not be judged: these windows contain no contact gap or no pose."
+NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
 def notes_of(
@@ -49,12 +49,12 @@ def _of_motion(motion: MotionFinding) -> list[str]:
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
         notes.append(
-            f"Not tried: {names}. In these pushes contact point, push angle and speed predict them. "
-            f"Randomise the order of the pushes."
+            f"Not tested: {names}. Contact point, push angle and speed predict them in these pushes. "
+            f"To test them, randomise the order of the pushes."
         )
     if motion.unchanged:
         effects = listed([effect_phrase(*label) for label in motion.unchanged])
-        notes.append(f"Not new, because training shows as much of it: {effects}.")
+        notes.append(f"Not new, because the training pushes show it to the same degree: {effects}.")
     return notes
 
 
@@ -63,7 +63,7 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
     if measured is not None and measured.errors:
         errors = listed([mechanism_phrase(error.mechanism) for error in measured.errors])
         notes.append(
-            f"The gap between pusher and slider suggests {errors}. Correcting that does not improve the predictions."
+            f"The gap between pusher and slider suggests {errors}. Correcting for it does not improve the predictions."
         )
     if measured is None:
         notes.append(NOT_JUDGED)

@@ -39,12 +39,12 @@ VERDICTS = {
     "variance": "noise only",
 }
 UNNAMED = (
-    "A mechanism is named only if the general pattern over contact point and push angle explains little in addition to "
-    "it. Some mechanisms above may be significant because they resemble the pattern, but none passed that test."
+    "A mechanism is named only if it explains nearly as much as a general pattern over contact point and push angle. "
+    "None does. A tested mechanism can be significant because it resembles the pattern."
 )
 EXPERIMENT = (
-    "Each push below was already made here, at other values of the covariates. Repeat it with the covariates set as "
-    "the table shows. There the rivals differ most, and one of them will be wrong."
+    "Make the pushes below, with the covariates set as the table shows. There the predictions of the rivals differ "
+    "most. Each push is in these data, at other values of the covariates."
 )
 
 
@@ -122,8 +122,8 @@ def _rivals_sentence(trace: Trace) -> str:
 def _held_out(out: Path, trace: Trace) -> list[str]:
     intro = (
         f"{_after(trace)} All figures are of pushes that took no part in the search. Before: the deployed model. "
-        "Refit: the same model retrained on the analysis pushes, without the effect (of an analytical model, only its "
-        "covariance)."
+        "Refit: the same model retrained on the analysis pushes, without the effect. Of an analytical model only the "
+        "covariance is estimated again."
     )
     parts = [html.heading("Before, refit, after"), html.paragraph(intro), *held_out_tables(trace)]
     return [*parts, html.heading("Calibration"), *map(html.figure, calibration_picture(out, trace))]

@@ -46,7 +46,7 @@ def _push(push: Mapping[str, float]) -> str:
 
 def _held_out(trace: Trace) -> list[str]:
     head = f"Held out: {len(trace.held_out.table.pushes)} pushes, SHA-256 {trace.held_out.digest}"
-    titles = f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact':>10s}{'90 % coverage, dx dy dtheta':>30s}"
+    titles = f"{'':8s}{'NMSE':>9s}{'NLPD':>10s}{'exact NLPD':>12s}{'90 % coverage, dx dy dtheta':>30s}"
     return [head, titles, *map(_line, comparisons_of(trace))]
 
 
@@ -54,7 +54,7 @@ def _line(comparison: Comparison) -> str:
     metrics: dict[str, Any] = metrics_json(comparison)
     exact = (metrics["exact_nlpd"] or {}).get("total")
     coverage = metrics["coverage"]["0.9"] or {}
-    cells = [_cell(metrics["nmse"]["total"], 9), _cell(metrics["nlpd"]["total"], 10), _cell(exact, 10)]
+    cells = [_cell(metrics["nmse"]["total"], 9), _cell(metrics["nlpd"]["total"], 10), _cell(exact, 12)]
     return f"{comparison.model:8s}{''.join(cells)}{''.join(_cell(share, 10) for share in coverage.values())}"
 
 

@@ -82,16 +82,14 @@ def _decision(trace: Trace) -> str:
         return "The motion model is extended."
     if not np.isfinite([gain.low, gain.high]).all():
         return "The motion model stays unchanged: there are too few pushes for an interval."
-    if gain.high < 0.0:
-        return "The motion model stays unchanged although the gain is certain: see the notes."
-    return "The motion model stays unchanged: found, but not worth modelling."
+    return "The motion model stays unchanged: modelling the effect does not improve the predictions beyond chance."
 
 
 def _gain(trace: Trace, pushes: str) -> str:
     effects = "the effect changes" if len(trace.terms) == 1 else "the effects change"
     return (
         f"On {pushes} {effects} the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "
-        "The reference is the same model retrained without the effect; below zero is better."
+        "The reference is the same model retrained without the effect. Below zero is better."
     )
 
 
@@ -171,7 +169,7 @@ def _none(trace: Trace) -> str:
     depends = "" if closest.covariate == CONSTANT else f" depending on {covariate_phrase(closest.covariate)}"
     text = f"{text} The closest is {name}{depends}, with p = {p_text(closest.p_value)}."
     if closest.p_value <= trace.alpha:
-        text = f"{text} It is not significant: motion, force and measurement share the level."
+        text = f"{text} It is not significant: the level is divided among motion, force and measurement."
     return text
 
 

@@ -163,9 +163,9 @@ def _example_alt(count: int) -> str:
 
 def _example_caption(model: str) -> str:
     return (
-        f"Up to {EXAMPLES} windows of {model}, each of another push: about 95 % of the dots should lie in ellipses. "
-        f"Left: the slider before (grey), after (orange) and as predicted (blue, dashed); the pusher moves to the "
-        f"right. Middle: predicted 95 % ellipse and observed outcome in the push frame. Right: 95 % interval of the "
+        f"Up to {EXAMPLES} windows of {model}, each from a different push. About 95 % of the dots should lie in the "
+        f"ellipses. Left: the slider before (grey), after (orange) and as predicted (blue, dashed). The pusher moves "
+        f"to the right. Middle: predicted 95 % ellipse and observed outcome in the push frame. Right: 95 % interval of the "
         f"rotation. Grey dots: windows with similar inputs (a tenth of the outline, 10°, 10 % of the speed). Each is "
         f"shifted by the difference of the predicted means, so it shows the unexplained part only. The windows are "
         f"chosen by their inputs alone; those with at least {ENOUGH} similar windows are preferred."
@@ -173,7 +173,7 @@ def _example_caption(model: str) -> str:
 
 
 TRACK_CAPTION = (
-    "Whole pushes from above: the path of the slider's centre, turned so that it goes to the right. About 95 % of the "
+    "Whole pushes from above: the path of the slider's centre, rotated to point right. About 95 % of the "
     "observed points should lie in their ellipses. Each ellipse is predicted from the observed pose at the start of "
     "its window. Shown are three long pushes: the largest clockwise rotation, the median, the largest "
     "counter-clockwise."

@@ -101,7 +101,7 @@ def contact_label(outline: Outline) -> str:
         return f"contact along the edge, counter-clockwise (mm; all {order} edges shown as one)"
     if order > 1:
         return f"contact along the outline, counter-clockwise (mm; {order} equal parts shown as one)"
-    equal = "; equal for the models" if outline.rotational_symmetry == 0 else ""
+    equal = "; the models do not depend on it" if outline.rotational_symmetry == 0 else ""
     return f"contact along the outline, counter-clockwise from its first vertex (mm{equal})"
 
 

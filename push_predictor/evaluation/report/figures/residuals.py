@@ -44,7 +44,7 @@ def time_axis(comparison: Comparison, windows: Sequence[PushWindow] | None) -> T
         start = np.array([window.start for window in windows], dtype=np.int64)
         return TimeAxis((start - start.min()) / 60e9, "time since the first window (min)")
     number = {push: k for k, push in enumerate(dict.fromkeys(comparison.push_id.tolist()))}
-    return TimeAxis(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "number of the push")
+    return TimeAxis(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "push count")
 
 
 def standardised_residuals(comparison: Comparison) -> Array:

@@ -104,7 +104,7 @@ def _room(y: Array) -> tuple[float, float]:
 def _driver(table: PushTable, covariate: str) -> tuple[Array, str]:
     """The covariate, or the order of the pushes if it is not recorded."""
     if covariate not in table.covariates:
-        return push_order(table).astype(np.float64), "Number of the push"
+        return push_order(table).astype(np.float64), "Push count"
     return table.covariates[covariate], with_unit(covariate)
 
 

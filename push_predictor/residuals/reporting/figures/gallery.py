@@ -42,11 +42,11 @@ def _of_effect(out: Path, trace: Trace, index: int, analysis: Rows, held_out: Ro
     path = out / f"shifts_{index}.png"
     draw(path, (WIDTH, 3.4), lambda figure: paint_shifts(figure, trace, effect, analysis, held_out))
     caption = (
-        "Does the effect show up where the fit predicts it? Each point is the mean shift found in windows of similar "
-        "fitted shift, beyond the model and the other effects. On the line, both agree; level points would mean "
-        f"no effect. {BARS} {_data_words(trace)}"
+        "Does the effect appear where the fit predicts it? Each point is the mean shift observed in windows of similar "
+        "fitted shift, beyond the model and the other effects. Points on the line confirm the fit. Points on a "
+        f"horizontal line would mean no effect. {BARS} {_data_words(trace)}"
     )
-    return [first, Picture(path, "Shift of dx, dy and dtheta as found against the fitted shift.", caption)]
+    return [first, Picture(path, "Observed against fitted shift of dx, dy and dtheta.", caption)]
 
 
 def channel_picture(out: Path, trace: Trace) -> list[Picture]:
@@ -92,9 +92,9 @@ def calibration_picture(out: Path, trace: Trace) -> list[Picture]:
     caption = (
         f"Calibration on {count(len(trace.held_out.table.pushes), 'held-out push', 'held-out pushes')}. Left: share of "
         "outcomes inside the central predicted interval, against its nominal share; band: 95 %, bootstrap of pushes. "
-        "Right: where outcomes lie in their predicted distributions. Level is calibrated, a hump means too wide a "
-        "prediction, a hollow too narrow, a slope biased. Grey: 95 % range of the bars for independent windows; "
-        "windows of one push are not independent."
+        "Right: probability integral transform (PIT), uniform for a calibrated model. A hump: the predicted "
+        "uncertainty is too large. A trough: it is too small. A slope: the mean is biased. Grey: 95 % range of the "
+        "bars for independent windows; windows of one push are not independent."
     )
     return [Picture(path, "Coverage curves and histograms of the probability integral transform.", caption)]
 
@@ -109,9 +109,9 @@ def _basis_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows,
     what = f"{name} against {covariates} ({effect.basis.name})"
     hidden = hidden_pushes(strength, trace, analysis)
     data = (
-        "Left: the fitted map. Right: each cell estimated by itself."
+        "Left: the fitted map. Right: each cell estimated separately."
         if wide
-        else "Line: fitted, with its 95 % band. Points: estimated in each bin by itself, from the residuals of the "
+        else "Line: fitted, with its 95 % band. Points: estimated separately in each bin, from the residuals of the "
         f"model and the other effects. {BARS} Orange: the pushes of the fit. Open squares: held-out pushes. Grey dots: "
         f"single pushes; {hidden} are not shown (outside the picture, or with too small a response)."
     )
@@ -131,8 +131,8 @@ def _course_picture(path: Path, trace: Trace, effect: Effect, analysis: Rows) ->
     axis = f"{course.label[:1].lower()}{course.label[1:]}"
     groups = " Colours: thirds of the edge or sector, counter-clockwise." if len(course.groups) > 1 else ""
     caption = (
-        f"Shift by {effect_phrase(effect.mechanism, effect.covariate)}, against {axis}, at the commonest speed and "
-        f"duration.{groups} Lines: fitted, with 95 % bands. Points: found. {BARS} {_data_words(trace)}"
+        f"Shift by {effect_phrase(effect.mechanism, effect.covariate)}, against {axis}, at the most common speed and "
+        f"duration.{groups} Lines: fitted, with 95 % bands. Points: observed. {BARS} {_data_words(trace)}"
     )
     return Picture(path, f"Shift of dx, dy and dtheta against {axis}.", caption)
 

@@ -84,6 +84,6 @@ def _split_words(trace: Trace) -> str:
         return ""
     name = covariate_phrase(trace.terms[0].covariate)
     return (
-        f" Maps are split at the median strength of the first effect, because an effect of {name} may cancel in one "
-        "map of all pushes."
+        f" Maps are split at the median strength of the first effect, because an effect that changes with {name} may "
+        "cancel in one map of all pushes."
     )

@@ -54,7 +54,7 @@ def paint_shifts(figure: Figure, trace: Trace, effect: Effect, analysis: Rows, h
     axes = figure.subplots(1, 3)
     for k, ax in enumerate(axes):
         _paint_shift(ax, trace, effect, (analysis, held_out), k)
-    axes[0].set_ylabel("Shift found")
+    axes[0].set_ylabel("Observed shift")
     axes[0].legend(loc="upper left", handlelength=1.2)
 
 
