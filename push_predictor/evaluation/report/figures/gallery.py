@@ -165,9 +165,9 @@ def _example_caption(model: str) -> str:
     return (
         f"Up to {EXAMPLES} windows of {model}, each from a different push. About 95 % of the dots should lie in the "
         f"ellipses. Left: the slider before (grey), after (orange) and as predicted (blue, dashed). The pusher moves "
-        f"to the right. Middle: predicted 95 % ellipse and observed outcome in the push frame. Right: 95 % interval of the "
-        f"rotation. Grey dots: windows with similar inputs (a tenth of the outline, 10°, 10 % of the speed). Each is "
-        f"shifted by the difference of the predicted means, so it shows the unexplained part only. The windows are "
+        f"to the right. Middle: predicted 95 % ellipse and observed outcome in the push frame. Right: 95 % interval of "
+        f"the rotation. Grey dots: windows with similar inputs (a tenth of the outline, 10°, 10 % of the speed). Each "
+        f"is shifted by the difference of the predicted means, so it shows the unexplained part only. The windows are "
         f"chosen by their inputs alone; those with at least {ENOUGH} similar windows are preferred."
     )
 
