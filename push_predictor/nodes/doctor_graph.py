@@ -81,7 +81,7 @@ def interfaces() -> dict[str, str]:
     except Exception as error:  # as above
         return _missing(
             f"push_predictor_interfaces is not usable ({error})",
-            "the nodes communicate by these interfaces",
+            "the nodes communicate with these interfaces",
             BUILD_INTERFACES,
         )
     if lacking:
@@ -108,7 +108,7 @@ def shared_memory() -> dict[str, str]:
     if os.access(place, os.W_OK) or "UDP" in os.environ.get("FASTDDS_BUILTIN_TRANSPORTS", ""):
         return _ok(f"{place} is writable" if os.access(place, os.W_OK) else "not used")
     remedy = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4"
-    return _finding("note", f"{place} is not writable", "Fast DDS prints errors, or loses messages", remedy)
+    return _finding("note", f"{place} is not writable", "Fast DDS reports errors or loses messages", remedy)
 
 
 def security() -> dict[str, str]:

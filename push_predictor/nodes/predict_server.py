@@ -46,7 +46,7 @@ from push_predictor_interfaces.srv import (
 )
 
 SERVICE_QOS = QoSProfile(depth=1000)  # the default, 10, loses requests of a client with more in flight
-SIMULATED = "the shipped model is of a simulated square on ABS; set the parameter 'models' for your rig"
+SIMULATED = "the default model was trained on a simulated square on ABS: set the parameter 'models' to one of your rig"
 Handler: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
 
 
@@ -145,7 +145,7 @@ class PredictServer(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer predictions from now on. Fails while no model is loaded; the node then stays inactive."""
         if not self._registry.names:
-            self.get_logger().error(f"{NO_MODEL}; the node stays inactive")
+            self.get_logger().error(f"the node stays inactive: {NO_MODEL}")
             return TransitionCallbackReturn.FAILURE
         self._state = "active"
         models = ", ".join(self._registry.names)

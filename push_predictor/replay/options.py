@@ -57,7 +57,7 @@ def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> Repla
     if not values["recording"]:
         raise RequestError("recording", "", "an MCAP file or the folder of a rosbag2 MCAP bag")
     if values["restamp"] and values["play.rate"] != 1.0:
-        accepted = "1.0, or restamp false: restamped messages keep their pace"
+        accepted = "1.0, which restamp requires, or restamp false"
         raise RequestError("play.rate", values["play.rate"], accepted)
     for name in ("play.start_offset", "play.delay"):
         if times[name] < 0:

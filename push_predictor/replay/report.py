@@ -29,10 +29,10 @@ class ReplayReport:
     @property
     def warnings(self) -> list[str]:
         """What an operator should know, most serious first."""
-        warnings = [f"{self.lost} messages may be lost"] if self.lost else []
-        warnings += ["not all messages were acknowledged"] if self.acknowledged is False else []
+        warnings = [f"subscribers may have lost {self.lost} messages"] if self.lost else []
+        warnings += ["not all messages were acknowledged by the subscribers"] if self.acknowledged is False else []
         warnings += [f"damaged: {text}" for text in self.damage]
-        warnings += [f"{self.behind:.3f} s behind"] if self.behind > 0.1 else []
+        warnings += [f"{self.behind:.3f} s behind schedule"] if self.behind > 0.1 else []
         warnings += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
         warnings += [f"not restamped: {topic} (its type does not begin with a header)" for topic in self.unstamped]
         return warnings + ([self.rig] if self.rig else [])

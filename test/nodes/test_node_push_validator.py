@@ -334,7 +334,7 @@ def test_refused_windows_and_invalid_gaussians_are_listed_and_not_scored(domain:
             log, result = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("windows", "validation"))
             reasons = [entry["reason"] for entry in log["refused"]]
             status.wait_for("refused", str(len(reasons)))
-            assert f"{len(reasons)} predictions were refused" in status.message
+            assert f"predict_push refused {len(reasons)} requests" in status.message
             assert process.stop() == 0, process.text()
     total = int(count_of_windows(models["gp"]))
     assert result["n_test"] == len(log["windows"]) == total - len(reasons) and log["unanswered"] == 0

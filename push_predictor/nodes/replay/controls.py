@@ -68,7 +68,7 @@ class ReplayControls:
 
     def _set_rate(self, request: Any, response: Any) -> Any:
         if self._restamps and request.rate != 1.0:
-            refusal = RequestError("set_rate", request.rate, "1.0: restamped messages keep their pace")
+            refusal = RequestError("set_rate", request.rate, "1.0, which restamp requires")
             self._node.get_logger().warning(str(refusal))
             response.success = False
         else:

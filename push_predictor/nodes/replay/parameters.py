@@ -35,7 +35,7 @@ PARAMETERS: tuple[Param, ...] = (
         3600.0,
     ),
     Param("exit_when_finished", False, "end the process after the last message"),
-    Param("play.rate", 1.0, "recorded seconds per second", 1.0e-6, 1.0e6),
+    Param("play.rate", 1.0, "recorded seconds per second of wall time", 1.0e-6, 1.0e6),
     Param("play.loop", False, "start again after the last message"),
     Param("play.start_paused", False, "start paused"),
     *_duration("play.start_offset", (0, 0), "start this long after the first message"),
@@ -51,7 +51,7 @@ PARAMETERS: tuple[Param, ...] = (
     Param("play.qos_profile_overrides_path", "", "YAML file {topic: {reliability, depth, ...}} as for ros2 bag play"),
     Param("play.read_ahead_queue_size", 1000, "messages to read ahead and sort by log time", 1, 1e6),
     *_duration(
-        "play.wait_acked_timeout", (5, 0), "wait for acknowledgements at the end (0: without limit, negative: not)"
+        "play.wait_acked_timeout", (5, 0), "wait for acknowledgements at the end (0: no limit, negative: do not wait)"
     ),
 )
 _DURATIONS = tuple(param.name.removesuffix(".sec") for param in PARAMETERS if param.name.endswith(".sec"))

@@ -10,7 +10,7 @@ from msg_adapters.diagnostics import Level, diagnostic_status
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.online.request_statistics import RequestStatistics
 
-NO_MODEL = "no model is loaded, give the parameter 'models' or call load_model"
+NO_MODEL = "no model is loaded: set the parameter 'models' or call load_model"
 
 
 def server_status(
@@ -37,5 +37,5 @@ def _health(state: str, registry: ModelRegistry, problems: Sequence[str]) -> tup
     if registry.default not in registry.names:
         return Level.WARN, f"default_model {registry.default!r} is not loaded"
     if problems:
-        return Level.WARN, f"{len(problems)} of the models could not be loaded"
-    return Level.OK, f"{len(registry.names)} models loaded"
+        return Level.WARN, f"models that could not be loaded: {len(problems)}, listed under problems"
+    return Level.OK, f"models loaded: {len(registry.names)}"

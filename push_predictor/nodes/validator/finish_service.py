@@ -54,7 +54,8 @@ class FinishService:
             text = f"The result is in {output}. The report failed: see the log of the node."
             return Trigger.Response(success=False, message=text)
         if self._session.state is State.WAITING:
-            return Trigger.Response(success=False, message="No sample was received yet.")
+            text = "No sample was received yet. Start the sensors or the replay."
+            return Trigger.Response(success=False, message=text)
         text = str(output or "The parameter output is empty: nothing was written.")
         return Trigger.Response(success=True, message=text)
 

@@ -14,7 +14,7 @@ PARAMETERS = (
     Param("frame_id", "world", "Frame that sensor messages must name; others are rejected. Empty: any frame."),
     Param("scalar_topics", [""], "Further topics with one number each. Every window gets their values at its start."),
     Param("request_timeout", 2.0, "Seconds after which an unanswered request is sent again.", low=0.05, high=60.0),
-    Param("last_answers", 30.0, "Seconds that the end of a recording waits for missing answers.", low=0.0, high=3600.0),
+    Param("last_answers", 30.0, "Longest wait for missing answers after a recording, in s.", low=0.0, high=3600.0),
     Param("false_alarm_rate", DEFAULT_RATE, "Largest probability that push_alarm is ever published without a change."),
     Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0),
 )

@@ -139,7 +139,7 @@ class SensorSubscriber:
         for name, buffer in self._buffers.items():
             topic = self._subscriptions[name].topic_name
             if not buffer.received and name != "wrench":
-                found.append(f"No sample on {topic}, which has {self._node.count_publishers(topic)} publishers.")
+                found.append(f"No sample on {topic}. Its number of publishers: {self._node.count_publishers(topic)}.")
             if buffer.rejected:
                 kinds = ", ".join(f"{kind} {count}" for kind, count in buffer.rejected.items())
                 found.append(

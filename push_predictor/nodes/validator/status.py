@@ -112,7 +112,7 @@ def _run_problems(run: ValidationRun) -> list[str]:
     found = [difference for model in run.validation.models if (difference := rig_difference(model, run.rig))]
     found += [*run.sync.problems(), *describe_faults(run.counts)]
     if run.refused:
-        found.append(f"{run.refused} predictions were refused, the last by {run.last_refusal}")
+        found.append(f"predict_push refused {run.refused} requests. The last, of model {run.last_refusal}")
     if run.table_failure:
         found.append(run.table_failure)
     if run.alarm is not None:
@@ -125,7 +125,7 @@ def _alarm_problems(alarm: AlarmProcess) -> list[str]:
     if alarm.state is not None and alarm.state.fired:
         found.append(alarm_sentence(alarm_json(alarm.state)))
     if alarm.skipped:
-        found.append(f"The alarm skipped {len(alarm.skipped)} pushes, the last: {alarm.skipped[-1]}")
+        found.append(f"The alarm skipped {len(alarm.skipped)} pushes. The last, {alarm.skipped[-1]}")
     return found
 
 

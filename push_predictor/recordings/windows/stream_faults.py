@@ -18,9 +18,9 @@ FAULTS = {
     "resets": "times that the slider was repositioned; each ends a push",
     "clock_set_back": "times that the clock was set; windows before and after are kept separate",
     "not_a_push": "windows rejected because the tip moves along the outline or away from it",
-    "inside": f"times that the tip lay over 5 mm inside the outline. {_CHECK}",
+    "inside": f"times that the tip was more than 5 mm inside the outline. {_CHECK}",
     "left_behind": f"windows rejected because the tip enters the outline. {_CHECK}",
-    "outran": "windows rejected because the slider moved farther than the tip",
+    "outran": f"windows rejected because the slider moved farther than the tip. {_CHECK}",
 }
 # A sound system has none of these. Resets, repeated stamps and short dropouts are normal.
 WARNED = (
