@@ -59,8 +59,8 @@ def main(arguments: Sequence[str] = ()) -> int:
     models = [load_model(path) for path in paths]
     largest = max(_largest_difference(model, k) for k, model in enumerate(models))
     agree = largest <= AGREEMENT
-    print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} (m, rad).\n")
-    page = _report(models, f"predictions differ by at most {largest:.1e} (m, rad)")
+    print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
+    page = _report(models, f"predictions differ by at most {largest:.1e} m or rad")
     print(f"   Report with pictures: {page}\n", flush=True)
     seed = int(arguments[0]) if arguments else SEED
     picture = close_the_loop(paths[0], models[0].name, OUT, seed)
@@ -116,7 +116,7 @@ def _report(models: Sequence[PushModel], agreement: str) -> Path:
     _print_summary(comparisons)
     windows = results[0][0]
     readme_picture(OUT / "overview.png", models[0], windows_to_table(windows))
-    facts = {"online against offline": agreement, "replayed at rate": f"{RATE:g}"}
+    facts = {"online and offline": agreement, "replay rate": f"{RATE:g}"}
     return report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts)
 
 

@@ -119,7 +119,10 @@ class Operator:
 
 def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
     """Run the loop, print its steps, and return the path of the picture. Raises SystemExit if a node fails."""
-    print("4. Replay a second recording. After some pushes the rig changes, in a way that no node knows.", flush=True)
+    print(
+        "4. Replay a second recording. After some pushes the rig changes. No node is informed of the change.",
+        flush=True,
+    )
     hidden = make_hidden(out, seed)
     before, after = out / "changed_online", out / "after_online"
     with node("predict_server", {"models": [str(model)]}, "loop_server"), Operator() as operator:
@@ -127,14 +130,14 @@ def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
         time.sleep(1.0)  # the alarm may still be in transit
         operator.stop_listening()
         if operator.alarm is None:
-            print("   The alarm did not fire. The trace is requested all the same.")
+            print("   The alarm did not fire. The trace is requested anyway.")
         print("5. Trace the cause in the residuals that the validator recorded (action trace_residual).")
         traced = operator.trace(name, before)
         _print_lines(traced.message)
         print("6. Load the extended model and continue.")
         served = None if traced.extended is None else f"{name}_extended"
         if traced.extended is None or served is None:
-            print("   There is no extended model: the trace found too little to change the model.")
+            print("   There is no extended model: no effect was found that improves the predictions.")
         else:
             _print_lines(operator.load(traced.extended, served))
         # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.
@@ -142,7 +145,7 @@ def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
     story = story_of(model, traced.extended, served, before, after, operator.alarm)
     _print_scores(story)
     truth = json.loads(hidden.truth.read_text())  # not before
-    revealed = ", ".join(f"{key} {value}" for key, value in truth.items() if key != "right names")
+    revealed = ", ".join(f"{key} {value}".replace("_", " ") for key, value in truth.items() if key != "right names")
     print(f"   The hidden change was: {revealed}.")
     return draw_story(out / "loop.png", story, traced.verdict, truth)
 
@@ -169,7 +172,7 @@ def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate
 
 
 def _print_scores(story: Story) -> None:
-    print(f"   Error on the {story.n_later} pushes after the trace (the trace did not use them):")
+    print(f"   Error on the {story.n_later} pushes after the trace (not used by the trace), with 95 % intervals:")
     for label, comparison in story.later.items():
         score: dict[str, Any] = metrics_json(comparison)
         spans = score["interval"]

@@ -107,7 +107,7 @@ def _paint_story(axes: Axes, story: Story, change: int) -> None:
         axes.semilogy(*score.T, marker, color=colour, markersize=3.0, alpha=0.45, linestyle="none")
         axes.semilogy(*_running(score, (0, change, story.traced)), color=colour, linewidth=1.8, label=f"{label} model")
     axes.axhline(1.0, color=NEARBY, linewidth=0.8, linestyle=":")
-    _mark(axes, change, "hidden change sets in", "--", 0.98)
+    _mark(axes, change, "hidden change begins", "--", 0.98)
     _mark(
         axes,
         story.traced,
@@ -120,7 +120,7 @@ def _paint_story(axes: Axes, story: Story, change: int) -> None:
     axes.set(
         xlabel="push",
         xlim=(-2, last + 2),
-        ylabel="mean squared standardised residual\nof a push (1: as predicted)",
+        ylabel="mean squared standardised residual\nof a push (1: calibrated)",
     )
     axes.legend(loc="lower center", ncols=2)
     grid(axes)

@@ -124,10 +124,10 @@ def _travel(choice: Choice) -> float:
 def _print_step(count: int, before: Array, choice: Choice, samples: Array, after: Array) -> None:
     _, contact, angle = choice.push.inputs[0]
     travel = 1e3 * _travel(choice)
-    print(f"Push {count}. The goal is at {_pose(GOAL.ahead(before))} in the slider's frame.")
+    print(f"Push {count}. The goal is at {_pose(GOAL.ahead(before))} (x, y, heading) in the slider's frame.")
     print(
         f"   chosen     contact {contact:.3f}, angle {angle:+.2f} rad, {travel:.0f} mm; "
-        f"{choice.expected:.1f} pushes expected in all"
+        f"{choice.expected:.1f} pushes expected"
     )
     sure = float(GOAL.reached(GOAL.ahead(samples)).mean())
     print(f"   It reaches the goal with probability {choice.probability:.2f} (by rollout_pushes: {sure:.2f}).")

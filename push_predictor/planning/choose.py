@@ -56,7 +56,7 @@ class Choice:
         x, y, heading = self.mean
         return (
             f"Choice: contact {contact:.3f}, angle {angle:+.2f} rad, {1e3 * velocity:.1f} mm/s, for {windows} windows\n"
-            f"  reaches the goal with probability {self.probability:.2f}; {self.expected:.1f} pushes expected in all\n"
+            f"  reaches the goal with probability {self.probability:.2f}; pushes expected: {self.expected:.1f}\n"
             f"  slider expected at x {x:.4f} m, y {y:.4f} m, heading {heading:.3f} rad"
         )
 

@@ -49,14 +49,14 @@ def in_order(samples: Samples, where: str, notes: Notes) -> Samples:
         notes.dropped.append(f"{where}: {missing} rows that contain NaN or infinity")
         samples = samples.take(finite)
     if late := int(np.sum(np.diff(samples.stamp) < 0)):
-        notes.repaired.append(f"{where}: {late} rows out of order in time, sorted")
+        notes.repaired.append(f"{where}: {late} rows out of order in time; all rows were sorted")
         samples = samples.take(np.argsort(samples.stamp, kind="stable"))
     first = np.concatenate([[True], np.diff(samples.stamp) > 0])[: len(samples.stamp)]
     if repeated := int(np.sum(~first)):
         notes.dropped.append(f"{where}: {repeated} rows that repeat the stamp of the row before")
         samples = samples.take(first)
     if len(samples.stamp) < 2:
-        raise ImportSourceError(f"{where}: {len(samples.stamp)} usable rows, at least 2 are needed")
+        raise ImportSourceError(f"{where}: {len(samples.stamp)} usable rows, give at least 2")
     return samples
 
 
@@ -76,7 +76,7 @@ def without_repeats(samples: Samples, where: str, notes: Notes) -> Samples:
     repeated = np.where(length[step] <= LONGEST_STEP, place > 0, place % interval > 0)
     if count := int(np.sum(repeated)):
         notes.repaired.append(
-            f"{where}: {count} of {len(repeated)} rows repeat the tip's position of an earlier row; removed"
+            f"{where}: {count} of {len(repeated)} rows repeat the tip's position in the row before; removed"
         )
     return samples.take(~repeated)
 

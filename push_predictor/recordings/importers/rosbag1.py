@@ -62,7 +62,7 @@ def read_mcube_bag(path: Path, body_topic: str, rig: Rig | None, notes: Notes) -
         for topic, values in ((body_topic, _transform), (FORCE, _wrench), (TIP, _position))
     }
     leads = "; ".join(f"{topic} {-1e3 * header_lead(messages[topic])[1]:.1f} ms" for topic in raw)
-    notes.assume(f"{path}: header stamps are used; the bag's clock is later by (median) {leads}")
+    notes.assume(f"{path}: header stamps are used. The bag's clock is later by a median of {leads}")
     x, y, z, w = raw[body_topic].values.T
     body = Samples(raw[body_topic].stamp, np.column_stack([x, y, np.unwrap(twist(z, w))]))
     block = block_of(path, int(body.stamp[0]))

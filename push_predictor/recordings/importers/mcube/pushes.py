@@ -54,8 +54,8 @@ def read_mcube(obj: Path, rig: Rig | None, notes: Notes) -> Recording:
         found.append(assemble(name, where, block, rig, body, raw["tcp"], raw["ft"], sign_notes))
     touches = [samples_in_touch(recording) for recording in found]
     notes.assume(
-        f"{where}: qw is not in the file and assumed {'positive' if touches[0] >= touches[1] else 'negative'} at the "
-        f"first sample: then {max(touches)} tip samples lie on the outline, otherwise {min(touches)}"
+        f"{where}: the file contains no qw. It is assumed {'positive' if touches[0] >= touches[1] else 'negative'} at "
+        f"the first sample, because {max(touches)} tip samples are then on the outline, otherwise {min(touches)}"
     )
     return found[int(touches[1] > touches[0])]
 
@@ -76,7 +76,7 @@ def assemble(
     require_overlap({"slider": body.stamp, "tip": tip.stamp, "force": force.stamp}, where)
     if (missing := int(body.stamp[-1] - tip.stamp[-1])) > STOPS_EARLY:
         notes.dropped.append(
-            f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's, later pushes are missing"
+            f"{where}: the tip stream stops {missing / 1e9:.1f} s before the slider's; later pushes are missing"
         )
     return Recording(
         name=name,
@@ -139,7 +139,7 @@ def tared(force: Samples, tip: Samples, where: str, notes: Notes) -> Samples:
     start = tip.stamp[moved[0]] - 2 * TIP_LATE if len(moved) else tip.stamp[-1]
     before = force.stamp < start
     if np.sum(before) < LEAST_TARE:
-        notes.dropped.append(f"{where}: no rest before the push; the force is not tared")
+        notes.dropped.append(f"{where}: the tip does not rest before the push, so the force is not tared")
         return force
     zero = force.values[before].mean(axis=0)
     notes.repaired.append(

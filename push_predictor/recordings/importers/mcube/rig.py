@@ -17,15 +17,16 @@ PUSHER_RADIUS = 0.004745  # m
 THICKNESS = 0.0132  # m; that of the MIT set's steel square, 0.837 kg on 0.09 m x 0.09 m
 TIP_LATE = 15_000_000  # ns; see CLOCK
 CLOCK = (
-    "clock: tip stamps are 15 ms late relative to the tracker's and were corrected (delay test without repeated rows: "
-    "15.0 ms, rms 0.17 mm; with the repeated rows, which are 12 ms old: 20 to 21 ms); tracker and force share a clock"
+    "clock: tip stamps are 15 ms late relative to the tracker's and were corrected. A delay test without repeated rows "
+    "gives 15.0 ms (rms 0.17 mm). With the repeated rows, which are 12 ms old, it gives 20 to 21 ms. Tracker and force "
+    "share a clock"
 )
 FORCE = (
-    "force: the sensor looks down, world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag; axes "
-    "fitted to the contact normals of each block agree within 3 degrees; it is the force of the slider on the pusher, "
-    "tared by the mean before the tip first moves"
+    "force: the sensor points down, so world (fx, fy) = sensor (fy, fx), from tip_pose's orientation in the bag. Axes "
+    "fitted to the contact normals of each block agree within 3 degrees. It is the force of the slider on the pusher, "
+    "tared by its mean before the tip first moves"
 )
-HEIGHT = "tip and slider are at height 0 where the files contain no height of the tip"
+HEIGHT = "height: tip and slider are at 0 where the files contain no height of the tip"
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,9 @@ class Block:
         """The assumptions about the block."""
         rig = self.rig
         return (
-            f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from tip's and centre's distance in contact; "
-            f"mass {rig.object_mass} kg from density {self.density:.0f} kg/m3 and thickness {THICKNESS * 1e3:.1f} mm, "
-            "that of the MIT set's square: not measured; surface unknown"
+            f"{self.name}: square of side {2e3 * self.half_side:.1f} mm, from the distance of tip and centre in "
+            f"contact. Mass {rig.object_mass} kg, not measured: from density {self.density:.0f} kg/m3 and thickness "
+            f"{THICKNESS * 1e3:.1f} mm, that of the MIT set's square; surface unknown"
         )
 
     @property
@@ -64,11 +65,14 @@ class Block:
         """The assumptions about the frames."""
         (bx, by), (cx, cy) = self.base, self.centre
         source = (
-            "the recorded transforms" if self.base == RECORDED_BASE else "fitted to the contact, recorded 10 mm off"
+            "from the recorded transforms"
+            if self.base == RECORDED_BASE
+            else "fitted to the contacts; the recorded one is 10 mm off"
         )
         return (
-            f"{self.name}: world is Vicon's; its origin in the robot's base ({bx:.4f}, {by:.4f}) m ({source}); the "
-            f"block's centre in the tracked body ({1e3 * cx:.2f}, {1e3 * cy:.2f}) mm"
+            f"{self.name}: the world frame is Vicon's. Its origin in the frame of the robot's base is "
+            f"({bx:.4f}, {by:.4f}) m ({source}). The block's centre in the tracked body is "
+            f"({1e3 * cx:.2f}, {1e3 * cy:.2f}) mm"
         )
 
 
@@ -87,5 +91,6 @@ def block_of(path: Path, stamp: int) -> Block:
         if block.days[0] <= stamp / 1e9 < block.days[1]:
             return block
     raise ImportSourceError(
-        f"{path}: the block is unknown from its folder (St_... steel, Al_... aluminium) and its first stamp {stamp} ns"
+        f"{path}: neither folder nor first stamp {stamp} ns identifies the block, name the folder St_... (steel) or "
+        "Al_... (aluminium)"
     )

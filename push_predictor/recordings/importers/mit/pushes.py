@@ -25,10 +25,10 @@ from push_predictor.types import Array
 PUSHER_RADIUS = 0.00475
 MASSES = {"rect1": 0.837, "ellip1": 0.894, "ellip2": 1.110, "ellip3": 1.334, "hex": 0.983}  # kg; Yu et al. 2016
 FRAME = (
-    "the tracker's body frame is the outline's: origin at its centroid, the first vertex at heading 0 for hex and the "
-    "ellipses, sides along the axes for rect1"
+    "the tracker's body frame is that of the outline, with the origin at its centroid. Hex and ellipses have their "
+    "first vertex at heading 0; rect1 has its sides along the axes"
 )
-FORCE = "the wrench is that of the slider on the pusher, along the axes of the robot's base; it is not tared"
+FORCE = "the wrench acts from the slider on the pusher, along the axes of the robot's base; it is not tared"
 CLOCK = "tip, object and wrench share a clock; no offset was applied"
 HEIGHT = "tip and slider are at height 0: the set has planar poses, and the tip is never lifted within a file"
 
@@ -110,16 +110,16 @@ def _steady(samples: Samples, rig: Rig, name: str, notes: Notes) -> Samples:
     repair = repair_heading(time, samples.values[:, 2], rig.outline.rotational_symmetry)
     lost = int(np.sum(~repair.keep))
     if repair.undone:
-        notes.repaired.append(f"{name}: object_pose: {repair.undone} jumps of the yaw by quarter turns undone")
+        notes.repaired.append(f"{name}: object_pose: {repair.undone} jumps of the yaw by quarter turns were undone")
     if repair.cut:
         notes.dropped.append(
             f"{name}: object_pose: {repair.cut} jumps of the yaw that the symmetry of {rig.shape} does not explain; "
-            f"the longest piece without one is kept"
+            f"the longest part without such a jump is kept"
         )
     if lost:
         notes.dropped.append(f"{name}: object_pose: {lost} of {len(repair.keep)} rows in or beyond jumps of the yaw")
     if np.sum(repair.keep) < 2:
-        raise ImportSourceError(f"{name}: object_pose: no two rows without a jump of the yaw between them")
+        raise ImportSourceError(f"{name}: object_pose: every two successive rows have a jump of the yaw between them")
     steady = np.column_stack([samples.values[:, :2], repair.heading])
     return Samples(samples.stamp, steady).take(repair.keep)
 

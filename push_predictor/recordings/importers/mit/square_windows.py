@@ -31,8 +31,8 @@ EDGE = 0
 COLUMNS = ("c", "beta", "dx", "dy", "dtheta", "push_group_est", "row_id")
 CSV_NAMES = {"beta": "beta_rad", "dx": "dx_m", "dy": "dy_m", "dtheta": "dtheta_rad"}
 ASSUMED = (
-    f"every window: pusher {VELOCITY} m/s, duration {DURATION} s, edge {EDGE} of rect1 (the source contains neither)",
-    "dy turned: the source counts it positive to the right of the push",
+    f"every window: pusher {VELOCITY} m/s, duration {DURATION} s, edge {EDGE} of rect1 (none of these in the source)",
+    "the sign of dy is reversed: in the source it is positive to the right of the push",
     "push_id is the source's estimate push_group_est",
     f"pusher radius {PUSHER_RADIUS} m, mass {MASSES['rect1']} kg, surface unknown",
 )

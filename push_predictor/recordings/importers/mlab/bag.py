@@ -27,13 +27,13 @@ UNIT = 0.02  # largest error of a quaternion's norm; a larger one marks an untra
 PAUSE = 0.3  # s
 MOVING = 0.001  # m/s
 BODY = (
-    "mlab bags: slider pose is that of the tracked body (origin at its markers, heading of its x axis); where the "
-    "object's outline lies in it is not recorded, so only displacement and change of heading are certain"
+    "mlab bags: the slider's pose is that of the tracked body (origin at its markers, heading of its x axis). The pose "
+    "of the outline in that body is not recorded, so only displacement and change of heading are certain"
 )
 FORCE = (
-    "mlab bags: force in the world on the pusher = R(tool yaw) diag(-1, 1) (F - zero); the axes were found from the "
-    "pushes (force against the direction of motion, 8 degrees or less on the mean in four bags, 22 in one), the "
-    "zero is the mean of the pause with the smallest force"
+    "mlab bags: the force on the pusher in the world is R(tool yaw) diag(-1, 1) (F - zero). The axes were found from "
+    "the pushes: the mean angle between force and reverse motion is 8 degrees or less in four bags, 22 in one. "
+    "The zero is the mean of the pause with the smallest force"
 )
 
 
@@ -62,7 +62,7 @@ def _report(path: Path, netft: Sequence[Stamped], rig: Rig | None, notes: Notes)
     least, median, most = header_lead(netft)
     notes.repaired.append(
         f"{path}: /netft_data header stamps lead the bag's clock by {median:.3f} s ({least:.3f} to {most:.3f}); "
-        "bag time is used for all streams, because the robot's log has no other"
+        "bag time is used for all streams, because the robot's log has no other time"
     )
     notes.assume(BODY)
     notes.assume(FORCE)

@@ -111,20 +111,18 @@ def report_irregularities(path: Path, pushes: list[LogPush], notes: Notes) -> No
         notes.dropped.append(f"{path}: {len(bare)} pushes without forces; normal_force and tangential_force are empty")
     repeats = sum(int(np.sum(np.all(np.diff(push.robot[:, 1:], axis=0) == 0.0, axis=1))) for push in pushes)
     if repeats:
-        notes.repaired.append(f"{path}: {repeats} robot poses repeat the previous one, ignored in the contact time")
+        notes.repaired.append(f"{path}: {repeats} robot poses repeat the one before, ignored in the contact time")
     timed = [push for push in pushes if len(push.force) or len(push.robot)]
     for one, two in pairwise(timed):
         if (back := one.time - two.time) > 0.0:
             notes.repaired.append(
-                f"{path}:{two.line}: after push {one.number} the clock goes back by {back:.0f} s: sessions were "
-                "joined; elapsed_time counts from the earliest"
+                f"{path}:{two.line}: after push {one.number} the clock goes back by {back:.0f} s, so the log "
+                "joins two sessions; elapsed_time counts from the earliest stamp"
             )
             continue
         moved = float(np.hypot(*(two.before - one.after)[:2]))
         if moved > MOVED_BY_HAND:
-            notes.assume(
-                f"{path}:{two.line}: object moved by hand {moved:.1f} mm before push {two.number}, not by a push"
-            )
+            notes.assume(f"{path}:{two.line}: the object was moved by hand {moved:.1f} mm before push {two.number}")
 
 
 def _pushes(lines: _Lines, notes: Notes) -> list[LogPush]:

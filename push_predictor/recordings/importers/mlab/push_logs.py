@@ -28,10 +28,10 @@ from push_predictor.types import Array
 MILLIMETRE = 1e-3
 FEWEST_POSES = 4
 ASSUMED = (
-    "contact begins where the tip's straight path meets the outline at rest and lasts until the tip stops; "
-    "velocity times duration is the travel in contact",
-    "force of the sensor in the world: R(tool yaw) T (F - mean of the first 10 samples), T a reflection "
-    "(MLab_EXP, ExtractFromLog.m); mean over the second half of a push",
+    "contact begins where the tip's straight path meets the outline at rest, and ends when the tip stops. Velocity "
+    "times duration is the distance travelled in contact",
+    "the force in the world is R(tool yaw) T (F - mean of the first 10 samples), where T is a reflection (MLab_EXP, "
+    "ExtractFromLog.m). It is averaged over the second half of a push",
 )
 
 

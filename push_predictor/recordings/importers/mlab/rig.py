@@ -18,8 +18,8 @@ FINGER_RADIUS = 1e-4  # m; a pointed finger: at the end of a push the logged tip
 SURFACES = {"": "hardboard", "wood_": "plywood"}
 THREE_POINTS = re.compile(r"(wood_)?((?:\d+(?:\.\d+)?_){5}\d+(?:\.\d+)?)")
 PATCH = re.compile(r"(wood_)?patch")
-FINGER = f"pointed finger: pusher radius {FINGER_RADIUS} m, contact where the tip's path meets the outline"
-ROUND_TRIP = "the object is the aluminium triangle of 150 mm legs and 1.518 kg, its centre at (50, 50) mm"
+FINGER = f"the finger is pointed: pusher radius {FINGER_RADIUS} m, contact where the tip's path meets the outline"
+ROUND_TRIP = "the object is the aluminium triangle of 1.518 kg with legs of 150 mm, its centre at (50, 50) mm"
 
 
 def triangle() -> Outline:
@@ -36,7 +36,7 @@ def folder_rig(folder: str, notes: Notes) -> Rig:
     notes.assume(FINGER)
     if match := THREE_POINTS.fullmatch(folder):
         points = np.array([float(word) for word in match[2].split("_")]).reshape(2, 3).T / 1000.0 - CENTROID
-        notes.assume(f"{folder}: support points from the folder's name, load shares from the centre of mass")
+        notes.assume(f"{folder}: the support points follow from the folder's name, their loads from the centre of mass")
         return _rig(SURFACES[match[1] or ""], np.column_stack([points, load_shares(points)]))
     if match := PATCH.fullmatch(folder):
         return _rig(SURFACES[match[1] or ""], None)
