@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -128,6 +129,9 @@ def test_alarm_is_added_to_the_json_without_other_changes():
     assert alarm_json(None, "too few pushes") == {"fired": False, "off": "too few pushes"}
 
 
+calibrated = cache(calibrate)  # the same for every test of a model
+
+
 # --- pushes and models -----------------------------------------------------------------------------------------------
 
 NOISE = np.array([2e-4, 2e-4, 4e-3])
@@ -153,7 +157,7 @@ def models() -> dict[str, PushModel]:
 
 def alarm_of(model: PushModel, table: PushTable):
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
-    return alarm_state(calibrate(model), table, prediction.mean, prediction.covariance)
+    return alarm_state(calibrated(model), table, prediction.mean, prediction.covariance)
 
 
 @pytest.mark.parametrize("kind", ["analytical", "gp"])
@@ -183,7 +187,7 @@ def test_alarm_is_equal_for_pushes_one_by_one_and_all_at_once(models: dict[str, 
     model, table = models["analytical"], made_up(6, 5, friction=0.45)
     velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
     table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
-    prediction, calibration = model.predict_rows(table.inputs, table.duration), calibrate(model)
+    prediction, calibration = model.predict_rows(table.inputs, table.duration), calibrated(model)
     monitor = AlarmMonitor(calibration)
     for push in table.pushes:
         rows = table.push_id == push
@@ -195,7 +199,7 @@ def test_alarm_is_equal_for_pushes_one_by_one_and_all_at_once(models: dict[str, 
 
 def test_repeated_push_is_ignored(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 6)
-    monitor, prediction = AlarmMonitor(calibrate(model)), model.predict_rows(table.inputs, table.duration)
+    monitor, prediction = AlarmMonitor(calibrated(model)), model.predict_rows(table.inputs, table.duration)
     for _ in range(3):
         monitor.add(table, prediction.mean, prediction.covariance)
     assert monitor.state.pushes == 10
@@ -205,7 +209,7 @@ def test_push_without_a_covariate_is_skipped_and_named(models: dict[str, PushMod
     model, table = models["analytical"], made_up(10, 7)
     heading = table.covariates["slider_heading"].copy()
     heading[4] = np.nan
-    monitor, prediction = AlarmMonitor(calibrate(model)), model.predict_rows(table.inputs, table.duration)
+    monitor, prediction = AlarmMonitor(calibrated(model)), model.predict_rows(table.inputs, table.duration)
     monitor.add(replace(table, covariates={"slider_heading": heading}), prediction.mean, prediction.covariance)
     assert monitor.state.pushes == 9
     (reason,) = monitor.skipped

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from even_physics import uniform_field
@@ -17,6 +19,7 @@ from push_predictor.types import Array
 CONTACTS, ANGLES, REPETITIONS = np.linspace(0.02, 0.23, 5), np.linspace(-1.2, 1.2, 5), 40
 
 
+@cache
 def first_windows(surface: str, seed: int = 3) -> PushTable:
     """The first 0.2 s of every push of a grid of repeated pushes, in order of the plan."""
     plan = grid_pushes(CONTACTS, ANGLES, REPETITIONS, travel=0.008)
