@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """The sub-command `trace`."""
+    """Add the sub-command `trace`."""
     parser = add_command(
         commands,
         "trace",

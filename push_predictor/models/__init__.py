@@ -1,4 +1,4 @@
 """Models of one push: from velocity, contact point and angle to the mean and covariance of the displacement.
 
-Start with `push_model`, `train` and `store.model_file`; the folders hold the parts that they are made of.
+Start with `push_model`, `train` and `store.model_file`; the folders contain their parts.
 """

@@ -33,7 +33,7 @@ PERIOD = 0.02  # s between two looks at what has arrived
 
 
 class PushValidator(Node):
-    """Finds windows in the sensor topics, asks predict_push about each, and scores the answers.
+    """Finds windows in the sensor topics, requests a prediction of each from predict_push, and scores the answers.
 
     The executor's thread does all work, every PERIOD. Raises PushPredictorError for a bad parameter.
     """

@@ -1,4 +1,4 @@
-"""Which pushes are complete, with every window answered? They leave in the order in which they were found."""
+"""The complete pushes, with every window answered, in the order in which they were found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are the streams of a validation in step? In a fast replay one lags behind while the middleware holds its samples."""
+"""Whether the streams of a validation are in step: in a fast replay the middleware may delay one of them."""
 
 from __future__ import annotations
 

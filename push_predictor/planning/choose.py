@@ -40,9 +40,11 @@ TIE = 1e-6  # weight of the distance (in tolerances) against the probability, to
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice:
-    """The chosen push (one), the probability that it reaches the goal, the pushes to be expected, this one included
-    (J; of a push that is as likely as wanted 1 / P, as if a miss cost one more of its kind), and where it should leave
-    the slider: mean (3,) and covariance (3, 3) in the world.
+    """The chosen push (one), and the probability that it reaches the goal.
+
+    expected: number of pushes to the goal, this one included. It is J of the module, or 1 / P for a push that is at
+    least as probable as requested, as if each miss cost one more push of this kind. mean (3,), covariance (3, 3): pose
+    of the slider after the push, in the world.
     """
 
     push: StraightPushes

@@ -1,4 +1,4 @@
-"""Trace the residual of a deployed model to an effect that the model lacks, add the effect, and measure again.
+"""Trace the residual of a deployed model to an effect that the model lacks, add it, and score the model again.
 
 Channels are judged in order of trust. A measurement error is corrected before anything is concluded about the motion,
 and effects on the mean before effects on the variance; the wrench is judged by itself. The held-out pushes are opened

@@ -27,7 +27,7 @@ def simulated(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [1, 3])
-def test_effect_sets_in_late_and_truth_lies_apart(tmp_path, short, simulated, seed):
+def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simulated, seed):
     places = make_hidden(tmp_path, seed)
     part, whole = read_recording(places.recorded), read_recording(places.whole)
     n = len(part.slider)

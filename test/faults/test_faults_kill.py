@@ -209,7 +209,7 @@ def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
     assert 20 <= json.loads((tmp_path / "validation.json").read_text())["n_test"] < len(windows)
 
 
-def test_a_completed_run_is_not_put_aside(tmp_path: Path):
+def test_a_completed_run_is_not_moved(tmp_path: Path):
     (tmp_path / "pushes.csv").write_text("complete")
     assert put_aside(tmp_path) is None and (tmp_path / "pushes.csv").exists()
 

@@ -208,7 +208,7 @@ def test_online_validation_of_a_measured_push_equals_offline(
 # --- the one push of the hexagon --------------------------------------------------------------------------------
 
 
-def test_the_hexagons_push_is_found_as_its_file_name_tells_it(found: dict[str, list[PushWindow]]) -> None:
+def test_the_hexagons_push_is_found_as_its_file_name_states(found: dict[str, list[PushWindow]]) -> None:
     (window,) = found[HEXAGON]
     assert window.angle == pytest.approx(-0.349, abs=0.02), "t in the file's name"
     assert window.covariates["edge"] == 1.0, "i, the side"
@@ -216,7 +216,7 @@ def test_the_hexagons_push_is_found_as_its_file_name_tells_it(found: dict[str, l
     assert 0.10 < window.velocity < 0.16, "v is 0.150; the tip sets off from rest in contact"
 
 
-def test_physics_tells_the_sense_of_the_hexagons_turn_not_its_size(
+def test_physics_predicts_the_sense_of_the_hexagons_rotation_not_its_size(
     imported: dict[str, Path], found: dict[str, list[PushWindow]]
 ) -> None:
     rig, table = load_rig_for([imported[HEXAGON]]), load_data([imported[HEXAGON]])

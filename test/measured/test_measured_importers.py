@@ -93,7 +93,7 @@ def _tip_at(recording: Recording, stamp: int) -> Array:
     return np.array([np.interp(stamp, tip.stamp, tip.x), np.interp(stamp, tip.stamp, tip.y)])
 
 
-def test_the_clock_offset_is_what_the_delay_test_shows_once_held_rows_are_left_out(measured_data: Path) -> None:
+def test_the_clock_offset_is_that_of_the_delay_test_without_repeated_rows(measured_data: Path) -> None:
     folder, notes = measured_data / "mcube_preliminary" / "time_delay", Notes()
     vicon = in_order(read_numbers(folder / "Output_vicon_tcpvicon.txt", 2, notes), "vicon", notes)
     tip = without_repeats(
@@ -138,7 +138,7 @@ def _facing(body: Array, half: float) -> Array:
     return body[np.abs(body[:, 1 - across]) < half - 0.008, across]
 
 
-def test_the_report_tells_what_was_done(mcube: tuple[ImportReport, dict[str, Recording]]) -> None:
+def test_the_report_states_what_was_done(mcube: tuple[ImportReport, dict[str, Recording]]) -> None:
     report, recordings = mcube
     assert sorted(recordings) == RUNS and report.pushes == 8
     assert sum("the tip stream stops" in line for line in report.dropped) == 4
@@ -166,7 +166,7 @@ def test_the_bag_of_aluminium_run_1_equals_its_text_files(
     assert bag.wrench is not None and np.any(bag.wrench.torque != 0.0)
 
 
-def test_the_mlab_bags_come_in_on_the_bags_clock_without_a_rig(measured_data: Path, tmp_path: Path) -> None:
+def test_mlab_bags_are_imported_with_bag_time_and_without_a_rig(measured_data: Path, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
     report = import_source("rosbag1", [measured_data / "mlab" / "bags"], tmp_path)
     assert report.recordings == 6
@@ -285,7 +285,7 @@ def test_the_350_point_pushes_equal_the_table_derived_by_others(measured_data: P
         assert np.all(np.abs(table.inputs[:, 0] - 0.0025) < 5e-5)
 
 
-def test_the_odd_things_of_the_mlab_logs_are_told(mlab: ImportReport) -> None:
+def test_irregularities_of_the_measured_mlab_logs_are_reported(mlab: ImportReport) -> None:
     assert any("after push 29 the clock goes back by 2897 s" in line for line in mlab.repaired)
     assert sum("moved by hand" in line for line in mlab.assumed) >= 5
     shares = {path.name: load_rig(path).support_points for path in mlab.written if path.suffix == ".yaml"}
@@ -302,7 +302,7 @@ def test_the_odd_things_of_the_mlab_logs_are_told(mlab: ImportReport) -> None:
         ("exp9_15", 11, ["states 15 pushes, contains 11"]),
     ],
 )
-def test_quirky_logs_come_in_as_far_as_they_can_and_say_so(
+def test_irregular_logs_are_imported_as_far_as_possible_and_reported(
     measured_data: Path, tmp_path: Path, name: str, pushes: int, words: list[str]
 ) -> None:
     report = import_source("mlab", [measured_data / "mlab" / "quirky_logs" / f"{name}.txt"], tmp_path)

@@ -25,7 +25,7 @@ def test_vhgp_has_a_better_density_than_gp_on_the_random_split(
     assert vhgp.exact_nlpd < vhgp.nlpd
 
 
-def test_the_exact_density_of_vhgp_is_better_than_gp_on_pushes_never_seen(measured_data: Path) -> None:
+def test_the_exact_density_of_vhgp_is_better_than_gp_on_held_out_pushes(measured_data: Path) -> None:
     gp = mean_scores(measured_data, "push", "gp", 100, 5)
     vhgp = mean_scores(measured_data, "push", "vhgp", 100, 5)
     assert vhgp.exact_nlpd < gp.nlpd

@@ -85,14 +85,14 @@ def test_whole_pushes_are_explained_by_the_load_on_the_support_points(pushes, su
 @pytest.mark.parametrize(
     ("surface", "support", "share"), [("plywood", "3pts1", 0.6), ("hardboard", "3pts2", 0.6), ("plywood", "3pts4", 1.0)]
 )
-def test_where_the_load_lies_close_or_wide_its_shares_beat_even_pressure(pushes, surface, support, share):
+def test_load_shares_beat_even_pressure_where_the_load_is_concentrated_or_spread(pushes, surface, support, share):
     """Measured 0.13 against 0.28, 0.22 against 0.38, 0.26 against 0.27."""
     table = pushes(surface, support)
     assert score(model(loaded(support)), table) < share * score(model(uniform_support(TRIANGLE)), table)
 
 
 @pytest.mark.parametrize("surface", ["hardboard", "plywood"])
-def test_where_the_load_lies_as_even_pressure_would_the_two_are_alike(pushes, surface):
+def test_load_shares_equal_even_pressure_where_the_load_is_even(pushes, surface):
     """c is 39 mm by the shares and 45 mm by even pressure; measured 0.122 and 0.122, 0.120 and 0.128."""
     table = pushes(surface, "3pts3")
     assert score(model(loaded("3pts3")), table) == pytest.approx(

@@ -37,7 +37,7 @@ def test_one_push_of_a_hexagon_is_too_little_and_is_named(found: tuple[Corpus, .
     assert found[-1].notes[0].endswith("; left out: hex on plywood (too few; pushes: 1, windows: 1).")
 
 
-def test_the_splits_deal_the_rows_that_the_tables_of_the_docs_tell(found: tuple[Corpus, ...]) -> None:
+def test_the_splits_have_the_rows_that_the_tables_of_the_docs_state(found: tuple[Corpus, ...]) -> None:
     table = found[0].sets[PAIR].table
     push = np.unique(table.push_id.astype(np.int64), return_inverse=True)[1]
     folds = np.random.default_rng(0).permutation(89)[push] % 5
@@ -64,7 +64,7 @@ def test_the_splits_deal_the_rows_that_the_tables_of_the_docs_tell(found: tuple[
         ("push", "vhgp", 0.180, -17.18),
     ],
 )
-def test_a_fit_of_the_paper_scores_what_the_docs_tell(
+def test_a_fit_of_the_paper_has_the_scores_of_the_docs(
     found: tuple[Corpus, ...], tmp_path: Path, split: SplitName, kind: str, nmse: float, nlpd: float
 ) -> None:
     fits = [(PAIR, Fit(kind, 100, split, k)) for k in range(FOLDS)]

@@ -189,7 +189,7 @@ def test_rejects_file_of_another_kind(tmp_path: Path) -> None:
         load_model(tmp_path / "absent")
 
 
-def test_error_of_newer_file_tells_user_to_update(models: dict[str, PushModel], tmp_path: Path) -> None:
+def test_error_of_newer_file_asks_the_user_to_update(models: dict[str, PushModel], tmp_path: Path) -> None:
     save_model(models["gp"], tmp_path / "m")
     _rewrite_header(tmp_path / "m", {"format_version": FORMAT_VERSION + 1, "written_by": "9.9"})
     with pytest.raises(

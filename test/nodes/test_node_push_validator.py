@@ -236,7 +236,7 @@ def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[
 
 
 @pytest.mark.parametrize("given", ["gp", ""])
-def test_a_model_is_given_by_the_servers_name_or_not_at_all(given: str, domain, server, models, tmp_path: Path):
+def test_a_model_is_given_by_the_servers_name_or_omitted(given: str, domain, server, models, tmp_path: Path):
     """The first model is the server's default."""
     with validator(domain, model=given, output=tmp_path) as process, replaying(domain, rate=20.0):
         process.wait_for_text(WRITTEN, 60.0)

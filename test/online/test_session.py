@@ -123,7 +123,7 @@ def test_a_finished_replay_ends_the_run_once_no_sample_follows() -> None:
     assert patience(session, BEGIN + 10.1 + 1.1 * QUIET) == pytest.approx(LAST_ANSWERS, abs=0.11)
 
 
-def test_a_replay_that_plays_on_takes_its_end_back() -> None:
+def test_a_replay_that_continues_cancels_the_end_of_the_run() -> None:
     session = opened()
     session.replay("finished", samples_waiting=False)
     session.replay("playing", samples_waiting=False)
@@ -153,7 +153,7 @@ def test_a_caller_waits_five_seconds_for_answers_and_gets_the_report() -> None:
     assert patience(session) == pytest.approx(CALLER_PATIENCE, abs=0.11)
 
 
-def test_no_report_is_written_where_the_parameter_says_so() -> None:
+def test_no_report_is_written_if_the_parameter_is_false() -> None:
     session = Session(LAST_ANSWERS, report=False)
     session.open(BEGIN)
     assert due(session, finish_requested=True)

@@ -57,7 +57,7 @@ def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path) -> None:
     assert not kept.table.covariates
 
 
-def test_repetitions_of_one_push_differ_and_go_where_it_was_sent() -> None:
+def test_repetitions_of_one_push_differ_and_follow_its_command() -> None:
     cell = repeat_push(QUICK, "rect1", "plywood", 0, 0.5, 0.0, 12, None)
     assert len(cell.outcomes) == 12 and cell.enough
     assert np.all(cell.sd > 0.0)

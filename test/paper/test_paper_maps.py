@@ -77,7 +77,7 @@ def as_the_paper_says() -> tuple[Place, Place, Place]:
     return NAMED["dx"][0], NAMED["dy"][0], NAMED["dtheta"][0]
 
 
-def test_outputs_that_are_largest_where_the_paper_says_so() -> None:
+def test_outputs_that_are_largest_where_the_paper_states() -> None:
     mean = bumps(as_the_paper_says())
     peaks = peaks_of(grid_of(mean), [model_of(mean)] * 2)
     assert peaks.repeated[0].place == (0.5, 0.0)
@@ -97,7 +97,7 @@ def test_a_model_that_disagrees_with_the_repetitions_makes_it_hold_in_part() -> 
     assert [finding.verdict for finding in findings] == ["holds in part"] * 4
 
 
-def test_a_push_that_comes_close_to_the_largest_counts_in_part_and_one_that_is_not_seen_not_at_all() -> None:
+def test_a_push_close_to_the_largest_counts_in_part_and_an_unobserved_one_does_not() -> None:
     def found(reach: float) -> Peaks:
         return peaks_at([(0.1, 1.0)], Estimate(reach, reach, reach))
 
@@ -169,7 +169,7 @@ def test_pushes_with_too_few_repetitions_are_never_the_largest() -> None:
     assert peaks_of(grid, [model]).repeated[0].place == (0.1, -1.5)
 
 
-def test_values_of_the_pushes_seen_go_where_they_belong() -> None:
+def test_values_of_the_observed_pushes_are_assigned_to_their_places() -> None:
     grid = grid_of(bumps(as_the_paper_says()), spoilt=5)
     np.testing.assert_array_equal(on_grid(grid, np.array([cell.mean for cell in grid.seen])), grid.mean)
     means, sds = redrawn(grid.seen)

@@ -143,7 +143,7 @@ def test_its_windows_are_those_of_the_pushes_that_were_written_to_it(corpus: Cor
     np.testing.assert_allclose(ours.outcomes[order], theirs.outcomes[expected], rtol=0.0, atol=1e-12)
 
 
-def test_cut_into_files_a_push_gives_the_windows_of_the_whole_recording_give_or_take_one(corpus: Corpus) -> None:
+def test_a_push_cut_into_files_gives_the_windows_of_the_whole_recording_within_one(corpus: Corpus) -> None:
     """A file has little free motion to tell the force's noise from: touch is seen up to a sample earlier or later."""
     recording = simulated(*PAIRS[0])
     whole = [window.push_id for window in find_windows(recording, require_rig(recording))]

@@ -80,7 +80,7 @@ def flat(level: float) -> dict[int, float]:
 # --- pushes ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_same_push_twice_as_fast_goes_the_same_way_when_slow_and_not_when_fast() -> None:
+def test_the_same_push_twice_as_fast_has_the_same_outcome_when_slow_and_not_when_fast() -> None:
     """The simulator's own truth: inertia is nothing at 20 mm/s and something at 200 mm/s."""
     plan = replace(FEW, speeds=(0.01, 0.02, 0.2), speed_pushes=6)
     slowest, slow, fast = (equal_travel(plan, "rect1", "plywood", k) for k in range(3))

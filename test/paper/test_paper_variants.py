@@ -91,11 +91,11 @@ def test_a_gain_by_push_alone_does_not_suffice() -> None:
     assert accepted(made_up({(500, "push", MATERN): 0.05})) == []
 
 
-def test_a_loss_at_a_smaller_size_forbids() -> None:
+def test_a_loss_at_a_smaller_size_rejects_the_variant() -> None:
     assert accepted(made_up(on_both(MATERN, 0.05) | {(100, "push", MATERN): -0.05})) == []
 
 
-def test_a_mean_that_gets_worse_forbids() -> None:
+def test_a_worse_mean_rejects_the_variant() -> None:
     assert accepted(made_up(on_both(MATERN, 0.05), nmse=0.3)) == []
     assert accepted(made_up(on_both(MATERN, 0.05), nmse=0.1)) == [MATERN]
 

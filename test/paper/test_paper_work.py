@@ -99,7 +99,7 @@ def test_another_folder_has_a_separate_cache(pieces, tmp_path: Path) -> None:
     assert lines(log) == [2, 2]
 
 
-def test_the_watch_sees_the_begin_and_every_piece_kept_ones_too(pieces, tmp_path: Path) -> None:
+def test_the_watch_sees_the_start_and_every_job_cached_ones_too(pieces, tmp_path: Path) -> None:
     for _ in range(2):
         seen = Seen()
         calls = [(n, str(tmp_path / "log")) for n in range(3)]

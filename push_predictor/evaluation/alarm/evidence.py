@@ -4,7 +4,7 @@ Each push gives several scores. If it is exchangeable with the calibration pushe
 scores so far, with ties broken at random, gives p values that are independent and uniform (Vovk, Gammerman and Shafer
 2005, section 7.1: conformal transducers). Each score bets that these p values are too often near 0 (or near 1). The
 capital is a test martingale, a mixture over the bets and over the push at which the change began. The weighted union
-over the scores holds however they depend on each other:
+over the scores is valid for any dependence between them:
 
     P(max over scores of weight * martingale ever reaches 1 / rate) <= sum of weights * rate = rate    (Ville)
 """

@@ -20,7 +20,7 @@ SYMBOLS = ("Δx", "Δy", "Δθ")
 
 
 def error_sentence(metrics: Mapping[str, Any]) -> str:
-    """Which share of the variation of the outcomes the model does not predict, with its interval."""
+    """The total NMSE with its interval: the unexplained share of the variation, summed over the outputs."""
     total, interval = metrics["nmse"]["total"], metrics["interval"]["nmse"]
     if total is None:
         return f"{metrics['model']}: the outcomes do not vary, so the NMSE is undefined."

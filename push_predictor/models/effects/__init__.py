@@ -1,4 +1,4 @@
 """An effect: a mechanism whose strength depends on a covariate, added to a base model.
 
-Import `effect`; `driver_basis` holds the functions of the covariate, `covariate_range` where they were observed.
+Import `effect`; `driver_basis` contains the functions of the covariate, `covariate_range` its observed range.
 """

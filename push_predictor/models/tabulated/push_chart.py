@@ -127,5 +127,5 @@ class PolygonChart:
         return (cast(Numbers, EDGE_SPACING * box + place),)
 
     def place_range(self, places: Array) -> tuple[float, float]:
-        """See Chart: where edges differ, the domain holds the whole of most of them."""
+        """See Chart: where edges differ, the domain contains most of them completely."""
         return (float(places.min()), float(places.max())) if self.boxes == 1 else (0.0, 1.0)

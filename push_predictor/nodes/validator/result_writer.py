@@ -55,7 +55,7 @@ class ResultWriter:
 
 
 def _folder(text: str) -> Path | None:
-    """The output folder, made now: a measurement should not end with the news that it cannot be."""
+    """Create the output folder before the run, so that a folder that cannot be written is reported at once."""
     if not text:
         return None
     folder = Path(text).expanduser().absolute()

@@ -1,4 +1,4 @@
-"""The size of effects: their coefficients, estimated jointly on standardised residuals, and what is unsure of them.
+"""The coefficients of effects, estimated jointly on standardised residuals, with their covariance.
 
 What a learnt base could express in its own inputs is regressed out of residuals and responses first (Frisch and Waugh
 1933). The covariance is a jackknife over blocks of pushes: it covers disturbances that neighbouring pushes share, and
