@@ -1,6 +1,6 @@
 """Read damaged copies of bags: is all data before the damage used, the damage named, memory and time small?
 
-    python -m benchmarks.recordings.fuzz_bags [--copies 2000] [--seed 0]
+    python -m benchmarks.recordings.fuzz_bags [--copies 2000] [--seed 0] [--only NUMBER...]
 
 A forked process reads each copy. A copy fails if
 
@@ -66,11 +66,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--copies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", type=int, help="the number of the one copy to read, its notes are printed")
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of the copies to read; their notes are printed")
     options = parser.parse_args()
     __import__("yaml")  # its memory counts once, before the readings
     whole, rows, failures = forms(), defaultdict(list), []
-    chosen = range(options.copies) if options.only is None else [options.only]
+    chosen = options.only or range(options.copies)
     begin = time.perf_counter()
     for number in chosen:
         copy = copy_number(number, options.seed, whole)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import re
 import subprocess
@@ -14,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ros_harness import REPOSITORY
+from repository import REPOSITORY
 
 from push_predictor import __version__
 from push_predictor.cli import COMMANDS, main
@@ -24,6 +26,8 @@ from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.rig import load_rig
 from push_predictor.recordings.table_file import read_table, write_table
+
+pytestmark = pytest.mark.slow
 
 OUTPUTS = ["dx", "dy", "dtheta"]
 METRICS = ["model", "n_train", "n_test", "n_pushes", "nmse", "nlpd", "exact_nlpd", "joint_nlpd", "coverage"]
@@ -79,9 +83,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
     }
     printed = {}
     for name, call in calls.items():
-        done = subprocess.run([sys.executable, "-m", "push_predictor.cli", *call], cwd=REPOSITORY, capture_output=True)
-        assert done.returncode == 0, done.stderr.decode()
-        printed[name] = done.stdout.decode()
+        with contextlib.redirect_stdout(io.StringIO()) as output:
+            assert main(call) == 0
+        printed[name] = output.getvalue()
     write_table(folder / "test.csv", load_data([folder / "test.mcap"]))
     rig = yaml.safe_dump(load_model(folder / "gp.pushmodel").rig.to_record())
     (folder / "test.rig.yaml").write_text(rig)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from ros_harness import REPOSITORY
+from repository import REPOSITORY
 from synthetic import START, Push, rows, translating_push, wrench_rows
 
 from push_predictor.recordings.read import read_recording
