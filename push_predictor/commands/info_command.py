@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from push_predictor.commands.output import add_command, write_json
+
+UNITS = {"velocity_range": "m/s", "angle_range": "rad"}
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -65,7 +67,16 @@ def _print(found: Mapping[str, object]) -> None:
     width = max(map(len, found))
     for key, value in found.items():
         if isinstance(value, (list, tuple)):
-            value = ", ".join(map(str, value)) or "none"
+            value = _listed(value)
         if isinstance(value, dict):
-            value = "".join(f"\n  {name}: {entry}" for name, entry in value.items()) or "none"
-        print(f"{key:{width}s}  {value}")
+            value = "".join(f"\n  {name}: {_entry(entry)}" for name, entry in value.items()) or "none"
+        unit = f" {UNITS[key]}" if key in UNITS else ""
+        print(f"{key:{width}s}  {value}{unit}")
+
+
+def _listed(values: Sequence[object]) -> str:
+    return ", ".join(f"{value:.4g}" if isinstance(value, float) else str(value) for value in values) or "none"
+
+
+def _entry(entry: object) -> object:
+    return _listed(entry) if isinstance(entry, (list, tuple)) else entry

@@ -64,7 +64,8 @@ def run(options: argparse.Namespace) -> None:
     sd, noise = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(prediction.process_covariance[0]))
     for k, (name, unit, scale) in enumerate((("dx", "mm", 1e3), ("dy", "mm", 1e3), ("dtheta", "deg", np.degrees(1.0)))):
         print(
-            f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f}  (process noise {noise[k] * scale:.3f})"
+            f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f} {unit}  "
+            f"(process noise {noise[k] * scale:.3f} {unit})"
         )
     print(INSIDE if result["in_domain"] else OUTSIDE)
 

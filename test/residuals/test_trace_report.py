@@ -100,7 +100,7 @@ def test_page_contains_hash_split_rivals_and_gain(tmp_path: Path, unpainted: Non
     assert re.search(r"contact friction\s+push count\s+[\d.]+\s+rival", text)
     assert re.search(r"contact friction\s+elapsed time\s+[\d.]+\s+found", text)
     assert "clock offset" in text and "after minus refit" in text and "a note for the reader" in text
-    assert re.search(r"The other \d+ candidates", text)
+    assert re.search(r"The other \d+ pairs", text)
 
 
 def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effects(
@@ -108,7 +108,7 @@ def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effect
 ) -> None:
     text = written(tmp_path, nothing)
     assert "No change found." in text and "None of 24 candidates explains the residual of 60 pushes" in text
-    assert "The closest is contact friction depending on elapsed time, with p = 0.3." in text
+    assert "The closest candidate is contact friction, depending on elapsed time, with p = 0.3." in text
     assert "The smallest detectable effect of each mechanism" in text and "0.021" in text
     for heading in ("Residuals before and after", "What else was tested", "Before, refit, after", "Calibration"):
         assert heading in text

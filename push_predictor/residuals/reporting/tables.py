@@ -60,11 +60,11 @@ def tested_tables(trace: Trace) -> list[str]:
     ]
     head = ("mechanism", "depends on", "family-wise p", "")
     open_rows = max(AT_ONCE, 1 + max((k for k, row in enumerate(rows) if row[3]), default=0))
-    caption = f"The {min(open_rows, len(rows))} candidates with the smallest p, of {len(rows)}."
+    caption = f"The {min(open_rows, len(rows))} pairs of mechanism and covariate with the smallest p, of {len(rows)}."
     parts = [html.table(caption, head, rows[:open_rows])]
     if rest := rows[open_rows:]:
-        table = html.table(f"The other {len(rest)}.", head, rest)
-        parts.append(html.details(f"The other {len(rest)} candidates", table))
+        table = html.table(f"The other {len(rest)} pairs.", head, rest)
+        parts.append(html.details(f"The other {len(rest)} pairs", table))
     return parts
 
 

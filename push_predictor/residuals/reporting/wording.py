@@ -166,8 +166,8 @@ def _none(trace: Trace) -> str:
     if closest is None:
         return text
     name = mechanism_phrase(closest.mechanism)
-    depends = "" if closest.covariate == CONSTANT else f" depending on {covariate_phrase(closest.covariate)}"
-    text = f"{text} The closest is {name}{depends}, with p = {p_text(closest.p_value)}."
+    depends = "" if closest.covariate == CONSTANT else f", depending on {covariate_phrase(closest.covariate)}"
+    text = f"{text} The closest candidate is {name}{depends}, with p = {p_text(closest.p_value)}."
     if closest.p_value <= trace.alpha:
         text = f"{text} It is not significant: the level is divided among motion, force and measurement."
     return text
