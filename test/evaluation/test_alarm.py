@@ -41,10 +41,11 @@ def fired_after(alarm: Alarm, pushes: Array) -> int | None:
 # --- the bets --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "calibration"), [(0.1, 5), (0.1, 60)])
 def test_false_alarm_probability_is_at_most_the_rate(rate: float, calibration: int):
     """With few calibration pushes just as with many; the union over two scores that depend leaves room."""
-    runs, pushes = 1000, 60
+    runs, pushes = 400, 60
     fired = sum(
         fired_after(Alarm(KINDS, rows[:calibration], rate, seed), rows[calibration:]) is not None
         for seed in range(runs)
@@ -160,17 +161,20 @@ def alarm_of(model: PushModel, table: PushTable):
     return alarm_state(calibrated(model), table, prediction.mean, prediction.covariance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["analytical", "gp"])
 def test_alarm_fires_after_a_change_and_not_on_pushes_like_the_training(kind: str, models: dict[str, PushModel]):
     assert not alarm_of(models[kind], made_up(120, 1)).fired
-    state = alarm_of(models[kind], made_up(120, 2, friction=0.6))
+    changed = made_up(120, 2, friction=0.6).take(np.arange(180))  # 60 pushes
+    state = alarm_of(models[kind], changed)
     assert state.fired and state.fired_after is not None and state.fired_after < 60
     assert state.fired_by in ("contact_friction: change of the contact friction", "size of the residual")
 
 
+@pytest.mark.slow
 def test_number_of_windows_of_a_push_does_not_raise_an_alarm(models: dict[str, PushModel]):
     for windows in (1, 6):
-        assert not alarm_of(models["analytical"], made_up(100, 3, windows=windows)).fired
+        assert not alarm_of(models["analytical"], made_up(60, 3, windows=windows)).fired
 
 
 def test_training_pushes_are_scored_by_cross_validation(models: dict[str, PushModel]):
@@ -182,10 +186,11 @@ def test_training_pushes_are_scored_by_cross_validation(models: dict[str, PushMo
     )
 
 
+@pytest.mark.slow
 def test_alarm_is_equal_for_pushes_one_by_one_and_all_at_once(models: dict[str, PushModel]):
-    """Fast pushes among them, whose integration takes its steps from the longest."""
-    model, table = models["analytical"], made_up(6, 5, friction=0.45)
-    velocity = np.where(np.repeat(np.arange(6), 3) % 2 == 0, 0.15, 0.05)
+    """A fast push among them, whose integration takes its steps from the longest."""
+    model, table = models["analytical"], made_up(3, 5, friction=0.45)
+    velocity = np.repeat([0.15, 0.05, 0.05], 3)
     table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
     prediction, calibration = model.predict_rows(table.inputs, table.duration), calibrated(model)
     monitor = AlarmMonitor(calibration)
@@ -197,10 +202,11 @@ def test_alarm_is_equal_for_pushes_one_by_one_and_all_at_once(models: dict[str, 
     assert monitor.state.fired_at == whole.fired_at
 
 
+@pytest.mark.slow
 def test_repeated_push_is_ignored(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 6)
     monitor, prediction = AlarmMonitor(calibrated(model)), model.predict_rows(table.inputs, table.duration)
-    for _ in range(3):
+    for _ in range(2):
         monitor.add(table, prediction.mean, prediction.covariance)
     assert monitor.state.pushes == 10
 
