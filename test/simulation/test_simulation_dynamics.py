@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from even_physics import no_noise, uniform_field
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from push_predictor.geometry.frames import rotate, to_body
@@ -39,7 +37,7 @@ def even_physics(slider: Slider, n: int, contact_friction: float = 0.25, frictio
 
 
 def push(
-    physics: Physics, plan: PushPlan, poses: Array | None = None, *, rest: float = 0.3, **options: Array
+    physics: Physics, plan: PushPlan, poses: Array | None = None, *, rest: float = 0.1, **options: Array
 ) -> Motion:
     start = np.zeros((len(plan), 3)) if poses is None else poses
     path = pusher_path(plan, physics.outline, physics.radius, start, ACCELERATION)
@@ -68,7 +66,7 @@ def turned(plan: PushPlan, speed: float) -> PushPlan:
     return PushPlan(plan.contact, plan.angle, np.full(len(plan), speed), plan.travel)
 
 
-def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, sticks: bool, steps: int = 100) -> Array:
+def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, sticks: bool, steps: int = 50) -> Array:
     """Poses (n, 3) after quasi-static pushes over `distance` beyond the touch.
 
     The slider's twist is the one of least frictional power that the contact allows (Peshkin and Sanderson 1988): a
@@ -107,26 +105,27 @@ def least_dissipation_path(physics: Physics, plan: PushPlan, distance: float, st
 def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: float) -> Array:
     """Poses (n, 3) when the tips have travelled `distance` beyond the commanded touch."""
     inward = physics.outline.inward_normal(plan.contact)
-    goal = physics.outline.point(plan.contact) - physics.radius * inward + distance * rotate(inward, plan.angle)
-    reached = np.argmin(np.linalg.norm(motion.pusher - goal[:, None], axis=2), axis=1)
+    touch, direction = physics.outline.point(plan.contact) - physics.radius * inward, rotate(inward, plan.angle)
+    along = np.sum((motion.pusher - touch[:, None]) * direction[:, None], axis=2)
+    reached = np.argmax(along > distance - 1e-5, axis=1)  # half a step before; not again when the tip retracts
     return motion.slider[np.arange(len(plan)), reached]
 
 
-SLOW = PushPlan(
-    np.array([0.04, 0.125, 0.19, 0.33]), np.array([0.3, -0.2, 0.1, -0.5]), np.full(4, 0.005), np.full(4, 0.012)
-)
+SLOW = PushPlan(np.array([0.04, 0.19, 0.33]), np.array([0.3, 0.1, -0.5]), np.full(3, 0.005), np.full(3, 0.0055))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("contact_friction", "sticks"), [(20.0, True), (0.0, False)])
 @pytest.mark.parametrize("shape", ["rect1", "ellip2", "hex"])
 def test_slow_push_minimises_dissipation(shape: str, contact_friction: float, sticks: bool) -> None:
     physics = even_physics(slider_named(shape), len(SLOW), contact_friction)
-    expected = least_dissipation_path(physics, SLOW, 0.01, sticks)
-    found = at_distance(push(physics, SLOW), SLOW, physics, 0.01)
-    assert np.all(np.abs(found - expected)[:, :2] < 1e-4)  # 1 % of the distance
+    expected = least_dissipation_path(physics, SLOW, 0.005, sticks)
+    found = at_distance(push(physics, SLOW), SLOW, physics, 0.005)
+    assert np.all(np.abs(found - expected)[:, :2] < 5e-5)  # 1 % of the distance
     assert np.all(np.abs(found - expected)[:, 2] < 0.01 * np.max(np.abs(expected[:, 2])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["rect1", "ellip2"])
 def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
     plan = random_pushes(20, [0.005], 0.01, np.random.default_rng(1))
@@ -137,16 +136,19 @@ def test_inertia_matters_at_150_mm_per_second_and_not_at_10(shape: str) -> None:
     assert np.any(relative(fast - slowest, slowest) > 0.12)
 
 
-@given(st.floats(0.05, 0.4), st.floats(-np.pi, np.pi), st.sampled_from(["rect1", "ellip3", "hex"]))
-@settings(max_examples=8, deadline=None)
-def test_free_slider_stops_when_friction_has_dissipated_its_energy(speed: float, direction: float, shape: str) -> None:
-    velocity = np.array([[speed * np.cos(direction), speed * np.sin(direction), 0.0]])
-    end = travelled(let_go(even_physics(slider_named(shape), 1), velocity))[0]
-    assert np.hypot(*end[:2]) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
-    assert np.arctan2(end[1], end[0]) == pytest.approx(direction, abs=1e-3)
-    assert abs(end[2]) < 1e-6
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", ["rect1", "ellip3", "hex"])
+def test_free_slider_stops_when_friction_has_dissipated_its_energy(shape: str) -> None:
+    rng = np.random.default_rng(2)
+    speed, direction = rng.uniform(0.05, 0.4, 8), rng.uniform(-np.pi, np.pi, 8)
+    velocity = np.column_stack([speed * np.cos(direction), speed * np.sin(direction), np.zeros(8)])
+    end = travelled(let_go(even_physics(slider_named(shape), 8), velocity))
+    assert np.hypot(*end[:, :2].T) == pytest.approx(speed**2 / (2.0 * FRICTION * GRAVITY), rel=0.02, abs=2e-5)
+    assert np.arctan2(end[:, 1], end[:, 0]) == pytest.approx(direction, abs=1e-3)
+    assert np.all(np.abs(end[:, 2]) < 1e-6)
 
 
+@pytest.mark.slow
 def test_friction_dissipates_energy_until_rest() -> None:
     slider = slider_named("ellip2")
     velocity = np.random.default_rng(3).normal(size=(20, 3)) * [0.2, 0.2, 4.0]
@@ -157,8 +159,9 @@ def test_friction_dissipates_energy_until_rest() -> None:
     assert np.all(energy[:, -1] < 1e-12 * energy[:, 0])
 
 
+@pytest.mark.slow
 def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
-    plan = random_pushes(20, [0.04, 0.2], 0.01, np.random.default_rng(4), angle_limit=1.0)
+    plan = random_pushes(20, [0.04, 0.1], 0.01, np.random.default_rng(4), angle_limit=1.0)
     mirrored = PushPlan(
         (0.25 - plan.contact) % 1.0, -plan.angle, plan.speed, plan.travel
     )  # left and right of the square
@@ -167,8 +170,9 @@ def test_symmetric_rig_gives_mirrored_motion_for_mirrored_pushes() -> None:
     assert np.allclose(one, other * [1.0, -1.0, -1.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
-    plan = random_pushes(10, [0.04, 0.2], 0.01, np.random.default_rng(5))
+    plan = random_pushes(10, [0.04, 0.1], 0.01, np.random.default_rng(5))
     poses = np.random.default_rng(6).normal(size=(10, 3)) * [0.03, 0.03, 1.0]
     physics = even_physics(slider_named("hex"), 10)
     there, here = travelled(push(physics, plan, poses)), travelled(push(physics, plan))
@@ -176,11 +180,13 @@ def test_motion_on_uniform_table_is_invariant_to_place_and_heading() -> None:
     assert np.allclose(there[:, 2], here[:, 2], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_outcome_converges_with_smaller_time_steps() -> None:
     plan = random_pushes(12, [0.01, 0.05, 0.15], 0.02, np.random.default_rng(7))
-    physics = even_physics(slider_named("ellip2"), 12)
-    path = pusher_path(plan, physics.outline, RADIUS, np.zeros((12, 3)), ACCELERATION)
-    ends = [travelled(push(physics, plan, rest=0.1, time_step=step / path.speed)) for step in (8e-5, 4e-5, 1e-5)]
+    physics, start = even_physics(slider_named("ellip2"), 12), np.zeros((12, 3))
+    path = pusher_path(plan, physics.outline, RADIUS, start, ACCELERATION)
+    until_rest = path.push_time + 0.08
+    ends = [travelled(run(physics, path, start, until_rest, time_step=d / path.speed)) for d in (8e-5, 4e-5, 1e-5)]
     coarse, usual = (relative(end - ends[-1], ends[-1]) for end in ends[:2])
     assert np.all(usual < 0.005)
     assert np.all(usual < coarse)
@@ -202,8 +208,9 @@ def test_force_through_the_centre_equals_friction_times_weight() -> None:
     assert np.max(np.abs(motion.wrench[0, :, 1:])) < 1e-6
 
 
+@pytest.mark.slow
 def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
-    plan = random_pushes(24, [0.04, 0.1, 0.3], 0.01, np.random.default_rng(8))
+    plan = random_pushes(24, [0.04, 0.15], 0.01, np.random.default_rng(8))
     physics = even_physics(slider_named("ellip3"), 24, contact_friction=0.25)
     motion = push(physics, plan)
     poses, tips = motion.slider[:, :-1].reshape(-1, 3), motion.pusher[:, :-1].reshape(-1, 2)
@@ -215,8 +222,9 @@ def test_contact_force_stays_in_the_friction_cone_and_never_pulls() -> None:
     assert np.all(rubbing <= 0.25 * pressing + 1e-9)
 
 
+@pytest.mark.slow
 def test_rod_penetrates_by_micrometres_and_separates_when_it_retracts() -> None:
-    plan = random_pushes(24, [0.04, 0.1, 0.3], 0.01, np.random.default_rng(9))
+    plan = random_pushes(24, [0.04, 0.15], 0.01, np.random.default_rng(9))
     physics = even_physics(slider_named("rect1"), 24)
     motion = push(physics, plan)
     gap = physics.outline.project(to_body(motion.pusher.reshape(-1, 2), motion.slider.reshape(-1, 3))).distance - RADIUS
