@@ -25,6 +25,8 @@ from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.sensors import Faults
 from push_predictor.simulation.spec import SimulationSpec
 
+pytestmark = pytest.mark.slow
+
 
 def spec(seed: int, pushes: int = 90) -> SimulationSpec:
     plan = random_pushes(pushes, (0.02,), travel=0.014, rng=np.random.default_rng(seed))
@@ -41,14 +43,23 @@ def learnt() -> PushModel:
     )
 
 
-def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
-    recording = simulate(replace(spec(2), changes=changes, faults=Faults(**faults)))
+def loaded(changes: Changes, faults: Faults) -> LoadedData:
+    recording = simulate(replace(spec(2), changes=changes, faults=faults))
     assert recording.rig is not None
-    return trace(learnt(), LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig))
+    return LoadedData(cut_again([recording], recording.rig), (recording,), recording.rig)
+
+
+@cache
+def faultless() -> LoadedData:
+    return loaded(Changes(), Faults())
+
+
+def traced(changes: Changes = Changes(), **faults: Any) -> Trace:
+    return trace(learnt(), loaded(changes, Faults(**faults)))
 
 
 def test_second_recording_of_the_same_rig_has_no_effect() -> None:
-    assert traced().verdict == "none"
+    assert trace(learnt(), faultless()).verdict == "none"
 
 
 def test_constant_bias_of_the_force_sensor_is_removed_by_zeroing() -> None:
@@ -60,7 +71,7 @@ def test_force_bias_during_contact_is_a_measurement_error(monkeypatch: pytest.Mo
     effect = WrenchEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ())
     found = WrenchFinding((effect,), (), 0.1, True)
     monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
-    result = trace_json(traced())
+    result = trace_json(trace(learnt(), faultless()))
     assert (result["verdict"], result["channel"], result["motion_model_changed"]) == (
         "measurement",
         "measurement",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -52,12 +53,13 @@ class Nuisance:
         return self.known[key]
 
     def _columns(self, touch: bool, constants: bool, kept: str | None, kind: Kind) -> Array | None:
-        parts = [self._late_touch()] if touch else []
+        parts = [self._late_touch] if touch else []
         if constants:
             parts += [self.response(name) for name in self.mechanisms if name != kept]
         columns = np.concatenate(parts, axis=2) if parts else np.empty((len(self.evidence.table), 3, 0))
         return _orthonormal(columns, Residualizer(controls_for(kind, self.inputs)))
 
+    @cached_property
     def _late_touch(self) -> Array:
         since = self.evidence.table.covariates.get("time_since_contact")
         if since is None:
