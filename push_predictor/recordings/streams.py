@@ -55,7 +55,7 @@ class ScalarStream:
         return len(self.stamp)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """All streams of one recording.
 
@@ -70,3 +70,13 @@ class Recording:
     wrench: WrenchStream | None
     scalars: dict[str, ScalarStream] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        seconds = 1e-9 * float(self.slider.stamp[-1] - self.slider.stamp[0]) if len(self.slider) else 0.0
+        force = f"{len(self.wrench)} wrenches" if self.wrench is not None else "no force sensor"
+        rig = f"{self.rig.shape} on {self.rig.surface}" if self.rig is not None else "no rig"
+        return (
+            f"Recording {self.name!r}: {rig}, {seconds:.1f} s\n"
+            f"  {len(self.slider)} slider poses, {len(self.pusher)} pusher poses, {force}\n"
+            f"  scalar topics: {', '.join(self.scalars) or 'none'}; notes: {len(self.notes)}"
+        )

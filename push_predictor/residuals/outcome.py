@@ -84,7 +84,7 @@ class HeldOut:
     digest: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trace:
     """All that a trace found.
 
@@ -116,3 +116,19 @@ class Trace:
     experiment: tuple[Mapping[str, float], ...]
     alpha: float
     notes: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        effects = [
+            f"  {effect.mechanism or 'unknown mechanism'}, depends on {effect.covariate}, p = {effect.p_value:.2g}"
+            for effect in self.effects
+        ]
+        gain, pushes = self.gain_nlpd, len(self.held_out.table.pushes)
+        interval = f"{gain.value:+.3f} ({gain.low:+.3f} to {gain.high:+.3f})"
+        return "\n".join(
+            [
+                f"Trace of {self.model.name!r}: verdict {self.verdict}",
+                *(effects or ["  no effect found"]),
+                f"  NLPD after less refit on {pushes} held-out pushes: {interval}",
+                f"  extended model: {'yes' if self.extended else 'no'}",
+            ]
+        )

@@ -216,6 +216,15 @@ def test_windows_are_found_from_the_recorded_rig_end_to_end_or_overlapping():
     assert {round(w.duration, 9) for w in plain} == {0.2} and len(dense) > 2 * len(plain)
 
 
+def test_the_repr_of_a_recording_states_its_rig_length_and_streams():
+    recording = read_recording(FEW)
+    text = repr(recording)
+    length = 1e-9 * (recording.slider.stamp[-1] - recording.slider.stamp[0])
+    for part in ("'hexagon_delrin'", "hex on delrin", f"{length:.1f} s", f"{len(recording.slider)} slider poses"):
+        assert part in text, part
+    assert len(text.splitlines()) == 3
+
+
 @pytest.mark.parametrize("given", [{"duration": 0.0}, {"duration": np.nan}, {"stride": -0.1}])
 def test_a_wrong_duration_or_stride_is_refused(given):
     with pytest.raises(RequestError, match=next(iter(given))):
@@ -252,6 +261,8 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
     assert "motion" in seen and found.alpha == 0.05 and found.model is model
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
     assert "elapsed_time" in tried and "slider_x" not in tried
+    assert repr(found).startswith(f"Trace of 'square_abs_train': verdict {found.verdict}")
+    assert f"{found.gain_nlpd.value:+.3f}" in repr(found) and len(repr(found).splitlines()) < 10
 
 
 # --- the next push ----------------------------------------------------------------------------------------------------
