@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
     for kind, names in OPTIONS_OF_KIND.items():
         for name in names:
             if kind != options.kind and getattr(options, name) is not None:
-                raise RequestError(f"--{name}", getattr(options, name), f"it with `report {kind}` only")
+                raise RequestError(f"report {options.kind}", f"--{name}", f"it with `report {kind}` only")
     check_output("--out", options.out, folder=True)
     options.out.mkdir(parents=True, exist_ok=True)
     if options.kind == "paper":
@@ -132,7 +132,7 @@ def _validation(options: argparse.Namespace) -> None:
 
     if (options.model is None) != (options.recording is None):
         missing = "--model" if options.model is None else "--recording"
-        raise RequestError(missing, None, "both --model and --recording, or neither")
+        raise RequestError(missing, "missing", "both --model and --recording, or neither")
     with progress("report"):
         if options.model is None:
             models, recording = _simulated(options.out, 60 if options.quick else 300)

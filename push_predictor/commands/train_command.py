@@ -97,9 +97,11 @@ def _check(options: argparse.Namespace, kind: str) -> None:
     check_seed(options.seed)
     check_output("--out", options.out)
     if options.fit and kind != "analytical":
-        raise RequestError("--fit", kind, "it with --kind analytical only: a learnt model has no friction to estimate")
-    if options.inducing is not None and (kind != "vhgp" or options.inducing < 1):
-        raise RequestError("--inducing", options.inducing, "an integer of at least 1, with --kind vhgp only")
+        raise RequestError("--kind", kind, "analytical with --fit: a learnt model has no friction to estimate")
+    if options.inducing is not None and kind != "vhgp":
+        raise RequestError("--kind", kind, "vhgp with --inducing")
+    if options.inducing is not None and options.inducing < 1:
+        raise RequestError("--inducing", options.inducing, "an integer of at least 1")
     if options.stride is not None and not 0.0 < options.stride < float("inf"):
         raise RequestError("--stride", options.stride, "a number above 0, in s")
 
