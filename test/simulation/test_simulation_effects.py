@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,15 +34,20 @@ def spec_of(plan: PushPlan, **options: object) -> SimulationSpec:
 def middle_pushes(angle: Array, speed: float = 0.02) -> PushPlan:
     """Pushes at the middle of the lowest side."""
     n = len(angle)
-    return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, 0.012))
+    return PushPlan(np.full(n, 0.125), np.asarray(angle), np.full(n, speed), np.full(n, 0.009))
 
 
 def some_pushes(n: int = 10) -> PushPlan:
-    return random_pushes(n, [0.02], 0.012, np.random.default_rng(4), angle_limit=0.8)
+    return random_pushes(n, [0.02], 0.009, np.random.default_rng(4), angle_limit=0.8)
+
+
+ON_GLASS = spec_of(some_pushes())
+ON_ABS = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
+outcomes_of, recording_of = cache(push_outcomes), cache(simulate)  # a spec is equal only to itself
 
 
 def mean_outcome(spec: SimulationSpec) -> Array:
-    return np.asarray(push_outcomes(spec).outcomes.mean(axis=0))
+    return np.asarray(outcomes_of(spec).outcomes.mean(axis=0))
 
 
 def constant(value: float) -> Changes:
@@ -65,28 +71,27 @@ def streams(recording: Recording) -> list[Array]:
 
 
 def test_changes_of_zero_leave_the_recording_identical() -> None:
-    plan = some_pushes()
     none = Changes(
         contact_friction=lambda moment: np.zeros(len(moment.travelled)),
         load=lambda moment: np.zeros((len(moment.travelled), 1)),
         grip=lambda moment: np.ones(len(moment.travelled)),
         pull=lambda moment: np.zeros((len(moment.travelled), 3)),
     )
-    plain = SimulationSpec("rect1", "abs", plan, seed=3)
-    for one, other in zip(streams(simulate(plain)), streams(simulate(replace(plain, changes=none))), strict=True):
+    same = simulate(replace(ON_ABS, changes=none))
+    for one, other in zip(streams(recording_of(ON_ABS)), streams(same), strict=True):
         assert np.array_equal(one, other)
 
 
 def test_pickled_spec_gives_the_same_recording() -> None:
-    plain = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
-    for one, other in zip(streams(simulate(plain)), streams(simulate(pickle.loads(pickle.dumps(plain)))), strict=True):
+    same = simulate(pickle.loads(pickle.dumps(ON_ABS)))
+    for one, other in zip(streams(recording_of(ON_ABS)), streams(same), strict=True):
         assert np.array_equal(one, other)
 
 
 def test_directed_drag_without_anisotropy_equals_isotropic_drag() -> None:
-    spec = spec_of(some_pushes())
     level = Changes(grain=lambda moment: np.zeros((len(moment.travelled), 2)))
-    assert push_outcomes(replace(spec, changes=level)).outcomes == pytest.approx(push_outcomes(spec).outcomes, abs=1e-9)
+    directed = push_outcomes(replace(ON_GLASS, changes=level)).outcomes
+    assert directed == pytest.approx(outcomes_of(ON_GLASS).outcomes, abs=1e-9)
 
 
 def test_more_contact_friction_reduces_slip() -> None:
@@ -109,14 +114,15 @@ def test_contact_friction_is_never_negative() -> None:
     )
 
 
+@pytest.mark.slow
 def test_lower_table_friction_changes_the_force_but_not_the_motion() -> None:
-    spec = spec_of(some_pushes())
-    half = replace(spec, changes=Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)))
-    plain, slippery = push_outcomes(spec).outcomes, push_outcomes(half).outcomes
+    half = replace(ON_GLASS, changes=Changes(grip=lambda moment: np.full(len(moment.travelled), 0.5)))
+    plain, slippery = outcomes_of(ON_GLASS).outcomes, push_outcomes(half).outcomes
     assert np.max(np.abs(slippery - plain)) < 0.03 * np.max(np.abs(plain))
-    assert _largest_force(half) == pytest.approx(0.5 * _largest_force(spec), rel=0.05)
+    assert _largest_force(half) == pytest.approx(0.5 * _largest_force(ON_GLASS), rel=0.05)
 
 
+@cache
 def _largest_force(spec: SimulationSpec) -> float:
     """Median force at the middle of the pushes, N."""
     (batch,) = run_pushes(spec)
@@ -125,15 +131,15 @@ def _largest_force(spec: SimulationSpec) -> float:
 
 
 def test_mass_added_at_the_centre_changes_the_force_but_not_the_motion() -> None:
-    spec = spec_of(some_pushes())
-    loaded = replace(spec, changes=Changes(added_mass=0.4))
-    plain, heavy = push_outcomes(spec).outcomes, push_outcomes(loaded).outcomes
+    loaded = replace(ON_GLASS, changes=Changes(added_mass=0.4))
+    plain, heavy = outcomes_of(ON_GLASS).outcomes, push_outcomes(loaded).outcomes
     assert np.max(np.abs(heavy - plain)) < 0.03 * np.max(np.abs(plain))
-    assert _largest_force(loaded) == pytest.approx((1.0 + 0.4 / spec.slider.mass) * _largest_force(spec), rel=0.05)
+    heavier = 1.0 + 0.4 / ON_GLASS.slider.mass
+    assert _largest_force(loaded) == pytest.approx(heavier * _largest_force(ON_GLASS), rel=0.05)
 
 
 def test_slider_with_load_on_its_rim_turns_less() -> None:
-    spec = spec_of(PushPlan(np.full(2, 0.19), np.zeros(2), np.full(2, 0.02), np.full(2, 0.012)))
+    spec = spec_of(PushPlan(np.full(2, 0.19), np.zeros(2), np.full(2, 0.02), np.full(2, 0.009)))
     points = support_points(spec.slider.outline)
     rim = np.sum(points**2, axis=1) / np.mean(np.sum(points**2, axis=1)) - 1.0
     turns = [
@@ -153,14 +159,14 @@ def test_off_centre_load_turns_the_slider_to_the_other_side() -> None:
     assert mean_outcome(loaded)[2] > 0.005  # the loaded left side lags, so the slider turns left
 
 
+@pytest.mark.slow
 def test_effect_of_table_grain_has_period_pi_and_changes_sign_at_right_angles() -> None:
-    plan = middle_pushes(np.zeros(1))
+    plain = spec_of(middle_pushes(np.zeros(1)), turn_spread=1.0)
 
     def turned(heading: float) -> Array:
         """The effect of the grain on a push of a slider with this heading."""
         grain = Changes(grain=lambda moment: np.tile([0.0, 0.02], (len(moment.travelled), 1)))
-        spec = replace(spec_of(plan), turn_spread=1.0)
-        return _at_heading(replace(spec, changes=grain), heading) - _at_heading(spec, heading)
+        return _at_heading(replace(plain, changes=grain), heading) - _at_heading(plain, heading)
 
     along, opposite, right = turned(0.3), turned(0.3 + np.pi), turned(0.3 + np.pi / 2.0)
     assert abs(along[1]) > 3e-5
@@ -200,6 +206,7 @@ def test_resting_slider_stays_on_a_gentle_slope() -> None:
     assert np.max(np.abs(batch.motion.slider[0, untouched, :2])) < 1e-4
 
 
+@pytest.mark.slow
 def test_viscous_drag_is_proportional_to_speed() -> None:
     drag = Changes(viscosity=lambda moment: np.full(len(moment.travelled), 20.0))
     added = []
@@ -239,13 +246,12 @@ def _found(recording: Recording) -> PushTable:
 
 
 def test_recorded_topic_does_not_change_the_pushes() -> None:
-    spec = SimulationSpec("rect1", "abs", some_pushes(4), seed=3)
     topic = Topic(np.array([0.0, 60.0]), np.array([5.0, 65.0]))
-    with_topic = simulate(replace(spec, topics={"room/light": topic}))
+    with_topic = simulate(replace(ON_ABS, topics={"room/light": topic}))
     assert set(with_topic.scalars) == {"surface/temperature", "room/light"}
     stream = with_topic.scalars["room/light"]
     assert stream.value == pytest.approx(5.0 + (stream.stamp - stream.stamp[0]) / 1e9, abs=0.01)
-    for one, other in zip(streams(simulate(spec)), streams(with_topic), strict=True):
+    for one, other in zip(streams(recording_of(ON_ABS)), streams(with_topic), strict=True):
         assert np.array_equal(one, other)
 
 
@@ -290,6 +296,8 @@ def test_compliant_rod_bends_only_under_force() -> None:
     assert np.median(away[force > 0.8]) == pytest.approx(5e-4 * np.median(force[force > 0.8]), rel=0.1)
 
 
+WITHOUT_NOISE = replace(ON_ABS, sensors=QUIET)
+
+
 def _both(faults: Faults) -> tuple[Recording, Recording]:
-    spec = SimulationSpec("rect1", "abs", some_pushes(4), seed=3, sensors=QUIET)
-    return simulate(spec), simulate(replace(spec, faults=faults))
+    return recording_of(WITHOUT_NOISE), simulate(replace(WITHOUT_NOISE, faults=faults))
