@@ -137,7 +137,7 @@ def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
         print("6. Load the extended model and continue.")
         served = None if traced.extended is None else f"{name}_extended"
         if traced.extended is None or served is None:
-            print("   There is no extended model: no effect was found that improves the predictions.")
+            print("   There is no extended model: no effect was found that improves the log density.")
         else:
             _print_lines(operator.load(traced.extended, served))
         # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.

@@ -45,7 +45,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--save-model",
         type=Path,
         metavar="EXTENDED",
-        help="write the extended model to this file, if the extension improves the predictions",
+        help="write the extended model to this file, if it improves the log density of held-out pushes",
     )
     add_rig(parser)
     parser.set_defaults(run=run)

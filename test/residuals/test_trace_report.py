@@ -185,7 +185,7 @@ def test_verdict_starts_with_the_answer_then_size_and_interval(drift: Trace) -> 
     ("gain", "kept", "words"),
     [
         (Gain(-0.5, -0.6, -0.4), True, "The motion model is extended."),
-        (Gain(-0.1, -0.3, 0.1), False, "does not improve the predictions beyond chance"),
+        (Gain(-0.1, -0.3, 0.1), False, "the effect does not improve the log density beyond chance"),
         (Gain(-0.1, float("nan"), float("nan")), False, "too few pushes for an interval"),
     ],
 )

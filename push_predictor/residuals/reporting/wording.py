@@ -82,7 +82,8 @@ def _decision(trace: Trace) -> str:
         return "The motion model is extended."
     if not np.isfinite([gain.low, gain.high]).all():
         return "The motion model stays unchanged: there are too few pushes for an interval."
-    return "The motion model stays unchanged: modelling the effect does not improve the predictions beyond chance."
+    effects = "the effect does" if len(trace.terms) == 1 else "the effects do"
+    return f"The motion model stays unchanged: {effects} not improve the log density beyond chance."
 
 
 def _gain(trace: Trace, pushes: str) -> str:

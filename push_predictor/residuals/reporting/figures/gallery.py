@@ -113,7 +113,7 @@ def _basis_picture(path: Path, trace: Trace, strength: Strength, analysis: Rows,
         if wide
         else "Line: fitted, with its 95 % band. Points: estimated separately in each bin, from the residuals of the "
         f"model and the other effects. {BARS} Orange: the pushes of the fit. Open squares: held-out pushes. Grey dots: "
-        f"single pushes; {hidden} are not shown (outside the picture, or with too small a response)."
+        f"single pushes. Not shown, by panel: {hidden} (outside the picture, or with too small a response)."
     )
     pattern = (
         ""
