@@ -119,7 +119,7 @@ def _covariates(request: Any, count: int) -> dict[str, Array]:
     if not names and not len(request.covariate_values):
         return {}
     if (found := len(request.covariate_values)) != count * len(names):
-        raise RequestError("covariate_values length", found, f"{count * len(names)}, one a name and push")
+        raise RequestError("covariate_values length", found, f"{count * len(names)}, one per name and push")
     if repeated := {name for name in names if names.count(name) > 1}:
         raise RequestError("covariate_names", sorted(repeated), "each name once")
     values = np.array(request.covariate_values, dtype=np.float64).reshape(count, len(names))

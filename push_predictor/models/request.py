@@ -107,7 +107,7 @@ def _check(
             raise RequestError(f"covariate {name}", "missing", f"{_finite_number(name)}: {model.name} needs it")
     _require("duration", duration, (duration > 0.0) & (duration < inf), "a finite number above 0, in s")
     low, high = model.duration_range
-    near = "{:.3g} to {:.3g} s, near what {} was trained on"
+    near = "{:.3g} to {:.3g} s, close to the training durations of {}"
     _require("duration", duration, (duration >= low) & (duration <= high), near, low, high, model.name)
     if model.predictor.integrates:
         most = "at most {:.3g} m/s for {:g} s: a path of {:g} m"

@@ -32,13 +32,13 @@ class Goal:
         for name, value in values.items():
             object.__setattr__(self, name, value)
         if self.pose.shape != (3,) or not np.all(np.isfinite(self.pose)):
-            raise RequestError("goal pose", self.pose.tolist(), "three finite numbers x, y in m, heading")
+            raise RequestError("goal pose", self.pose.tolist(), "three finite numbers x, y in m, heading in rad")
         if not 0.0 < self.distance < np.inf:
             raise RequestError("goal distance", self.distance, "a finite number above 0, in m")
         if self.turn is not None and not 0.0 < self.turn < np.inf:
             raise RequestError("goal turn", self.turn, "a finite number above 0, in rad, or None for any heading")
         if self.symmetry < 1:
-            raise RequestError("goal symmetry", self.symmetry, "1 or more; a circle has turn None")
+            raise RequestError("goal symmetry", self.symmetry, "1 or more, for a circle turn None")
 
     def remaining(self, ahead: Array, moved: Array) -> Array:
         """Displacements (..., 3) that remain of ahead (..., 3) after displacements moved (..., 3).

@@ -43,7 +43,9 @@ def describe_table(path: Path) -> dict[str, object]:
 
 def _rig(recording: Recording) -> str:
     rig = recording.rig
-    return "none: give it with --rig" if rig is None else f"{rig.shape} on {rig.surface}, {rig.object_mass:g} kg"
+    if rig is None:
+        return "none: give it to the commands that need it, with --rig"
+    return f"{rig.shape} on {rig.surface}, {rig.object_mass:g} kg"
 
 
 def _streams(recording: Recording) -> dict[str, str]:

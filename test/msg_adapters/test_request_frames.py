@@ -219,7 +219,7 @@ def test_rejects_numbers_that_are_not_finite_by_field(field: str, shown: str, ba
         ({"pusher__z": 0.05}, "pusher.z: 0.05 is not accepted, give a tip at most 0.02 m above the slider's frame"),
         ({"pusher_velocity__z": -0.01}, "pusher_velocity.z: -0.01 is not accepted, give a velocity within 0.1 rad"),
         ({"pusher_velocity": Vector3(z=0.01)}, "pusher_velocity.z: 0.01"),
-        ({"covariate_names": ["a"]}, "covariate_values length: 0 is not accepted, give 1, one a name and push"),
+        ({"covariate_names": ["a"]}, "covariate_values length: 0 is not accepted, give 1, one per name and push"),
         ({"covariate_values": [1.0]}, "covariate_values length: 1"),
         ({"covariate_names": ["a", "a"], "covariate_values": [1.0, 2.0]}, "covariate_names: ['a']"),
     ],

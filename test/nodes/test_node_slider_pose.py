@@ -103,7 +103,7 @@ def test_response_is_stamped_at_the_end_of_the_push(ask: Any) -> None:
         ({"pusher_velocity": {}}, ("pusher_velocity: (0.0, 0.0)", "above 0")),
         ({"pusher_velocity": {"x": float("nan")}}, ("pusher_velocity.x: nan", "a finite number")),
         ({"slider": {"position": {"x": 0.3, "y": 0.1}, "orientation": {"w": 0.0}}}, ("slider.orientation norm: 0.0",)),
-        ({"duration": 2.0}, ("duration: 2.0", "near what gp was trained on")),
+        ({"duration": 2.0}, ("duration: 2.0", "close to the training durations of gp")),
         ({"model": "nobody"}, ("model: 'nobody'", "one of analytical, gp")),
         ({"covariate_names": ["slider_heading"], "covariate_values": [1.0]}, ("covariate slider_heading: 1.0",)),
         ({"header": {}}, ("header.frame_id: ''", "'world'")),
