@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -95,7 +95,14 @@ class Sensors:
         for publisher in (*self._out.values(), self._clock):
             assert wait_until(partial(_has_subscriber, publisher))
 
-    def send(self, recording: Recording, names: tuple[str, ...] = tuple(TOPICS), pause: float = 0.01) -> None:
+    def send(
+        self,
+        recording: Recording,
+        names: tuple[str, ...] = tuple(TOPICS),
+        pause: float = 0.01,
+        until: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Send a recording in portions, with a pause (s) after each, until its end or until the condition holds."""
         longest = max(len(getattr(recording, name)) for name in names)
         for first in range(0, longest, PORTION):
             for name in names:
@@ -103,7 +110,8 @@ class Sensors:
                     self._out[name].publish(message)
             now = recording.pusher.stamp[min(first, len(recording.pusher) - 1)]
             self._clock.publish(Clock(clock=ns_to_stamp(int(now))))
-            time.sleep(pause)
+            if wait_until(until, pause):
+                return
 
 
 def _has_subscriber(publisher: Publisher) -> bool:
@@ -160,8 +168,10 @@ def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> N
         assert values["streams resets"] == "8"  # one during a push, and one between each two pushes
         assert int(values["slider dropouts"]) >= 1 + 7  # and one between each two pushes, which lie 10 s apart
         assert "1 samples with a stamp ahead" in status.message
-        sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3)  # the force sensor stops, the others continue
-        status.wait_for_message("No sample from the wrench for 2 s")
+        silent = "No sample from the wrench for 2 s"
+        # The force sensor stops, the others continue.
+        sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3, until=lambda: silent in status.message)
+        status.wait_for_message(silent)
         assert process.stop() == 0, process.text()
     table = read_table(out / "pushes.csv")
     assert len(expected_rows) > 30 and len(table) == len(expected_rows)

@@ -19,7 +19,7 @@ from push_predictor.evaluation.alarm.scores import alarm_state, calibrate
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
@@ -31,8 +31,10 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushe
 from push_predictor.types import Array
 from push_predictor_interfaces.msg import PushAlarm
 
-PUSHES = 60
-CHANGE_AT = 25
+pytestmark = pytest.mark.slow
+
+PUSHES = 36
+CHANGE_AT = 12
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -51,8 +53,9 @@ def record(path: Path, seed: int, changes: Changes = PLAIN, pushes: int = PUSHES
 def bench(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A model, a recording like those it was trained on, and one in which the friction changes."""
     folder = tmp_path_factory.mktemp("alarm")
-    training = [record(folder / "training", seed=1, pushes=120)]
-    model = train_model(load_data(training), load_rig_for(training), "gp", name="gp")
+    training = [record(folder / "training", seed=1, pushes=60)]
+    options = TrainingOptions(n_train=150)
+    model = train_model(load_data(training), load_rig_for(training), "gp", name="gp", options=options)
     save_model(model, folder / "gp.pushmodel")
     changed = record(folder / "changed", seed=2, changes=Changes(contact_friction=doubled_friction))
     return {"model": folder / "gp.pushmodel", "clean": record(folder / "clean", seed=3), "changed": changed}
