@@ -61,6 +61,7 @@ def test_every_public_name_is_there_and_documented_and_others_are_refused():
 # --- training ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_training_reports_each_stage_with_its_share_of_the_work():
     seen: list[tuple[str, float]] = []
     train([FEW], kind="gp", n_train=40, watch=lambda stage, done: seen.append((stage, done)))
@@ -70,12 +71,14 @@ def test_training_reports_each_stage_with_its_share_of_the_work():
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
+@pytest.mark.slow
 def test_without_a_callback_training_prints_its_progress_to_stderr(capsys: pytest.CaptureFixture[str]):
     train(FEW, kind="analytical", n_train=40)
     captured = capsys.readouterr()
     assert "read the data" in captured.err and "100 %" in captured.err and not captured.out
 
 
+@pytest.mark.slow
 def test_training_uses_one_blas_thread_and_leaves_the_callers_setting_alone():
     during: set[int] = set()
 
@@ -94,6 +97,7 @@ def blas_threads() -> list[int]:
     return [pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "call"),
     [
@@ -121,6 +125,7 @@ def test_every_long_step_uses_one_blas_thread(model: PushModel, monkeypatch: pyt
         assert set(during) == {1} and blas_threads() == before
 
 
+@pytest.mark.slow
 def test_the_name_is_the_first_files_stem_and_the_provenance_names_the_data(model: PushModel, tmp_path: Path):
     table, rig = windows_to_table(find_windows(read_recording(FEW))).take(np.arange(50)), model.rig
     write_table(tmp_path / "monday.csv.gz", table)
@@ -128,6 +133,7 @@ def test_the_name_is_the_first_files_stem_and_the_provenance_names_the_data(mode
     assert learned.name == "monday" and learned.provenance.sources == ("monday.csv.gz",)
 
 
+@pytest.mark.slow
 def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp_path: Path):
     table = windows_to_table(find_windows(read_recording(FEW))).take(np.arange(40))
     write_table(tmp_path / "rows.csv", table)
@@ -138,6 +144,7 @@ def test_a_rig_may_be_an_object_a_path_or_left_to_the_data(model: PushModel, tmp
         assert train(tmp_path / "rows.csv", kind="analytical", rig=rig).rig.pusher_radius == model.rig.pusher_radius
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
@@ -155,6 +162,7 @@ def test_a_wrong_call_of_train_is_refused_by_field(arguments, error, message):
 # --- models and predictions -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_saved_model_predicts_the_same_and_paths_are_str_or_path(model: PushModel, tmp_path: Path):
     model.save(str(tmp_path / "m.pushmodel"))
     pushes = Pushes(0.02, [0.1, 0.4], 0.3)
@@ -162,6 +170,7 @@ def test_a_saved_model_predicts_the_same_and_paths_are_str_or_path(model: PushMo
         np.testing.assert_array_equal(load_model(path).predict(pushes).mean, model.predict(pushes).mean)
 
 
+@pytest.mark.slow
 def test_the_repr_of_a_model_states_its_provenance(model: PushModel):
     text = repr(model)
     for part in ("'small' (gp)", "rect1 on abs", "120 windows", "square_abs_train", "0.2 s", "covariates: none"):
@@ -169,6 +178,7 @@ def test_the_repr_of_a_model_states_its_provenance(model: PushModel):
     assert len(text.splitlines()) <= 10
 
 
+@pytest.mark.slow
 def test_the_standard_deviation_is_the_root_of_the_covariances_diagonal(model: PushModel):
     prediction = model.predict(Pushes(0.02, [0.1, 0.4, 0.7], [0.0, 0.3, -0.3]))
     assert prediction.std.shape == prediction.mean.shape == (3, 3) and len(prediction) == 3
@@ -176,6 +186,7 @@ def test_the_standard_deviation_is_the_root_of_the_covariances_diagonal(model: P
         np.testing.assert_allclose(prediction.std[:, k] ** 2, prediction.covariance[:, k, k], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain(model: PushModel):
     few = repr(model.predict(Pushes([0.02, 0.5], 0.1, 0.3)))
     assert "yes" in few.splitlines()[2] and "NO" in few.splitlines()[3]
@@ -185,6 +196,7 @@ def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain
     assert len(many.splitlines()) < 20 and "... and 490 more" in many
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pushes", "message"),
     [
@@ -201,6 +213,7 @@ def test_a_push_that_the_model_cannot_predict_is_refused_as_a_service_would(
         model.predict(pushes)
 
 
+@pytest.mark.slow
 def test_the_index_in_the_error_counts_all_pushes_also_where_durations_differ(model: PushModel):
     pushes = Pushes(0.02, [0.1, 0.2, 1.5], 0.3, duration=[0.2, 0.19, 0.19])
     with pytest.raises(RequestError, match=r"contact\[2\]: 1.5"):
@@ -210,6 +223,7 @@ def test_the_index_in_the_error_counts_all_pushes_also_where_durations_differ(mo
 # --- windows, validation, trace ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_windows_are_found_from_the_recorded_rig_end_to_end_or_overlapping():
     recording = read_recording(str(TEST))
     plain, dense = find_windows(recording), find_windows(recording, stride=0.05)
@@ -236,6 +250,7 @@ def flat(tree: Any) -> list[float]:
     return [number for value in tree.values() for number in flat(value)] if isinstance(tree, dict) else [tree]
 
 
+@pytest.mark.slow
 def test_a_validation_has_the_metrics_of_the_command_line(model: PushModel, tmp_path: Path):
     model.save(tmp_path / "m.pushmodel")
     found = validate(model, str(TEST))
@@ -249,11 +264,13 @@ def test_a_validation_has_the_metrics_of_the_command_line(model: PushModel, tmp_
     assert len(found.windows) == printed["n_test"] and "603 windows of 120 pushes" in repr(found)
 
 
+@pytest.mark.slow
 def test_an_absent_recording_is_an_error_with_its_name(model: PushModel):
     with pytest.raises(RecordingError, match="absent"):
         validate(model, "absent")
 
 
+@pytest.mark.slow
 def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for():
     seen: list[str] = []
     model = train(TRAINING, kind="analytical", watch=lambda stage, done: None)
@@ -268,6 +285,7 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
 # --- the next push ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_chosen_push_moves_the_slider_towards_the_goal(model: PushModel):
     goal = Goal([0.03, 0.0, 0.0], 0.01, None)
     choice = choose_push(model, [0.0, 0.0, 0.0], goal)
@@ -276,10 +294,12 @@ def test_the_chosen_push_moves_the_slider_towards_the_goal(model: PushModel):
     assert "probability" in repr(choice) and len(repr(choice).splitlines()) == 3
 
 
+@pytest.mark.slow
 def test_at_the_goal_there_is_nothing_to_push(model: PushModel):
     assert choose_push(model, (0.03, 0.0, 0.0), Goal((0.03, 0.0, 0.0), 0.01, None)) is None
 
 
+@pytest.mark.slow
 def test_a_slider_pose_of_another_shape_is_refused(model: PushModel):
     with pytest.raises(RequestError, match="slider"):
         choose_push(model, [0.0, 0.0], Goal((0.03, 0.0, 0.0), 0.01, None))

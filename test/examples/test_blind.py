@@ -140,6 +140,7 @@ def test_rejects_truth_folder_inside_data_folder(tmp_path: Path) -> None:
             apart(tmp_path / "data", truth_folder)
 
 
+@pytest.mark.slow
 def test_recording_contains_no_hint_of_the_truth(tmp_path: Path) -> None:
     data, hidden = tmp_path / "data", tmp_path / "truth"
     hidden.mkdir()
@@ -155,6 +156,7 @@ def test_recording_contains_no_hint_of_the_truth(tmp_path: Path) -> None:
         assert not any(hint.encode() in path.read_bytes() for hint in hints if hint != "contact_friction"), path
 
 
+@pytest.mark.slow
 def test_making_again_keeps_existing_recordings(tmp_path: Path) -> None:
     call = ["make", "--out", str(tmp_path / "data"), "--truth", str(tmp_path / "truth"), "--count", "1"]
     call += ["--training", "25", "--least", "20", "--most", "22", "--rows", "40", "--model", "analytical"]
@@ -172,6 +174,7 @@ def test_groups_keep_their_shares_in_random_order() -> None:
     assert groups[0] != groups[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("group", GROUPS)
 def test_every_kind_of_effect_can_be_drawn_and_changes_outcomes(group: str) -> None:
     spec = later_spec(rig_of(np.random.default_rng(2), "x", 8), np.random.default_rng(3), 8)
@@ -210,6 +213,7 @@ def test_mechanism_is_removed_only_inside_the_context() -> None:
         pass
 
 
+@pytest.mark.slow
 def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     """No effect, an effect of the library and a change of the wrench, each on 120 pushes."""
     data, hidden, results = (tmp_path / name for name in ("data", "truth", "results"))

@@ -27,6 +27,7 @@ def simulated(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.slow
 def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simulated, seed):
     places = make_hidden(tmp_path, seed)
     part, whole = read_recording(places.recorded), read_recording(places.whole)
@@ -46,6 +47,7 @@ def test_effect_begins_late_and_truth_is_stored_separately(tmp_path, short, simu
     assert not any(told["mechanism"].encode() in path.read_bytes() for path in places.recorded.iterdir())
 
 
+@pytest.mark.slow
 def test_same_seed_same_effect(tmp_path, short):
     first, second = (json.loads(make_hidden(tmp_path / name, 3).truth.read_text()) for name in "ab")
     assert first == second

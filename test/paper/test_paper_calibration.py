@@ -177,6 +177,7 @@ def test_nine_corrected_intervals_jointly_cover_as_often_as_one() -> None:
     assert corrected(SURE, 1).text(".6f") == SURE.text(".6f")
 
 
+@pytest.mark.slow
 def test_a_perfect_gaussian_model_is_seldom_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     """900 pushes of 4 windows, predicted as they were drawn, the outcomes of a push alike: at most 10 % rejected."""
     drawn = push_bootstrap(ids(900, 1))
@@ -342,6 +343,7 @@ def study(tmp_path: Path, simulated: Corpus, *measured: Corpus) -> Study:
     )
 
 
+@pytest.mark.slow
 def test_a_section_has_its_tables_and_pictures_for_every_corpus(tmp_path: Path) -> None:
     made = section(study(tmp_path, corpus(), corpus("measured")))
     assert len(made.tables) == 4 + 3 and len(made.findings) == 5 + 4  # speeds: of the simulated set only

@@ -223,6 +223,7 @@ def compared(study):
     return section(study)
 
 
+@pytest.mark.slow
 def test_section_compares_all_three_kinds_with_the_paper(compared):
     paper = next(table for table in compared.tables if "paper" in table.head[1])
     assert paper.rows[0][1:4] == ("0.72", "0.38", "0.37")
@@ -230,6 +231,7 @@ def test_section_compares_all_three_kinds_with_the_paper(compared):
     json.dumps(compared.data, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_the_cost_is_a_median_with_its_range_and_never_negative(compared):
     rows = next(table for table in compared.tables if "CPU" in table.caption).rows
     for cell in (cell for row in rows for cell in row[1:4]):
@@ -237,6 +239,7 @@ def test_the_cost_is_a_median_with_its_range_and_never_negative(compared):
         assert 0.0 <= low <= value <= high
 
 
+@pytest.mark.slow
 def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
     si = next(row for row in compared.tables[0].rows if row[0] == "NLPD, total")
     paper = next(table for table in compared.tables if "paper" in table.head[1]).rows[1]
@@ -247,6 +250,7 @@ def test_the_paper_s_units_add_13_8155_to_the_nlpd(compared):
     assert first(paper[6]) - first(si[3]) == pytest.approx(13.8155, abs=0.011)  # two decimals in both cells
 
 
+@pytest.mark.slow
 def test_mean_gain_section_has_every_size_and_speed(study):
     made = mean_gain.section(study)
     assert {row[0] for row in made.tables[0].rows} >= {"20, by push", "20, random"}

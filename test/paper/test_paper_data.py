@@ -47,6 +47,7 @@ def test_sets_share_slider_or_table_but_not_their_noise() -> None:
     assert len({pair_number(*pair) for pair in FULL.pairs}) == 16
 
 
+@pytest.mark.slow
 def test_seed_reproduces_a_recording_which_can_be_kept(tmp_path: Path) -> None:
     small = replace(QUICK, pushes=6, speeds=(0.05, 0.1))
     kept = learning_set(small, "rect1", "abs", tmp_path)
@@ -91,6 +92,7 @@ def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
     assert [c.pushes for c in counts] == [16] * 10
 
 
+@pytest.mark.slow
 def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp_path: Path) -> None:
     study, pushes = made_up_study(tmp_path), next(iter(made_up_corpus().sets.values()))
     four = section(study).findings[0]
@@ -99,6 +101,7 @@ def test_the_learning_data_hold_with_all_sixteen_sets_and_in_part_with_fewer(tmp
     assert section(replace(study, simulated=every)).findings[0].verdict == "holds"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "repetitions, known, verdict",
     [

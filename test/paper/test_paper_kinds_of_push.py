@@ -117,6 +117,7 @@ def test_relative_spread_and_growth_of_rays_are_what_they_were_made_with() -> No
     assert growth(rays(3e-4, 4000, power=0.0)) == pytest.approx(half, abs=0.05)
 
 
+@pytest.mark.slow
 def test_interval_of_a_spread_covers_the_truth_as_often_as_stated() -> None:
     """95 % intervals from 60 repetitions, 100 times over."""
     truth, hits = np.sqrt(2.0) * 3e-4 / WAY, 0
@@ -179,6 +180,7 @@ def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
     assert has_modes(p, power) == verdict
 
 
+@pytest.mark.slow
 def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -> None:
     """Findings, one row a push, a picture, numbers that JSON can hold."""
     grid = grid_of(rays(6e-4), drawn_together(1e-4), fanned_out(1e-3), rays(4e-4, apart_by=4e-3))
@@ -189,12 +191,14 @@ def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -
     assert json.loads(json.dumps(dict(made.data), allow_nan=False))["chosen"]["convergent"]["angle"] == 0.1
 
 
+@pytest.mark.slow
 def test_equal_pushes_are_not_distinguished(tmp_path: Path) -> None:
     """Ten pushes of one spread, straight: the half that did not choose the extremes says that they are chance."""
     made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
     assert not {finding.verdict for finding in made.findings} & {"holds", "holds in part"}
 
 
+@pytest.mark.slow
 def test_a_wide_push_that_draws_together_does_not_end_closer(tmp_path: Path) -> None:
     """Convergent and divergent by their growth, but the convergent one ends further apart: the second does not hold."""
     made = section(study_of(tmp_path, grid_of(drawn_together(1e-3), fanned_out(3e-4))))

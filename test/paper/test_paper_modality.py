@@ -55,6 +55,7 @@ def with_modes(tmp_path_factory: pytest.TempPathFactory) -> Section:
     return made_up_section(tmp_path_factory.mktemp("modes"), grid_with_modes())
 
 
+@pytest.mark.slow
 def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
     assert with_modes.findings[0].verdict == "holds"
     assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
@@ -70,6 +71,7 @@ def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: py
     assert "no push has several modes" in made.findings[2].sentence
 
 
+@pytest.mark.slow
 def test_section_has_findings_tables_and_picture(with_modes: Section) -> None:
     for table in with_modes.tables:
         assert {len(row) for row in table.rows} == {len(table.head)}

@@ -90,6 +90,7 @@ def test_the_same_push_twice_as_fast_has_the_same_outcome_when_slow_and_not_when
     assert departure(slowest, fast, False)[0].value > 0.03
 
 
+@pytest.mark.slow
 def test_windows_are_of_equal_travel_at_every_speed() -> None:
     """Four of 5 mm a push at most; no push is made at two speeds."""
     tables = [speed_windows(FEW, "rect1", "plywood", k) for k in range(2)]
@@ -144,6 +145,7 @@ def test_a_model_of_slow_pushes_knows_fast_ones_only_where_the_world_is_quasi_st
     assert nmse_at(2.0, False, 1, 4) > 1.0
 
 
+@pytest.mark.slow
 def test_speed_as_an_input_helps_where_inertia_matters() -> None:
     """The turn reverses with speed: without the speed there is no telling."""
     assert nmse_at(2.0, True, 5, 4) < 0.5 * nmse_at(2.0, False, 5, 4)
@@ -227,6 +229,7 @@ def test_skips_draws_without_any_such_push() -> None:
     assert np.isnan(estimated(np.full(4, np.nan)).low)
 
 
+@pytest.mark.slow
 def test_the_section_of_a_small_study(tmp_path: Path) -> None:
     """Four findings, tables of every bracket and speed, a picture, numbers that JSON can hold."""
     study = replace(paper_studies.made_up_study(tmp_path), plan=FEW)
@@ -239,6 +242,7 @@ def test_the_section_of_a_small_study(tmp_path: Path) -> None:
     assert content["departure"][0]["value"] == 0.0
 
 
+@pytest.mark.slow
 def test_too_few_windows_are_not_decided(tmp_path: Path) -> None:
     """Three pushes a speed are nothing to learn from."""
     made = section(

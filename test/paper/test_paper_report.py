@@ -50,6 +50,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_each_claim_has_verdict_and_numbers(made: Path) -> None:
     content = json.loads((made / "paper.json").read_text())
     assert set(content["sections"]) == CLAIMS
@@ -60,6 +61,7 @@ def test_each_claim_has_verdict_and_numbers(made: Path) -> None:
             assert re.search(r"\d", finding["sentence"]), finding
 
 
+@pytest.mark.slow
 def test_page_is_self_contained_and_warns_that_it_is_quick(made: Path) -> None:
     page = (made / "paper.html").read_text()
     for key in CLAIMS:
@@ -70,6 +72,7 @@ def test_page_is_self_contained_and_warns_that_it_is_quick(made: Path) -> None:
     assert "Made with --quick" in page
 
 
+@pytest.mark.slow
 def test_questions_beyond_the_paper_have_their_own_table(made: Path) -> None:
     page = (made / "paper.html").read_text()
     paper, ours = re.findall(r'<table class="verdicts">.*?</table>', page, re.DOTALL)
@@ -81,11 +84,13 @@ def test_questions_beyond_the_paper_have_their_own_table(made: Path) -> None:
     assert ours.count("<tr><td>") == sum(finding["origin"] == "beyond the paper" for finding in findings) > 0
 
 
+@pytest.mark.slow
 def test_page_contains_no_nan(made: Path) -> None:
     page = (made / "paper.html").read_text()
     assert "nan" not in re.sub(r"base64,[^\"]+", "", page).lower().split()
 
 
+@pytest.mark.slow
 def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
     content = json.loads((made / "paper.json").read_text())
     for section in content["sections"].values():
@@ -93,6 +98,7 @@ def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
             assert not ("simulated:" in table["caption"] and "measured:" in table["caption"])
 
 
+@pytest.mark.slow
 def test_second_report_reads_the_cache_and_is_the_same(made: Path) -> None:
     before, kept = json.loads((made / "paper.json").read_text())["sections"], kept_results(made)
     assert kept

@@ -49,6 +49,7 @@ def curve(held: HeldOut) -> SpeedCurve:
     return SpeedCurve("analytical", tuple(SPEEDS.tolist()), nmse, nmse, nmse)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("nmse", "verdict"),
     [((0.01, 0.1, 0.5, 1.0), "holds"), ((1.0, 0.5, 0.1, 0.01), "does not hold")],
@@ -147,6 +148,7 @@ def test_a_push_has_one_speed():
     )
 
 
+@pytest.mark.slow
 def test_the_section_shows_every_speed(tmp_path):
     made = speed_error.section(made_up_study(tmp_path))
     assert len(made.findings) == 2 and made.pictures[0].path.exists()

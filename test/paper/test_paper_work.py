@@ -107,6 +107,7 @@ def test_the_watch_sees_the_start_and_every_job_cached_ones_too(pieces, tmp_path
         assert seen.events == [("squares", 3), "one", "one", "one"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cores", "end"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGKILL)])
 def test_results_before_an_interruption_are_kept(pieces, tmp_path: Path, cores: int, end: signal.Signals) -> None:
     log, count = tmp_path / "log", 8
@@ -231,6 +232,7 @@ def cluster(pieces) -> Iterator[object]:
         yield client
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_path: Path) -> None:
     import joblib
 
@@ -245,6 +247,7 @@ def test_a_dask_cluster_does_the_same_work_on_both_workers(cluster, pieces, tmp_
     assert os.getpid() not in {pid for _, pid in places}
 
 
+@pytest.mark.slow
 def test_results_of_a_cluster_are_read_from_disk_locally(cluster, pieces, tmp_path: Path) -> None:
     import joblib
 

@@ -7,6 +7,7 @@ import re
 import runpy
 import subprocess
 import sys
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,6 +24,7 @@ LIBRARY = sorted({room for row in PICTURE for room in row if (PACKAGE / room).is
 MOST_MODULES = 15
 
 
+@cache
 def imports_of(path: Path) -> set[str]:
     """Modules that a file imports, and what it imports from them: a.b and a.b.c for `from a.b import c`."""
     tree = ast.parse(path.read_text())
@@ -146,6 +148,7 @@ def test_the_simulator_knows_no_model() -> None:
             assert not name.startswith(("push_predictor.models", "push_predictor.evaluation")), f"{path}: {name}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("node", ["predict_server", "push_replay", "push_validator"])
 def test_a_node_starts_without_scipy_stats(node: str) -> None:
     """It takes 0.4 s to import; the nodes need one small function of it, which push_predictor.normal_scores has."""
@@ -153,6 +156,7 @@ def test_a_node_starts_without_scipy_stats(node: str) -> None:
     subprocess.run([sys.executable, "-c", check], check=True, cwd=REPOSITORY)
 
 
+@pytest.mark.slow
 def test_models_are_learnt_and_used_where_there_is_no_ros() -> None:
     forbidden = "import sys; sys.modules.update(dict.fromkeys(['rclpy', 'matplotlib', 'rosbags', 'h5py', 'rich']))\n"
     use = (

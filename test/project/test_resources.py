@@ -15,6 +15,7 @@ from push_predictor.recordings.load import load_data
 from push_predictor.resources import DEFAULT_MODEL, share_path
 
 
+@pytest.mark.slow
 def test_it_was_trained_on_the_simulators_recording_and_nothing_else():
     model = load_model(share_path(*DEFAULT_MODEL))
     assert model.provenance.sources == ("square_abs_train",)

@@ -102,6 +102,7 @@ def test_model_without_extension_fixes_no_covariate(base: PushModel, table: Push
     assert fixed_covariates(base, table) == {} and fixed_covariates_text(base, {}) == ""
 
 
+@pytest.mark.slow
 def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     base: PushModel, table: PushTable, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -119,5 +120,6 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     assert "The map of plain" not in page
 
 
+@pytest.mark.slow
 def test_readme_figure_accepts_an_extended_model(base: PushModel, table: PushTable, tmp_path: Path) -> None:
     assert readme_picture(tmp_path / "picture.png", extended(base, slippery()), table).exists()

@@ -70,17 +70,20 @@ def assert_found(finding: MeasurementFinding, mechanism: str, values: tuple[floa
     assert all(parameter.low < parameter.value < parameter.high for parameter in strongest.parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), PLANTED)
 def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, ...]) -> None:
     assert_found(judged(windows(planted(recorded(2), mechanism, values)), training()), mechanism, values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[3], PLANTED[5]])
 def test_planted_error_is_found_without_training_windows(mechanism: str, values: tuple[float, ...]) -> None:
     """A shift of half a millimetre needs more pushes than these."""
     assert_found(judged(windows(planted(recorded(2), mechanism, values)), None), mechanism, values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[5]])
 def test_no_error_remains_after_correction(mechanism: str, values: tuple[float, ...]) -> None:
     wrong = planted(recorded(2), mechanism, values)
@@ -98,12 +101,14 @@ def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
     assert np.allclose(finding.errors[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_clean_recording_has_no_error(seed: int) -> None:
     assert judged(windows(recorded(seed)), training()).errors == ()
     assert judged(windows(recorded(seed)), None).errors == ()
 
 
+@pytest.mark.slow
 def test_change_of_contact_friction_is_not_a_measurement_error() -> None:
     assert judged(windows(recorded(4, contact_friction=0.5)), training()).errors == ()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import design_of
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -19,7 +21,7 @@ from push_predictor.residuals.candidates.enumeration import candidates_of, confo
 from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
-from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import block_scores, screen
@@ -83,12 +85,18 @@ def a_library_of_six(monkeypatch) -> None:
     monkeypatch.setattr("push_predictor.residuals.candidates.enumeration.LIBRARY", library)
 
 
+@cache
+def baseline(model: PushModel) -> Baseline:
+    """The model's errors on its own training data: the same in every search."""
+    return baseline_of(model, PHYSICS)
+
+
 def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> SearchResult:
     evidence, inputs = evidence_of(model, table, PHYSICS), inputs_basis(model, table)
     candidates = candidates_of(evidence, drivers, inputs)
     if mechanisms is not None:
         candidates = [c for c in candidates if c.mechanism is None or c.mechanism in mechanisms]
-    return search(evidence, candidates, inputs, alpha, baseline=baseline_of(model, PHYSICS))
+    return search(evidence, candidates, inputs, alpha, baseline=baseline(model))
 
 
 class TestFalseAlarms:
@@ -97,6 +105,7 @@ class TestFalseAlarms:
     REPETITIONS = 200
     ALPHA = 0.05
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("tails", "common"), [(np.inf, 0.0), (3.0, 0.8)], ids=["normal", "heavy tails, windows of a push alike"]
     )
@@ -121,10 +130,12 @@ class TestFalseAlarms:
 
 
 class TestNoEffect:
+    @pytest.mark.slow
     def test_finds_nothing_with_a_learned_base_of_few_pushes(self, learnt) -> None:
         verdicts = [searched(learnt, pushes(150, 100 + seed)) for seed in range(3)]
         assert [len(found.terms) for found in verdicts] == [0, 0, 0]
 
+    @pytest.mark.slow
     def test_effect_that_training_shows_too_is_not_selected(self) -> None:
         """A slider whose sides differ, learned by a model that folds them, has not changed since training."""
         shift = DriverBasis("constant"), 0.003, -0.002
@@ -157,18 +168,15 @@ class TestNoEffect:
         assert "time_since_contact" not in {term.best.covariate for term in found}
 
     def test_cross_validated_residuals_of_a_learned_base_are_calibrated(self, learnt) -> None:
-        deviation = baseline_of(learnt, PHYSICS).deviation
+        deviation = baseline(learnt).deviation
         assert np.all((deviation > 0.85) & (deviation < 1.15))
 
+    @pytest.mark.slow
     def test_effects_above_the_detectable_size_are_found_and_far_smaller_ones_are_not(self, learnt) -> None:
         table = pushes(150, 103)
-        evidence, inputs, baseline = (
-            evidence_of(learnt, table, PHYSICS),
-            inputs_basis(learnt, table),
-            baseline_of(learnt, PHYSICS),
-        )
-        found = search(evidence, candidates_of(evidence, DRIVERS, inputs), inputs, 0.01, baseline=baseline)
-        size = detectable_json(minimum_detectable(found, evidence, inputs, 0.01, baseline))["contact_friction"][
+        evidence, inputs = evidence_of(learnt, table, PHYSICS), inputs_basis(learnt, table)
+        found = search(evidence, candidates_of(evidence, DRIVERS, inputs), inputs, 0.01, baseline=baseline(learnt))
+        size = detectable_json(minimum_detectable(found, evidence, inputs, 0.01, baseline(learnt)))["contact_friction"][
             "driven"
         ]
         assert size["unit"] == "1"
@@ -181,6 +189,7 @@ class TestNoEffect:
 
 
 class TestNames:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("mechanism", "driver", "coefficients"),
         [
@@ -216,6 +225,7 @@ class TestNames:
         assert found.terms[0].best.label == ("contact_friction", "model_inputs")
         assert found.terms[0].coefficients[0] == pytest.approx(0.25 - 0.3, abs=0.02)
 
+    @pytest.mark.slow
     def test_effect_outside_the_library_gets_its_covariate_and_no_mechanism(self, learnt) -> None:
         """Asymmetric slip grows with temperature, but the library contains only two other mechanisms."""
         plain = pushes(200, 205)
@@ -224,6 +234,7 @@ class TestNames:
         assert first.best.label == (None, "topic:/temperature")
         assert not first.naming.known
 
+    @pytest.mark.slow
     def test_correlated_covariates_stay_undecided(self, learnt) -> None:
         plain = pushes(200, 206)
         twins = {**plain.covariates, "slid_distance": 0.003 * plain.covariates["elapsed_time"] + 0.001}
@@ -235,6 +246,7 @@ class TestNames:
 
 
 class TestBasis:
+    @pytest.mark.slow
     def test_step_is_found_with_its_place(self, learnt) -> None:
         plain = pushes(200, 300)
         place = 1200.0
@@ -243,6 +255,7 @@ class TestBasis:
         assert basis.name == "step"
         assert basis.place == pytest.approx(place, abs=150.0)
 
+    @pytest.mark.slow
     def test_linear_dependence_stays_linear(self, learnt) -> None:
         plain = pushes(200, 301)
         table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)
@@ -250,6 +263,7 @@ class TestBasis:
 
 
 class TestVariance:
+    @pytest.mark.slow
     def test_variance_that_grows_with_a_covariate_is_not_a_mean_effect(self, learnt) -> None:
         table = pushes(200, 400)
         warm = table.covariates["topic:/temperature"]
@@ -258,7 +272,7 @@ class TestVariance:
         louder = replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
         found = searched(learnt, louder)
         evidence = evidence_of(learnt, louder, PHYSICS)
-        noise = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline_of(learnt, PHYSICS))
+        noise = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline(learnt))
         assert not found.terms
         assert noise.found[0].covariate == "topic:/temperature"
         assert noise.found[0].ratio > 2.0
@@ -266,11 +280,11 @@ class TestVariance:
     def test_variance_as_in_training_is_not_reported(self, learnt) -> None:
         table = pushes(200, 401)
         evidence = evidence_of(learnt, table, PHYSICS)
-        assert not variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
+        assert not variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline(learnt)).found
 
     def test_larger_variance_than_in_training_is_reported_as_constant(self, learnt) -> None:
         table = pushes(200, 402, noise=2.0 * NOISE)
         evidence = evidence_of(learnt, table, PHYSICS)
-        noise = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline_of(learnt, PHYSICS)).found
+        noise = variance_effects(learnt, evidence, evidence.z, 0.01, baseline=baseline(learnt)).found
         assert noise[0].covariate == "model_inputs"
         assert noise[0].ratio == pytest.approx(2.0, rel=0.25)

@@ -121,6 +121,7 @@ def test_dependence_on_place_that_training_has_too_is_not_reported() -> None:
     assert found(sloped(2), sloped(1)).effects == ()
 
 
+@pytest.mark.slow
 def test_finds_nothing_without_an_effect() -> None:
     for seed in range(10, 22):
         assert found(made(seed), made(1)).effects == ()
@@ -143,6 +144,7 @@ def test_windows_without_a_force_give_no_finding() -> None:
     assert found(replace(table, covariates={}), table).tested == ()
 
 
+@pytest.mark.slow
 def test_drift_of_the_force_in_a_recording_is_found_and_leaves_the_motion_unchanged() -> None:
     pushes = random_pushes(60, (0.02, 0.05), rng=np.random.default_rng(3))
     recording = simulate(SimulationSpec("rect1", "delrin", pushes, seed=3))

@@ -61,6 +61,7 @@ def run(place: Path, *options: str) -> int:
     return main(["trace", str(place / "new.csv"), "--model", str(place / "deployed.pushmodel"), *options])
 
 
+@pytest.mark.slow
 def test_trace_of_a_table_writes_json_and_extended_model(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

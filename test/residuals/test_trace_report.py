@@ -84,6 +84,7 @@ def written(path: Path, trace: Trace) -> str:
 # --- the page --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_page_embeds_six_pictures(tmp_path: Path, drift: Trace) -> None:
     page = write_trace_report(tmp_path / "trace.html", drift)
     assert [path.name for path in tmp_path.iterdir()] == ["trace.html"]
@@ -116,6 +117,7 @@ def test_page_of_no_change_shows_the_closest_candidate_and_the_detectable_effect
     assert comparisons_of(nothing)[-1].model == "refit"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("trace", "words"),
     [
@@ -233,6 +235,7 @@ def test_bins_recover_the_planted_drift_on_analysis_and_held_out_pushes(drift: T
         np.testing.assert_allclose(found.value[:, 0], truth, atol=0.04)
 
 
+@pytest.mark.slow
 def test_bins_follow_the_data_rather_than_a_wrong_fit() -> None:
     """A step, fitted by a line: the bins stay on the step."""
     trace = made_up_trace(planted("contact_friction", "elapsed_time", made_up.JUMP, 0.15), count=200)
@@ -278,6 +281,7 @@ def test_unknown_mechanism_is_shown_by_its_strongest_pattern() -> None:
     assert strength.share == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_constant_effect_is_shown_against_push_angle_by_thirds_of_the_edge() -> None:
     trace = made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08), count=200)
     rows, effect = analysis_rows(trace), trace.terms[0]
