@@ -121,7 +121,7 @@ def test_anisotropy_is_even_and_slope_odd_under_half_a_turn(name: str, sign: int
 # --- whole pushes ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("outline", OUTLINES)
+@pytest.mark.parametrize("outline", ["rect1", "ellip3", "tri"])
 @pytest.mark.parametrize("duration", [0.2, 1.0])
 def test_the_perturbed_push_without_a_change_is_the_analytical_push(outline: str, duration: float) -> None:
     physics, push = physics_of(outline), pushes(150, duration=duration)
@@ -130,10 +130,11 @@ def test_the_perturbed_push_without_a_change_is_the_analytical_push(outline: str
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.01 * np.sqrt(np.mean(expected**2, axis=0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outline", ["rect1", "tri"])
 def test_responses_grow_with_path_length(outline: str) -> None:
     for mechanism in LIBRARY:
-        short, long = (mechanism.response(physics_of(outline), pushes(15, duration=t)) for t in (0.2, 1.0))
+        short, long = (mechanism.response(physics_of(outline), pushes(15, duration=t)) for t in (0.2, 0.5))
         assert np.all(np.isfinite(long))
         assert np.all(size(long) > size(short))
 
@@ -277,6 +278,7 @@ def test_a_friction_gradient_shifts_the_centre_of_friction_of_a_slider_to_the_ro
 # --- against the rig simulator, which has Newton's and Coulomb's laws but no limit surface ---------------------------
 
 
+@pytest.mark.slow
 def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_response_to_it() -> None:
     before, after = (_first_windows("delrin", 0.02, friction) for friction in (0.25, 0.3))
     both = np.intersect1d(before.push_id, after.push_id)
@@ -295,7 +297,7 @@ def test_a_change_of_contact_friction_in_the_simulator_is_spanned_by_the_respons
 
 
 def _first_windows(surface: str, speed: float, friction: float) -> PushTable:
-    plan = random_pushes(200, (speed,), travel=0.01, rng=np.random.default_rng(3))
+    plan = random_pushes(200, (speed,), travel=0.006, rng=np.random.default_rng(3))
     table = push_outcomes(SimulationSpec("rect1", surface, plan, contact_friction=friction))
     return table.take(np.unique(table.push_id, return_index=True)[1])
 
