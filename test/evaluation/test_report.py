@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -48,6 +49,14 @@ from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting import html
 
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_layout() -> Iterator[None]:
+    """Pictures are laid out once: a second time only moves ticks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.draw_without_rendering", lambda figure: None)
+        yield
 
 
 def rig_of(shape: str) -> Rig:
@@ -132,10 +141,13 @@ def page(
     models: list[PushModel],
     comparisons: list[Comparison],
 ) -> Path:
+    """The report of the VHGP and the analytical model."""
     out = tmp_path_factory.mktemp("report") / "deep" / "er"
     facts = {"online equals offline": "288 of 288 windows, <1e-9 apart"}
     title, notes = "Held-out <b>square</b> & co", ['a "note" with <script>alert(1)</script>']
-    return write_validation_report(out, title, table, windows_of(table, square), models, comparisons, facts, notes)
+    return write_validation_report(
+        out, title, table, windows_of(table, square), models[::2], comparisons[::2], facts, notes
+    )
 
 
 def gaussian_comparison(sd_factor: float, pushes: int = 400, seed: int = 0) -> Comparison:
@@ -367,10 +379,11 @@ def test_trend_detects_a_drift_and_none_without_one() -> None:
 # --- the page -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list[Comparison]) -> None:
     text = " ".join(Shown(page).text).replace("−", "-")
     shown = {float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text)}
-    for comparison in comparisons:
+    for comparison in comparisons[::2]:
         metrics = metrics_json(comparison)
         assert metrics["model"] in text
         coverage = metrics.pop("coverage")
@@ -381,6 +394,7 @@ def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list
             assert float(f"{value:.3g}") in shown
 
 
+@pytest.mark.slow
 def test_page_states_split_pushes_and_units(page: Path) -> None:
     text = " ".join(Shown(page).text)
     assert "288 windows of 36 pushes" in text
@@ -390,6 +404,7 @@ def test_page_states_split_pushes_and_units(page: Path) -> None:
     assert "20" in text and "240 of 288 windows" in text
 
 
+@pytest.mark.slow
 def test_page_is_self_contained_and_escapes_all_text(page: Path) -> None:
     shown = Shown(page)
     assert shown.addresses and all(address.startswith("data:image/png;base64,") for address in shown.addresses)
@@ -405,12 +420,12 @@ def test_figures_and_numbers_are_written_next_to_the_page(page: Path, comparison
     for name in files & PICTURES:
         assert (page.parent / name).read_bytes().startswith(b"\x89PNG")
     content = json.loads((page.parent / "report.json").read_text())
-    assert content["metrics"] == json.loads(json.dumps([metrics_json(c) for c in comparisons]))
+    assert content["metrics"] == json.loads(json.dumps([metrics_json(c) for c in comparisons[::2]]))
 
 
-@pytest.mark.parametrize("shape", ["ellip2", "hex"])
-def test_report_accepts_one_push_and_one_model(shape: str, tmp_path: Path) -> None:
-    rig, training, one = rig_of(shape), made_up_table(4, 1, name="train"), made_up_table(1, 2)
+@pytest.mark.slow
+def test_report_accepts_one_push_of_a_circle_and_one_model(tmp_path: Path) -> None:
+    rig, training, one = rig_of("ellip1"), made_up_table(4, 1, name="train"), made_up_table(1, 2)
     model = train_model(training, rig, "analytical", name="analytical")
     page = write_validation_report(tmp_path, "one", one, None, [model], [compare(model, one)], {}, [])
     text = " ".join(Shown(page).text)
@@ -426,7 +441,8 @@ def test_report_without_windows_states_so(models: list[PushModel], table: PushTa
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_report_warns_about_training_pushes(square: Rig, tmp_path: Path) -> None:
+def test_report_warns_about_training_pushes(square: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", ())  # the text alone
     training = made_up_table(4, 1)
     model = train_model(training, square, "analytical", name="analytical")
     seen = training.take(np.arange(8))
