@@ -177,7 +177,7 @@ def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting:
     assert names(drifting) == before
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_rejects_alpha_out_of_range_at_start(alpha: float) -> None:
     with harness.node_process("predict_server", domain=harness.free_domain(), params={"trace_alpha": alpha}) as node:
         assert node.wait(harness.START_TIMEOUT) == 1
