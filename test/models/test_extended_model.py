@@ -141,6 +141,7 @@ def joint(model: PushModel, table: PushTable) -> np.ndarray:
     return design @ whole @ design.transpose(0, 2, 1)
 
 
+@pytest.mark.slow
 def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> None:
     """Two correlated covariates: neither coefficient is determined, but their sum is."""
     table = pushes(100, 4, slippery(0.2))
@@ -157,8 +158,9 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
     assert np.trace(uncertainty.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
 
 
+@pytest.mark.slow
 def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, PushModel], tmp_path: Path) -> None:
-    table = pushes(60, 4, slippery(0.2))
+    table = pushes(40, 4, slippery(0.2))
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     first = with_effects(refit_base(bases["gp"], table), table, terms)
     second = with_effects(
@@ -360,12 +362,13 @@ def test_rejects_damaged_effect_by_name(bases: dict[str, PushModel], damage: str
 # --- estimation -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_planted_effects_are_found_within_their_intervals(bases: dict[str, PushModel], kind: str) -> None:
     terms = [("contact_friction", "elapsed_time", DRIFT), GRAIN]
     away = []
     for seed in range(10, 16):
-        table = pushes(100, seed, slippery(0.15), grain(0.1))
+        table = pushes(60, seed, slippery(0.15), grain(0.1))
         predictor = with_effects(refit_base(bases[kind], table), table, terms, bases[kind]).predictor
         found = np.concatenate([effect.coefficients for effect in predictor.effects])
         sd = np.concatenate([np.sqrt(np.diag(effect.covariance)) for effect in predictor.effects])
@@ -388,9 +391,10 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(100, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
+    table, held_out = pushes(60, 5, slippery(0.2)), pushes(60, 6, slippery(0.2))
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     nmse, nlpd = gain(refit, after, held_out, bases[kind].training_mean)
@@ -400,9 +404,10 @@ def test_true_effect_improves_held_out_pushes(bases: dict[str, PushModel], kind:
     assert all(0.88 < share <= 1.0 for share in coverage["0.95"].values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_absent_effect_improves_nothing(bases: dict[str, PushModel], kind: str) -> None:
-    table, held_out = pushes(100, 7), pushes(60, 8)
+    table, held_out = pushes(60, 7), pushes(60, 8)
     refit = refit_base(bases[kind], table)
     after = with_effects(refit, table, [("contact_friction", "elapsed_time", DRIFT)], bases[kind])
     _, nlpd = gain(refit, after, held_out)
@@ -419,6 +424,7 @@ def test_refit_keeps_physics_and_estimates_covariance(bases: dict[str, PushModel
     assert np.all(np.diagonal(predicted(refit, probe).covariance[0] / predicted(base, probe).covariance[0]) > 9.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gp", "analytical"])
 def test_a_refit_of_an_extended_model_keeps_its_effects(bases: dict[str, PushModel], kind: str) -> None:
     table, held_out = pushes(60, 10, slippery(0.3)), pushes(30, 11, slippery(0.3))

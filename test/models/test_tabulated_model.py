@@ -69,9 +69,15 @@ KINDS = ("gp", "vhgp", "coupled vhgp")
 
 
 @cache
+def trained_widely(shape: str, kind: str) -> PushModel:
+    """Trained on pushes at all velocities, contacts and angles."""
+    return trained(OUTLINES[shape], kind, *WIDE, n=150 if shape == "triangle" else 100)
+
+
+@cache
 def tabulated(shape: str, kind: str) -> TabulatedModel:
-    """Trained on pushes at all velocities, contacts and angles; coupled: with a correlation that changes its sign."""
-    model = trained(OUTLINES[shape], kind.split()[-1], *WIDE, n=200 if shape == "triangle" else 100)
+    """The table of a widely trained model; coupled: with a correlation that changes its sign."""
+    model = trained_widely(shape, kind.split()[-1])
     return tabulate(coupled(model) if "coupled" in kind else independent(model))
 
 
