@@ -60,6 +60,7 @@ def test_points_level_with_corners_are_classified_correctly() -> None:
         assert (nearest(x, y)[4] < 0.0) == inside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.00475, 0.0])
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_single_push_equals_the_same_push_in_a_batch(shape: str, radius: float) -> None:

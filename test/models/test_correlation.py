@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,9 @@ def trained(kind: str = "gp", strength: float = 0.8, n: int = 400) -> PushModel:
     return train_model(pushes(n, 0, strength), square_rig(), kind, name="a")
 
 
+trained_once = cache(trained)
+
+
 def correlation_of(model: PushModel) -> Correlation:
     assert isinstance(model.predictor, GaussianProcessPredictor) and model.predictor.correlation is not None
     return model.predictor.correlation
@@ -72,7 +76,7 @@ def of(model: PushModel, inputs: Array) -> Array:
 
 @pytest.fixture(scope="module")
 def model() -> PushModel:
-    return trained()
+    return trained_once("gp")
 
 
 # --- properties at all inputs -------------------------------------------------------------------------------
@@ -149,14 +153,14 @@ def test_three_numbers_determine_a_correlation_matrix(numbers: Array) -> None:
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_a_correlation_that_changes_its_sign_is_found(kind: str) -> None:
-    model, angles = trained(kind), np.array([-0.8, -0.5, 0.5, 0.8])
+    model, angles = trained_once(kind), np.array([-0.8, -0.5, 0.5, 0.8])
     inputs = np.column_stack([np.full(4, 0.02), np.full(4, 0.12), angles])
     assert of(model, inputs) == pytest.approx(0.8 * np.sign(angles), abs=0.25)
 
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_correlation_increases_likelihood_of_new_pushes(kind: str) -> None:
-    model, new = trained(kind), pushes(400, 1, 0.8)
+    model, new = trained_once(kind), pushes(400, 1, 0.8)
     with_it, plain = (m.predict_rows(new.inputs, new.duration) for m in (model, without(model)))
     gain = joint_nlpd(plain.mean, plain.covariance, new.outcomes) - joint_nlpd(
         with_it.mean, with_it.covariance, new.outcomes
@@ -170,6 +174,7 @@ def test_correlation_increases_likelihood_of_new_pushes(kind: str) -> None:
         assert np.diagonal(ours, axis1=1, axis2=2) == pytest.approx(np.diagonal(theirs, axis1=1, axis2=2), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_no_correlation_is_fitted_to_independent_outputs() -> None:
     model = trained(strength=0.0, n=240)
     assert isinstance(model.predictor, GaussianProcessPredictor)
@@ -250,7 +255,7 @@ def test_sums_of_no_rows_give_independence() -> None:
 
 @pytest.mark.parametrize("kind", ["gp", "vhgp"])
 def test_loaded_model_has_the_saved_correlation(kind: str, tmp_path: Path) -> None:
-    model = trained(kind)
+    model = trained_once(kind)
     save_model(model, tmp_path / "m")
     loaded = load_model(tmp_path / "m")
     assert isinstance(loaded.predictor, GaussianProcessPredictor) and loaded.predictor.correlation is not None

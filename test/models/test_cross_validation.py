@@ -66,6 +66,7 @@ def test_held_out_gp_equals_gp_conditioned_on_other_blocks(n: int) -> None:
         np.testing.assert_allclose(getattr(found, name), expected[name], rtol=1e-5, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "choice", [KernelChoice(), KernelChoice("matern52", noise_nugget=True)], ids=["plain", "nugget"]
 )

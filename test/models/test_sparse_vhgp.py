@@ -68,6 +68,7 @@ def test_rows_beyond_the_dense_limit_improve_the_model(fitted: SparseVHGP) -> No
     assert error < 0.5 * of_dense
 
 
+@pytest.mark.slow
 def test_the_same_rows_give_the_same_model(fitted: SparseVHGP) -> None:
     again = fit_sparse_vhgp(*rows(3000), 40)
     new = rows(20, seed=4)[0]
@@ -162,6 +163,7 @@ def test_memory_grows_with_rows_times_inducing_inputs() -> None:
     assert peak < 3.0 * 8 * 20_000 * len(chosen)  # features of f and of g, and blocks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outputs", [np.zeros(200), np.sign(np.arange(200) - 20.0), np.eye(200)[3] * 30.0])
 def test_degenerate_outputs_still_give_finite_predictions(outputs: Array) -> None:
     inputs = np.random.default_rng(0).normal(size=(200, 2))
@@ -202,6 +204,7 @@ def test_many_windows_or_given_inducing_inputs_make_a_sparse_model() -> None:
             inducing_inputs(kind, 100, wanted)
 
 
+@pytest.mark.slow
 def test_sparse_push_model_is_trained_saved_loaded_and_tabulated(tmp_path: Path) -> None:
     rows = table(400)
     model = train_model(rows, square_rig(), "vhgp", name="sparse", options=TrainingOptions(n_train=400, inducing=30))

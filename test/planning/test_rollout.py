@@ -68,6 +68,7 @@ def after_one_push(model: PushModel, step: list[float]) -> Array:
     return displaced(AT_REST[None], heading, moved)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["rect1", "hex", "ellip2", "ellip1"])
 @pytest.mark.parametrize("contact, angle, duration", [(0.1, 0.1, 3.0), (0.2, 0.5, 3.0), (0.02, 0.0, 1.5)])
 def test_rollout_without_noise_equals_the_integrated_push(shape, contact, angle, duration) -> None:
@@ -165,6 +166,7 @@ def test_slider_does_not_move_after_the_tip_has_passed() -> None:
     assert rollout(model, AT_REST, CERTAIN, [PUSH], 1).in_contact[0] == 1.0
 
 
+@pytest.mark.slow
 def test_unimodal_steps_can_lead_to_two_modes() -> None:
     """Through the centre a push is unstable: sooner or later the slider turns to the left or to the right."""
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
@@ -242,6 +244,7 @@ def test_fit_shrinks_with_few_pushes_and_is_zero_for_single_windows() -> None:
     np.testing.assert_array_equal(fit_persistence(*pushes_with(given, 30, 1)).correlation(np.array([4e-3])), 0.0)
 
 
+@pytest.mark.slow
 def test_persistent_errors_widen_the_outcome_of_a_long_push() -> None:
     persistent_fraction = Persistence(np.ones(3), np.zeros(3), np.ones(3))
     turned = [

@@ -83,6 +83,7 @@ def refusal(push: WorldPush, predictor: PushModel | None = None) -> str:
 # --- the outcome ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", OUTLINES)
 @pytest.mark.parametrize("angle", [-1.2, 0.0, 0.4])
 def test_prediction_equals_that_of_the_model_at_the_contact(shape: str, angle: float) -> None:
@@ -226,6 +227,7 @@ def test_rejects_a_tip_that_moves_away_from_a_corner(driving: float) -> None:
 # --- replayed windows -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_recorded_windows_get_the_prediction_of_the_validator() -> None:
     """The tip's line at a window's start leads to the window's contact and to the same outcome."""
     recording, tabulated = read_recording(BAGS / "square_abs_test"), tabulate(model_of("rect1", "vhgp"))
