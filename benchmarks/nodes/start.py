@@ -2,9 +2,9 @@
 
     python -m benchmarks.nodes.start [--repeats 5] [--domain D]
 
-A node is ready when a running node finds its service. All programs start in turns, so that they share the machine's
-load, which is printed. Ratios are of the fastest starts: another node occasionally misses an announcement, and the next
-one follows only after 3 s.
+A node is ready when a running node finds its service; the processor time that it takes until then is printed too. All
+programs start in turns, so that they share the machine's load, which is printed. Ratios are of the fastest starts:
+another node occasionally misses an announcement, and the next one follows only after 3 s.
 """
 
 from __future__ import annotations
@@ -60,30 +60,40 @@ def main() -> int:
     parser.add_argument("--domain", type=int, default=82, help="ROS domain to run in (default %(default)s)")
     options = parser.parse_args()
     taken: dict[str, list[float]] = {name: [] for name in (*NODES, *PROGRAMS)}
+    worked: dict[str, list[float]] = {name: [] for name in NODES}
     before = load()
     with graph(options.domain):
         for _ in range(options.repeats):
             for name in NODES:
-                taken[name].append(_ready(name))
+                ready, processor = _ready(name)
+                taken[name].append(ready)
+                worked[name].append(processor)
             for name, arguments in PROGRAMS.items():
                 taken[name].append(_ended(arguments))
     _print(taken, EMPTY, list(NODES))
+    print("processor time: " + ", ".join(f"{name} {min(worked[name]):.2f} s" for name in NODES))
     _print(taken, "python alone", list(PROGRAMS))
     print(f"fastest of {options.repeats}; load average {before} before, {load()} after, {os.cpu_count()} cores")
     return 0
 
 
-def _ready(name: str) -> float:
+def _ready(name: str) -> tuple[float, float]:
+    """Time until a node is ready, and its processor time by then (s)."""
     arguments, kind, service = NODES[name]
     with caller() as asking:
         client = asking.node.create_client(kind, service)
         begun = perf_counter()
-        with process(*arguments):
+        with process(*arguments) as number:
             while not client.service_is_ready():  # wait_for_service looks every 0.25 s
                 if perf_counter() > begun + PATIENCE:
                     raise SystemExit(f"{name}: no {client.srv_name} after {PATIENCE:g} s")
                 sleep(0.005)
-            return perf_counter() - begun
+            return perf_counter() - begun, _processor_time(number)
+
+
+def _processor_time(number: int) -> float:
+    ticks = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
 def _ended(arguments: Sequence[str]) -> float:

@@ -85,7 +85,7 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
 def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours():
     """The long form: 24 recorded hours. A few seconds are too short for memory."""
     done = benchmark(
-        "endurance", "--minutes", "0.2", "--every", "0.1", "--warm-up", "0.12", "--most-growth", "60",
+        "endurance", "--minutes", "0.14", "--rate", "20", "--every", "0.1", "--warm-up", "0.1", "--most-growth", "60",
         "--recording", "bags/hexagon_delrin",
     )  # fmt: skip
     text = done.stdout + done.stderr
