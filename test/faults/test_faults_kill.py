@@ -94,6 +94,7 @@ class Planning(threading.Thread):
         self.join(30.0)
 
 
+@pytest.mark.slow
 def test_validator_and_planner_survive_a_killed_server_and_report_the_gap(
     domain: int, model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
@@ -165,6 +166,7 @@ def test_answers_to_other_clients_do_not_crowd_out_the_validators(domain: int):
 # --- push_validator and push_replay ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
     domain: int, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

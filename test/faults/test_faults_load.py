@@ -39,6 +39,7 @@ def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 # --- many clients ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_all_clients_are_answered_in_spite_of_a_deaf_and_a_stopped_one():
     """The long form: 50 clients, 10 minutes."""
     done = benchmark("load", "--clients", "6", "--minutes", "0.05", "--every", "1")
@@ -82,6 +83,7 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
 # --- many hours ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours():
     """The long form: 24 recorded hours. A few seconds are too short for memory."""
     done = benchmark(

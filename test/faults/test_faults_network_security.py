@@ -150,6 +150,7 @@ def finds(machine: str, patience: float) -> bool:
     return "True" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [{}, {RANGE: "SUBNET"}], ids=["as it is", "asked for the network"])
 def test_another_machine_discovers_a_node_only_on_request(asked: Mapping[str, str], tmp_path: Path):
     log = tmp_path / "log"

@@ -141,6 +141,7 @@ def offline(recordings: list[Recording]) -> PushTable:
     return windows_to_table([*windows, *finder.finish()])
 
 
+@pytest.mark.slow
 def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> None:
     model, rig, out = tmp_path / "model.pushmodel", tmp_path / "square.rig.yaml", tmp_path / "out"
     save_model(train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="any"), model)

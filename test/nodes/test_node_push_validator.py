@@ -53,6 +53,8 @@ from push_predictor.recordings.windows.finder import find_windows
 from push_predictor_interfaces.msg import PushResidual
 from push_predictor_interfaces.srv import LoadModel, Pause, PredictPush, Resume, Seek, SetRate
 
+pytestmark = pytest.mark.slow
+
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 

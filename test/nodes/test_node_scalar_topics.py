@@ -40,6 +40,8 @@ from push_predictor.recordings.write import write_recording
 from push_predictor.residuals.evidence.loading import load_evidence
 from push_predictor.simulation.rig_simulator import SimulationSpec, random_pushes, simulate
 
+pytestmark = pytest.mark.slow
+
 WARMTH, ROD, HUMIDITY, NAME = "/surface/warmth", "/rod/temperature", "/room/humidity", "/rod/name"
 OURS = (WARMTH, ROD, HUMIDITY)
 ASKED = ["surface/warmth", "/rod/temperature", "room/humidity", "rod/name", "nowhere"]

@@ -145,6 +145,7 @@ def test_bad_goal_is_aborted_with_the_reason(case: str, server: Server, drifting
     assert ".trace-" not in result.message and names(drifting) == before
 
 
+@pytest.mark.slow
 def test_goal_without_data_uses_those_of_a_running_validator(server: Server, drifting: Path, tmp_path: Path) -> None:
     last = (drifting / "pushes.csv").read_text().splitlines()[-1]
     with (drifting / "pushes.csv").open("a") as stream:
