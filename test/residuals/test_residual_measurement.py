@@ -48,13 +48,22 @@ def windows(recording: Recording) -> PushTable:
 
 
 @cache
+def clean(seed: int) -> PushTable:
+    return windows(recorded(seed))
+
+
 def training() -> PushTable:
-    return windows(recorded(1))
+    return clean(1)
 
 
 def planted(recording: Recording, mechanism: str, values: tuple[float, ...]) -> Recording:
     """The recording with an error in its streams, made by correcting the negative of the error."""
     return correct(recording, mechanism, [-value for value in values])
+
+
+@cache
+def with_error(mechanism: str, values: tuple[float, ...], seed: int = 2) -> PushTable:
+    return windows(planted(recorded(seed), mechanism, values))
 
 
 def judged(table: PushTable, baseline: PushTable | None) -> MeasurementFinding:
@@ -73,29 +82,28 @@ def assert_found(finding: MeasurementFinding, mechanism: str, values: tuple[floa
 @pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), PLANTED)
 def test_planted_error_is_named_and_sized(mechanism: str, values: tuple[float, ...]) -> None:
-    assert_found(judged(windows(planted(recorded(2), mechanism, values)), training()), mechanism, values)
+    assert_found(judged(with_error(mechanism, values), training()), mechanism, values)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[3], PLANTED[5]])
 def test_planted_error_is_found_without_training_windows(mechanism: str, values: tuple[float, ...]) -> None:
     """A shift of half a millimetre needs more pushes than these."""
-    assert_found(judged(windows(planted(recorded(2), mechanism, values)), None), mechanism, values)
+    assert_found(judged(with_error(mechanism, values), None), mechanism, values)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("mechanism", "values"), [PLANTED[1], PLANTED[5]])
 def test_no_error_remains_after_correction(mechanism: str, values: tuple[float, ...]) -> None:
-    wrong = planted(recorded(2), mechanism, values)
-    right = wrong
-    for error in judged(windows(wrong), training()).errors:
+    right = planted(recorded(2), mechanism, values)
+    for error in judged(with_error(mechanism, values), training()).errors:
         right = correct(right, error.mechanism, error.values)
     assert judged(windows(right), training()).errors == ()
     assert "corrected for" in right.notes[-1]
 
 
 def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
-    finding = judged(windows(planted(recorded(2), "tool_offset", (0.0, 0.0008))), training())
+    finding = judged(with_error("tool_offset", (0.0, 0.0008)), training())
     assert finding.errors[0].mechanism == "frame_shift"
     assert "tool_offset" in finding.errors[0].rivals
     assert np.allclose(finding.errors[0].values, (0.0, -0.0008), atol=UNIT["frame_shift"])
@@ -104,8 +112,8 @@ def test_tool_offset_is_a_rival_of_the_opposite_frame_shift() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_clean_recording_has_no_error(seed: int) -> None:
-    assert judged(windows(recorded(seed)), training()).errors == ()
-    assert judged(windows(recorded(seed)), None).errors == ()
+    assert judged(clean(seed), training()).errors == ()
+    assert judged(clean(seed), None).errors == ()
 
 
 @pytest.mark.slow
@@ -121,7 +129,7 @@ def test_error_that_training_has_too_is_not_reported() -> None:
 
 
 def test_smaller_pusher_radius_is_not_a_measurement_error() -> None:
-    table = windows(recorded(2))
+    table = clean(2)
     gap = table.covariates["contact_gap"] - 0.001
     worn = replace(table, covariates={**table.covariates, "contact_gap": gap})
     assert judged(worn, training()).errors == ()
@@ -132,19 +140,19 @@ def test_error_below_the_tracker_noise_is_not_reported() -> None:
 
 
 def test_reports_every_candidate_tested() -> None:
-    tested = {t.mechanism: t.p_value for t in judged(windows(recorded(2)), training()).tested}
+    tested = {t.mechanism: t.p_value for t in judged(clean(2), training()).tested}
     assert set(tested) == {"clock_offset", "frame_rotation", "frame_shift"}
     assert all(0.0 < p <= 1.0 for p in tested.values())
 
 
 def test_windows_without_a_gap_give_no_finding() -> None:
-    table = windows(recorded(2))
+    table = clean(2)
     assert measurement_errors(replace(table, covariates={}), training(), RIG) is None
 
 
 def test_responses_match_the_geometry() -> None:
     """A gap recomputed at a displaced pose opens by the response, to first order."""
-    table = windows(recorded(2))
+    table = clean(2)
     fraction = RIG.outline.edge(table.inputs[:, 1])[1]
     table = table.take(np.abs(fraction - 0.5) < 0.4)
     c, contact = table.covariates, table.inputs[:, 1]
@@ -165,7 +173,7 @@ def test_responses_match_the_geometry() -> None:
 
 def test_clock_response_is_zero_in_the_first_window() -> None:
     """Just before, the slider was at rest, and a late stream still shows that."""
-    table = windows(recorded(2))
+    table = clean(2)
     first = table.covariates["time_since_contact"] < 0.03
     lag = gap_responses(table, RIG.outline)["clock_offset"][:, 0]
     assert np.all(lag[first] == 0.0)
