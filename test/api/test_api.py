@@ -72,6 +72,13 @@ def test_training_reports_each_stage_with_its_share_of_the_work():
 
 
 @pytest.mark.slow
+def test_the_seed_draws_the_training_windows():
+    one, same, other = (train(FEW, kind="analytical", n_train=20, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.training.outcomes, same.training.outcomes)
+    assert not np.array_equal(one.training.outcomes, other.training.outcomes)
+    assert (one.provenance.seed, other.provenance.seed) == (1, 2)
+
+
 def test_without_a_callback_training_prints_its_progress_to_stderr(capsys: pytest.CaptureFixture[str]):
     train(FEW, kind="analytical", n_train=40)
     captured = capsys.readouterr()
@@ -203,6 +210,7 @@ def test_the_repr_of_a_prediction_fits_one_screen_and_marks_pushes_out_of_domain
         (Pushes(-0.02, 0.1, 0.3), "velocity: -0.02 is not accepted, give a finite number above 0, in m/s"),
         (Pushes(0.02, [0.1, 1.0], 0.3), r"contact\[1\]: 1.0 is not accepted"),
         (Pushes(0.02, 0.1, [0.3, 0.0, 1.6]), r"angle\[2\]: 1.6 is not accepted"),
+        (Pushes(0.02, 0.1, -1.6), "angle: -1.6 is not accepted"),
         (Pushes(0.02, 0.1, 0.3, duration=2.0), "duration: 2.0 is not accepted, give 0.18 to 0.22 s"),
     ],
 )
@@ -279,7 +287,9 @@ def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}
     assert "elapsed_time" in tried and "slider_x" not in tried
     assert repr(found).startswith(f"Trace of 'square_abs_train': verdict {found.verdict}")
-    assert f"{found.gain_nlpd.value:+.3f}" in repr(found) and len(repr(found).splitlines()) < 10
+    gain = found.gain_nlpd
+    assert f"{gain.value:+.3f} ({gain.low:+.3f} to {gain.high:+.3f})" in repr(found)
+    assert gain.low <= gain.value <= gain.high and len(repr(found).splitlines()) < 10
 
 
 # --- the next push ----------------------------------------------------------------------------------------------------

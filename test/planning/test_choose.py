@@ -6,14 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drifting_models import extended, slippery
+from drifting_models import pushes as drifting_pushes
 from scipy.stats import norm
+from synthetic import square_rig
 
 from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.prediction import Prediction
+from push_predictor.models.train import train_model
 from push_predictor.planning.choose import choose_push
 from push_predictor.planning.goal import Goal
+from push_predictor.planning.model_repertoire import model_repertoire
 from push_predictor.planning.repertoire import Repertoire, StraightPushes, push_grid, repertoire
 from push_predictor.planning.unscented import PusherGeometry
 
@@ -258,3 +263,9 @@ def test_push_ends_when_the_tip_passes_the_slider():
     along = np.array([[0.02, 0.2, -1.4]])
     lengths = repertoire(still, SQUARE, along, range(1, 11)).pushes.windows
     assert 4 <= lengths.max() <= 6
+
+
+def test_a_model_that_needs_covariates_is_refused_by_their_names():
+    base = train_model(drifting_pushes(20), square_rig(), "analytical", name="drifting")
+    with pytest.raises(RequestError, match=r"model: 'drifting' is not accepted, give .* elapsed_time"):
+        model_repertoire(extended(base, slippery(0.1)))
