@@ -334,3 +334,11 @@ def test_every_verdict_has_a_name() -> None:
     assert set(report.VERDICTS) == {
         "none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance",
     }  # fmt: skip
+
+
+def test_repr_states_verdict_effects_and_the_interval_of_the_gain(drift: Trace) -> None:
+    lines = repr(replace(drift, gain_nlpd=Gain(-0.2, -0.3, -0.1))).splitlines()
+    effect = drift.effects[0]
+    assert lines[0].endswith(f"verdict {drift.verdict}")
+    assert f"depends on {effect.covariate}, p = {effect.p_value:.2g}" in lines[1]
+    assert any("-0.200 (-0.300 to -0.100)" in line for line in lines)
