@@ -111,7 +111,9 @@ def at_distance(motion: Motion, plan: PushPlan, physics: Physics, distance: floa
     return motion.slider[np.arange(len(plan)), reached]
 
 
-SLOW = PushPlan(np.array([0.04, 0.19, 0.33]), np.array([0.3, 0.1, -0.5]), np.full(3, 0.005), np.full(3, 0.0055))
+SLOW = PushPlan(
+    np.array([0.04, 0.125, 0.19, 0.33]), np.array([0.3, -0.2, 0.1, -0.5]), np.full(4, 0.005), np.full(4, 0.0055)
+)
 
 
 @pytest.mark.slow
