@@ -211,6 +211,7 @@ def test_repeated_push_is_ignored(models: dict[str, PushModel]):
     assert monitor.state.pushes == 10
 
 
+@pytest.mark.slow
 def test_push_without_a_covariate_is_skipped_and_named(models: dict[str, PushModel]):
     model, table = models["analytical"], made_up(10, 7)
     heading = table.covariates["slider_heading"].copy()

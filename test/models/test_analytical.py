@@ -359,6 +359,7 @@ def test_fit_recovers_true_parameters():
         assert fitted.support.length == pytest.approx(0.029, rel=share)
 
 
+@pytest.mark.slow
 def test_fit_is_deterministic_and_keeps_other_parameters():
     start = AnalyticalPush(square(0.09), RADIUS, support=Support((0.003, 0.001), 0.03))
     inputs, duration = pushes(60)
