@@ -23,13 +23,15 @@ NEEDS_ROS = re.compile(
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data."""
+    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data; put slow files first."""
     needs_ros = {path: bool(NEEDS_ROS.search(path.read_text())) for path in {item.path for item in items}}
     for item in items:
         if needs_ros[item.path]:
             item.add_marker(pytest.mark.ros)
         if "measured_data" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.measured)
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)  # first, so that at the end no worker waits for a long file
 
 
 @pytest.fixture(scope="session")
