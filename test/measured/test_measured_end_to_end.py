@@ -154,7 +154,7 @@ def server(models: tuple[Path, dict[str, PushModel]]) -> Iterator[int]:
     """The ROS domain in which a predict_server serves all of them."""
     domain = free_domain()
     with node_process("predict_server", domain=domain, params={"models": [str(models[0])]}) as process:
-        process.wait_for_text("serving", 120.0)
+        process.wait_for_text("active with the models", 120.0)
         yield domain
 
 

@@ -34,7 +34,7 @@ def test_the_square_is_found_with_the_counts_of_its_source(found: tuple[Corpus, 
 
 
 def test_one_push_of_a_hexagon_is_too_little_and_is_named(found: tuple[Corpus, ...]) -> None:
-    assert found[-1].notes[0].endswith("; left out: hex on plywood (too few; pushes: 1, windows: 1).")
+    assert found[-1].notes[0].endswith("; skipped: hex on plywood (too few; pushes: 1, windows: 1).")
 
 
 def test_the_splits_have_the_rows_that_the_tables_of_the_docs_state(found: tuple[Corpus, ...]) -> None:
