@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of node processes: two threads cost several times the CPU time
+threadpool_limits(limits=1, user_api="blas")  # of this process, which has loaded numpy already
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"

@@ -26,6 +26,8 @@ from push_predictor.recordings.windows.stream_faults import (
 )
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.slow
+
 Stream = PoseStream | WrenchStream
 SECOND, DAY = 10**9, 86_400 * 10**9
 PERIOD = 25_000_000  # ns, the longest of all streams

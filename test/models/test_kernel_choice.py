@@ -39,6 +39,8 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.slow
+
 CHOICES = [KernelChoice(family, nugget) for family, nugget in product(FAMILIES, (False, True))]
 KERNEL = Matern52(np.array([0.3, -0.4, 1.0]), 0.2)
 

@@ -23,6 +23,8 @@ from push_predictor.simulation.slider import support_points
 from push_predictor.simulation.surface import Surface
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.slow
+
 GLASS = Surface("glass", 0.2, 0.0, 0.02, 0.0, 0.0)  # uniform and without noise
 QUIET = Sensors(tracker_noise=0.0, heading_noise=0.0, tip_noise=0.0, dropout_interval=0.0)
 
