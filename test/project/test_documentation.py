@@ -246,6 +246,8 @@ def test_model_files_have_one_suffix(document: Path):
 def test_code_cites_documents_that_exist():
     for room in ("push_predictor", "msg_adapters", "push_predictor_paper", "benchmarks", "examples", "launch", "test"):
         for path in (REPOSITORY / room).rglob("*.py"):
+            if "build" in path.relative_to(REPOSITORY).parts:  # what pip left of an earlier state
+                continue
             for cited in re.findall(r"docs/[\w/]+\.md", path.read_text()):
                 assert (REPOSITORY / cited).is_file(), f"{path}: {cited}"
 
