@@ -26,8 +26,8 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.persistence import persistence_of
-from push_predictor.planning.repertoire import Repertoire, push_grid, repertoire
+from push_predictor.planning.model_repertoire import candidate_pushes, persistent_fraction
+from push_predictor.planning.repertoire import Repertoire, repertoire
 from push_predictor.planning.unscented import PusherGeometry
 from push_predictor.simulation.interactive_rig import push_once
 from push_predictor.simulation.pushes import PushPlan
@@ -82,14 +82,12 @@ def _trained() -> Path:
 def _asked(client: PlannerClient, model: PushModel) -> Repertoire:
     """The pushes that the model knows, with predictions from the service."""
     outline = model.rig.outline
-    edges = len(outline.vertices)
-    contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
-    lines = push_grid([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
-    persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    lines = candidate_pushes(outline, VELOCITY)
+    persistent = persistent_fraction(model, VELOCITY * WINDOW)
     client.predict(lines[:1])  # returns when the server is up
     begun = time.monotonic()
     pushes = repertoire(
-        client.predict, PusherGeometry(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, persistent_fraction
+        client.predict, PusherGeometry(outline, model.rig.pusher_radius, WINDOW), lines, WINDOWS, persistent
     )
     print(f"{len(pushes)} pushes in the model's domain, predicted in {time.monotonic() - begun:.1f} s.", flush=True)
     return pushes

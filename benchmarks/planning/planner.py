@@ -28,8 +28,8 @@ from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabu
 from push_predictor.models.train import train_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.persistence import persistence_of
-from push_predictor.planning.repertoire import Repertoire, push_grid, repertoire
+from push_predictor.planning.model_repertoire import candidate_pushes, persistent_fraction
+from push_predictor.planning.repertoire import Repertoire, repertoire
 from push_predictor.planning.unscented import Predict, PusherGeometry
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.simulation.interactive_rig import push_once
@@ -88,13 +88,11 @@ def repertoires_of(tabulated: TabulatedModel) -> dict[str, Repertoire]:
         return tabulated.predict_rows(inputs, np.full(len(inputs), WINDOW))
 
     typical = model.predict_rows(model.training.inputs, model.training.duration).covariance.mean(axis=0)
-    persistent_fraction = float(persistence_of(model).correlation(np.array([VELOCITY * WINDOW])).mean())
+    persistent = persistent_fraction(model, VELOCITY * WINDOW)
     tip = PusherGeometry(model.rig.outline, model.rig.pusher_radius, WINDOW)
-    edges = len(model.rig.outline.vertices)
-    contacts = ((np.arange(edges)[:, None] + np.linspace(0.06, 0.94, 9)) / edges).ravel()
-    lines = push_grid([VELOCITY], contacts, np.linspace(-1.2, 1.2, 13))
-    own = repertoire(predict, tip, lines, WINDOWS, persistent_fraction)
-    constant = repertoire(_with_covariance(predict, typical), tip, lines, WINDOWS, persistent_fraction)
+    lines = candidate_pushes(model.rig.outline, VELOCITY)
+    own = repertoire(predict, tip, lines, WINDOWS, persistent)
+    constant = repertoire(_with_covariance(predict, typical), tip, lines, WINDOWS, persistent)
     keys = np.intersect1d(_keys(own), _keys(constant))
     own, constant = _only(own, keys), _only(constant, keys)
     every = np.tile(own.covariance.mean(axis=0), (len(own), 1, 1))

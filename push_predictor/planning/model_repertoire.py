@@ -41,9 +41,18 @@ def model_repertoire(
         return tabulated.predict_rows(inputs, np.full(len(inputs), duration))
 
     geometry = PusherGeometry(trained.rig.outline, trained.rig.pusher_radius, duration)
-    persistent = float(persistence_of(trained).correlation(np.array([speed * duration])).mean())
-    lines = push_grid([speed], contacts_around(trained.rig.outline), ANGLES)
-    return repertoire(predict, geometry, lines, windows, persistent)
+    lines = candidate_pushes(trained.rig.outline, speed)
+    return repertoire(predict, geometry, lines, windows, persistent_fraction(trained, speed * duration))
+
+
+def candidate_pushes(outline: Outline, velocity: float) -> Array:
+    """Inputs (n, 3) of the pushes to choose from: at this velocity (m/s), all around the slider, in all directions."""
+    return push_grid([velocity], contacts_around(outline), ANGLES)
+
+
+def persistent_fraction(model: PushModel, path_length: float) -> float:
+    """Fraction of a window's covariance that the next window of a push shares, after this path length (m)."""
+    return float(persistence_of(model).correlation(np.array([path_length])).mean())
 
 
 def contacts_around(outline: Outline) -> Array:

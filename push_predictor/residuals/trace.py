@@ -7,7 +7,7 @@ once, at the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
+from push_predictor.models.train import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.corrections import correct
@@ -39,12 +40,7 @@ from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, note
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
 BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
-Watch = Callable[[str, float], None]
 NO_GAIN = Gain(0.0, 0.0, 0.0)
-
-
-def no_watch(stage: str, done: float) -> None:
-    """Report progress to nobody."""
 
 
 def trace_data(
