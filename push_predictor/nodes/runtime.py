@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import signal
 import sys
 import threading
@@ -39,23 +40,28 @@ class Stop:
     """A request to end the process, made by a signal, the node itself or one of its threads."""
 
     def __init__(self) -> None:
-        self._event = threading.Event()
+        # Not an Event: a signal handler that calls set() while its own thread is inside wait() can block for ever on
+        # the lock of that Event. put() of a SimpleQueue is reentrant.
+        self._requests: queue.SimpleQueue[None] = queue.SimpleQueue()
         self.error: BaseException | None = None
 
     def request(self) -> None:
-        """End with status 0."""
-        self._event.set()
+        """End with status 0. May be called by a signal handler."""
+        self._requests.put(None)
 
     def fail(self, error: BaseException) -> None:
         """End with status 1 and report the error."""
         self.error = self.error or error
-        self._event.set()
+        self._requests.put(None)
 
     def wait(self) -> None:
         """Block until the end is requested."""
         # With a timeout: Python's main thread misses a signal that the kernel delivers to another thread.
-        while not self._event.wait(0.2):
-            pass
+        while True:
+            try:
+                return self._requests.get(timeout=0.2)
+            except queue.Empty:
+                continue
 
 
 def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | None = None) -> int:

@@ -20,13 +20,14 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from push_predictor.nodes.replay.topics import message_class
+from push_predictor.nodes.runtime import Stop
 
 
 def main(output: str, depth: str, *topics: str) -> None:
     """Subscribe; depth 0 keeps all messages."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    done = threading.Event()
-    signal.signal(signal.SIGINT, lambda number, frame: done.set())
+    stop = Stop()
+    signal.signal(signal.SIGINT, lambda number, frame: stop.request())
     node = Node("listener")
     history = HistoryPolicy.KEEP_LAST if int(depth) else HistoryPolicy.KEEP_ALL
     heard: dict[str, list[bytes]] = {}
@@ -40,7 +41,7 @@ def main(output: str, depth: str, *topics: str) -> None:
     executor.add_node(node)
     spinner = threading.Thread(target=executor.spin)
     spinner.start()
-    done.wait()
+    stop.wait()
     while _still_receiving(heard):
         pass
     executor.shutdown()

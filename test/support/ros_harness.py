@@ -72,7 +72,7 @@ class NodeProcess(subprocess.Popen[bytes]):
         try:
             return self.wait(timeout)
         except subprocess.TimeoutExpired:
-            self.kill()
+            self.send_signal(signal.SIGABRT)  # PYTHONFAULTHANDLER prints where every thread is
             self.wait()
             raise AssertionError(f"signal {number} did not end the node:\n{self.text()}") from None
 
@@ -116,6 +116,7 @@ def node_environment(domain: int) -> dict[str, str]:
         ROS_DOMAIN_ID=str(domain),
         ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
         PYTHONUNBUFFERED="1",
+        PYTHONFAULTHANDLER="1",
         OPENBLAS_NUM_THREADS="1",
         PYTHONPATH=os.pathsep.join(filter(None, [str(REPOSITORY), environment.get("PYTHONPATH")])),
     )
