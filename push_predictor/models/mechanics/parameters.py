@@ -1,0 +1,104 @@
+"""The parameters of the forward model: one table of names, units, textbook values, plausible ranges and priors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from push_predictor.types import Array
+
+# Values by name: a number, or one per push (n,). A name that is missing has its textbook value.
+ParameterValues: TypeAlias = Mapping[str, "float | Array"]
+
+
+@dataclass(frozen=True)
+class MechanicsParameter:
+    """A number of the forward model.
+
+    textbook: value without further knowledge. low, high: plausible range of a rig. spread: standard deviation of the weak
+    prior about the textbook value. part: contact, pressure, measurement or world. needs: covariates that it needs.
+    """
+
+    name: str
+    unit: str
+    textbook: float
+    low: float
+    high: float
+    spread: float
+    part: str
+    meaning: str
+    needs: tuple[str, ...] = ()
+
+
+_HEADING = ("push_heading",)
+
+PARAMETERS: tuple[MechanicsParameter, ...] = (
+    MechanicsParameter("contact_friction", "1", 0.3, 0.0, 1.5, 0.15, "contact", "friction of pusher and slider"),
+    MechanicsParameter(
+        "friction_difference", "1", 0.0, -0.6, 0.6, 0.1, "contact", "friction in slip to the left less the mean"
+    ),
+    MechanicsParameter(
+        "friction_by_angle", "1/rad", 0.0, -0.5, 0.5, 0.15, "contact", "change with the angle of velocity and normal"
+    ),
+    MechanicsParameter(
+        "friction_by_speed", "1", 0.0, -0.2, 0.2, 0.05, "contact", "change when the tangential speed grows e-fold"
+    ),
+    MechanicsParameter(
+        "friction_by_load", "1", 0.0, -0.5, 0.5, 0.1, "contact", "change when the normal force grows e-fold"
+    ),
+    MechanicsParameter(
+        "rim_exponent", "1", 0.0, -4.0, 12.0, 1.5, "pressure", "exponent of the pressure's growth towards the rim"
+    ),
+    MechanicsParameter("centre_x", "m", 0.0, -0.03, 0.03, 0.004, "pressure", "shift of the pressure along body x"),
+    MechanicsParameter("centre_y", "m", 0.0, -0.03, 0.03, 0.004, "pressure", "shift of the pressure along body y"),
+    MechanicsParameter(
+        "pushing_height", "m", 0.0, -0.03, 0.03, 0.005, "pressure", "height of the push times surface friction"
+    ),
+    MechanicsParameter(
+        "body_anisotropy", "1", 0.0, -0.8, 0.8, 0.1, "pressure", "slides more easily along the body's x"
+    ),
+    MechanicsParameter(
+        "body_anisotropy_diagonal", "1", 0.0, -0.8, 0.8, 0.1, "pressure", "slides more easily along its diagonal"
+    ),
+    MechanicsParameter(
+        "tracker_rotation", "rad", 0.0, -0.35, 0.35, 0.03, "measurement", "heading of the slider in its tracked frame"
+    ),
+    MechanicsParameter(
+        "push_rotation", "rad", 0.0, -0.35, 0.35, 0.03, "measurement", "true push direction less the recorded one"
+    ),
+    MechanicsParameter("outline_x", "m", 0.0, -0.02, 0.02, 0.002, "measurement", "shift of the slider in its frame, x"),
+    MechanicsParameter("outline_y", "m", 0.0, -0.02, 0.02, 0.002, "measurement", "shift of the slider in its frame, y"),
+    MechanicsParameter(
+        "radius_error", "m", 0.0, -0.004, 0.01, 0.001, "measurement", "true pusher radius less the rig's"
+    ),
+    MechanicsParameter(
+        "tip_offset_along",
+        "m",
+        0.0,
+        -0.01,
+        0.01,
+        0.001,
+        "measurement",
+        "true tip less the recorded one, along the push",
+    ),
+    MechanicsParameter(
+        "tip_offset_across", "m", 0.0, -0.01, 0.01, 0.001, "measurement", "the same to the left of the push"
+    ),
+    MechanicsParameter("clock_delay", "s", 0.0, -0.2, 0.2, 0.01, "measurement", "age of the recorded tip position"),
+    MechanicsParameter(
+        "travel_share", "1", 0.0, -0.5, 0.5, 0.02, "measurement", "true path length over the recorded one, less 1"
+    ),
+    MechanicsParameter("grain_x", "1", 0.0, -0.8, 0.8, 0.1, "world", "slides more easily along world x", _HEADING),
+    MechanicsParameter("grain_diagonal", "1", 0.0, -0.8, 0.8, 0.1, "world", "the same along its diagonal", _HEADING),
+    MechanicsParameter(
+        "slope_x", "1", 0.0, -0.7, 0.7, 0.05, "world", "pull along world x over sliding friction", _HEADING
+    ),
+    MechanicsParameter("slope_y", "1", 0.0, -0.7, 0.7, 0.05, "world", "the same along world y", _HEADING),
+    MechanicsParameter(
+        "gradient_x", "1/m", 0.0, -20.0, 20.0, 2.0, "world", "growth of friction along world x", _HEADING
+    ),
+    MechanicsParameter("gradient_y", "1/m", 0.0, -20.0, 20.0, 2.0, "world", "the same along world y", _HEADING),
+    MechanicsParameter("inertia", "s^2/m", 0.0, 0.0, 2.0, 0.3, "world", "1 / (surface friction times gravity)"),
+)
+BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
