@@ -21,12 +21,13 @@ from push_predictor.evaluation.metrics_text import metrics_lines
 from push_predictor.evaluation.offline import validate_recording, window_options
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import TrainingOptions, Watch, train_model
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.watch import Watch
 from push_predictor.planning import choose
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
 from push_predictor.planning.repertoire import Repertoire
-from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.load import different_supports, load_data, load_rig_for
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.streams import Recording
@@ -47,27 +48,30 @@ def train(
     name: str | None = None,
     n_train: int | None = None,
     seed: int = 0,
+    fit: bool = False,
     watch: Watch | None = None,
 ) -> PushModel:
     """Train a model on recordings or push tables.
 
     kind: vhgp, gp or analytical. rig: a Rig or a rig file, needed only where the data name none. name: of the model in
     the services; the first file's stem unless given. n_train: that many windows at random by the seed; by default all
-    up to 1000, beyond that 1000 spread evenly over the pushes. watch: called with each stage and the share of the work
+    up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of an analytical
+    model. watch: called with each stage and the share of the work
     done; by default stages are printed to stderr.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
     paths, watch = _paths(data), watch or _print_stage
     watch("read the data", 0.0)
     known = _rig(rig) or load_rig_for(paths)
-    table = load_data(paths, known)
+    supports = different_supports(paths) if fit and rig is None else {}
+    table = load_data(paths, known, numbered=bool(supports))
     return train_model(
         table,
         known,
         kind,
         name=name or paths[0].name.split(".")[0],
         sources=[path.name for path in paths],
-        options=TrainingOptions(n_train=n_train, seed=seed),
+        options=TrainingOptions(n_train=n_train, seed=seed, fit=fit, supports=supports),
         watch=watch,
     )
 

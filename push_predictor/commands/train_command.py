@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.table import PushTable
+    from push_predictor.types import Array
 
 KINDS = ("vhgp", "gp", "analytical")
 
@@ -53,7 +55,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="vhgp: train a sparse model with M inducing inputs (default: dense up to 2000 windows, else M = 100)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of --n-train (default 0)")
-    parser.add_argument("--fit", action="store_true", help="analytical: estimate friction and pressure distribution")
+    parser.add_argument(
+        "--fit",
+        action="store_true",
+        help="analytical: choose and estimate parameters of friction, pressure and measurement",
+    )
     parser.add_argument(
         "--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"
     )
@@ -66,7 +72,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
-    from push_predictor.recordings.load import load_data, load_rig_for
+    from push_predictor.recordings.load import different_supports, load_data, load_rig_for
     from push_predictor.recordings.windows.push_window import WindowOptions
 
     if options.old_kind is not None:
@@ -74,9 +80,10 @@ def run(options: argparse.Namespace) -> None:
     kind = options.kind or options.old_kind
     _check(options, kind)
     rig = load_rig_for(options.data, options.rig)
+    supports = different_supports(options.data) if options.fit and options.rig is None else {}
     with progress("read"):
-        table = load_data(options.data, rig, WindowOptions(stride=options.stride))
-    model = _trained(options, kind, table, rig)
+        table = load_data(options.data, rig, WindowOptions(stride=options.stride), numbered=bool(supports))
+    model = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     result = {
         "model": str(options.out),
@@ -106,13 +113,17 @@ def _check(options: argparse.Namespace, kind: str) -> None:
         raise RequestError("--stride", options.stride, "a number above 0, in s")
 
 
-def _trained(options: argparse.Namespace, kind: str, table: PushTable, rig: Rig) -> PushModel:
+def _trained(
+    options: argparse.Namespace, kind: str, table: PushTable, rig: Rig, supports: Mapping[int, Array]
+) -> PushModel:
     from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
 
     count = len(training_rows(table, options.n_train, options.seed))
     if m := inducing_inputs(kind, count, options.inducing):
         print(f"train vhgp: sparse, {count} windows, up to {m} inducing inputs", file=sys.stderr)
-    choices = TrainingOptions(n_train=options.n_train, seed=options.seed, fit=options.fit, inducing=options.inducing)
+    choices = TrainingOptions(
+        options.n_train, options.seed, fit=options.fit, inducing=options.inducing, supports=supports
+    )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
     with progress(f"train {kind}"):
         return train_model(table, rig, kind, name=name, sources=sources, options=choices)

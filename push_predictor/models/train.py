@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,23 +16,31 @@ from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, Kerne
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
-from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
-from push_predictor.models.predictors import AnalyticalPredictor, GaussianProcessPredictor, Predictor, Scaling
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.ladder import Rung
+from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.predictors import (
+    AnalyticalPredictor,
+    GaussianProcessPredictor,
+    MechanicsPredictor,
+    Predictor,
+    Scaling,
+)
 from push_predictor.models.predictors.correlation_fit import fit_correlation
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
+from push_predictor.models.train_mechanics import predictor_about, train_mechanics
+from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
 
-Watch = Callable[[str, float], None]
 DEFAULT_ROWS = 1000
+MOST_FITTED_ROWS = 4000  # of fitted mechanics, unless n_train is given
+MOST_SEARCHED_ROWS = 1200  # by the ladder of fitted mechanics
 FEWEST_ROWS = 10
 MOST_DENSE_ROWS = 2000  # a dense VHGP takes 46 CPU s and 240 MB; with twice the rows eight and four times as much
 CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
-
-
-def no_watch(stage: str, done: float) -> None:
-    """Report nothing."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +48,11 @@ class TrainingOptions:
     """How to train a model. Raises TrainingError for a value that no training accepts.
 
     n_train: draw this many rows at random with default_rng(seed). None takes all rows up to 1000; of more, it draws
-    1000 evenly over the pushes. fit: estimate friction and pressure of an analytical model; otherwise the textbook's
-    values are used. kernels: of a learnt model. inducing: number of inducing inputs of a VHGP. None trains a dense
-    VHGP on up to MOST_DENSE_ROWS rows, and beyond that a sparse one with DEFAULT_INDUCING.
+    1000 evenly over the pushes (MOST_FITTED_ROWS with fit). fit: choose and estimate the mechanics' parameters of an
+    analytical model; otherwise the textbook's values are used. supports: support points (k, 3) as in Rig, by the
+    covariate `recording`, where recordings had others than the rig; used with fit. kernels: of a learnt model.
+    inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
+    that a sparse one with DEFAULT_INDUCING.
     """
 
     n_train: int | None = None
@@ -50,6 +60,7 @@ class TrainingOptions:
     fit: bool = False
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
+    supports: Mapping[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, value in (("n_train", self.n_train), ("inducing", self.inducing)):
@@ -74,37 +85,70 @@ def train_model(
     Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or options that the kind does not
     have.
     """
+    return train_with_ladder(table, rig, kind, name=name, sources=sources, options=options, watch=watch)[0]
+
+
+def train_with_ladder(
+    table: PushTable,
+    rig: Rig,
+    kind: str,
+    *,
+    name: str,
+    sources: Sequence[str] = (),
+    options: TrainingOptions = TrainingOptions(),
+    watch: Watch = no_watch,
+) -> tuple[PushModel, list[Rung]]:
+    """Like `train_model`; also returns the ladder of fitted mechanics, empty for other models."""
     if kind not in KINDS:
         raise TrainingError(f"model: {kind!r} is not accepted, give one of {', '.join(KINDS)}")
-    rows = table.take(training_rows(table, options.n_train, options.seed))
+    most = MOST_FITTED_ROWS if kind == "analytical" and options.fit else DEFAULT_ROWS
+    rows = table.take(training_rows(table, options.n_train, options.seed, most))
     if len(rows) < FEWEST_ROWS:
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     with one_blas_thread():
-        predictor = _predictor(rows, rig, kind, options, watch)
+        predictor, ladder = _predictor(rows, rig, kind, options, watch)
     watch(f"trained {kind} on {len(rows)} windows of {len(rows.pushes)} pushes", 1.0)
     provenance = Provenance(tuple(sources), len(rows.pushes), options.seed, __version__)
-    return PushModel(name, kind, rig, predictor, rows, provenance)
+    return PushModel(name, kind, rig, predictor, rows, provenance), ladder
 
 
-def _predictor(rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch) -> Predictor:
+def _predictor(
+    rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
+) -> tuple[Predictor, list[Rung]]:
     inducing = inducing_inputs(kind, len(rows), options.inducing)
-    if kind == "analytical":
-        return _analytical(rows, rig, options.fit)
-    return _learnt(rows, rig, kind, options.kernels, inducing, watch)
+    if kind != "analytical":
+        return _learnt(rows, rig, kind, options.kernels, inducing, watch), []
+    if options.fit:
+        return _fitted(rows, rig, options, watch)
+    return _with_covariance(AnalyticalPush(rig.outline, rig.pusher_radius), rows), []
+
+
+def _fitted(rows: PushTable, rig: Rig, options: TrainingOptions, watch: Watch) -> tuple[MechanicsPredictor, list[Rung]]:
+    support = None if rig.support_points is None or options.supports else supported_at(rig.support_points)
+    supports = {number: supported_at(points) for number, points in options.supports.items()}
+    mechanics = PushMechanics(rig.outline, rig.pusher_radius, support, supports)
+    search = rows.take(_even_over_pushes(rows, MOST_SEARCHED_ROWS, options.seed))
+    trained = train_mechanics(mechanics, rows, search, watch)
+    return trained.predictor, trained.ladder
 
 
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
     A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. An analytical one
-    keeps its friction and pressure, and its covariance is estimated again. Raises TrainingError for too few rows.
+    keeps its parameters, and its covariance is estimated again. Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
         options = TrainingOptions(seed=seed, kernels=predictor.regressions[0].parameters.choice)
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
-    return PushModel(name, model.kind, model.rig, _with_covariance(predictor.physics, table), table, provenance)
+    again: Predictor
+    if isinstance(predictor, MechanicsPredictor):
+        again = predictor_about(predictor.fitted, table)
+    else:
+        again = _with_covariance(predictor.physics, table)
+    return PushModel(name, model.kind, model.rig, again, table, provenance)
 
 
 def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | None:
@@ -116,11 +160,11 @@ def inducing_inputs(kind: str, rows: int, wanted: int | None = None) -> int | No
     return TrainingOptions(inducing=wanted).inducing
 
 
-def training_rows(table: PushTable, n_train: int | None, seed: int) -> IntArray:
-    """Indices of the training rows; see TrainingOptions."""
+def training_rows(table: PushTable, n_train: int | None, seed: int, most: int = DEFAULT_ROWS) -> IntArray:
+    """Indices of the training rows, unless n_train is given at most `most`; see TrainingOptions."""
     count = len(table)
     if n_train is None:
-        return np.arange(count) if count <= DEFAULT_ROWS else _even_over_pushes(table, DEFAULT_ROWS, seed)
+        return np.arange(count) if count <= most else _even_over_pushes(table, most, seed)
     if not 0 < n_train <= count:
         raise TrainingError(f"n_train: {n_train} is not accepted, give 1 to {count}, the number of rows")
     return np.sort(np.random.default_rng(seed).permutation(count)[:n_train])
@@ -179,13 +223,6 @@ def _scaling(rows: PushTable, rig: Rig) -> Scaling:
     return Scaling(
         tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), rows.outcomes.mean(axis=0), outcome_sd
     )
-
-
-def _analytical(rows: PushTable, rig: Rig, fit: bool) -> AnalyticalPredictor:
-    physics = AnalyticalPush(rig.outline, rig.pusher_radius)
-    if fit:
-        physics = fit_analytical(physics, rows.inputs, rows.duration, rows.outcomes)
-    return _with_covariance(physics, rows)
 
 
 def _with_covariance(physics: AnalyticalPush, rows: PushTable) -> AnalyticalPredictor:

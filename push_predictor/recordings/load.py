@@ -16,16 +16,22 @@ from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, rig_path
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
+from push_predictor.types import Array
 
 
-def load_data(paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()) -> PushTable:
+def load_data(
+    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions(), *, numbered: bool = False
+) -> PushTable:
     """The windows of all recordings and the rows of all tables, in the order given.
 
-    rig replaces the recorded one. A covariate is kept if all data have it. If two paths use the same push_id for
-    different rows, the name of the path is prefixed to it; the same rows twice remain one push. Raises RecordingError
-    (also if no recording has a window), TableError or RigError.
+    rig replaces the recorded one. numbered: add the covariate `recording`, the number of the path from 0. A covariate
+    is kept if all data have it. If two paths use the same push_id for different rows, the name of the path is prefixed
+    to it; the same rows twice remain one push. Raises RecordingError (also if no recording has a window), TableError or
+    RigError.
     """
     tables = [_load(Path(path), rig, options) for path in paths]
+    if numbered:
+        tables = [_numbered(number, table) for number, table in enumerate(tables)]
     if paths and not any(map(len, tables)):
         raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings that contain pushes")
     names = [Path(path).name for path in paths]
@@ -46,6 +52,18 @@ def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
         if _geometry(rig) != _geometry(first[1]):
             raise RigError(f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})")
     return first[1]
+
+
+def different_supports(paths: Sequence[Path]) -> dict[int, Array]:
+    """Support points (k, 3) as in Rig, by number of the path, if the rigs of the paths differ in them; else empty.
+
+    Paths without known support points are omitted.
+    """
+    rigs = [known_rig(Path(path)) for path in paths]
+    found = [None if rig is None else rig.support_points for rig in rigs]
+    if all(_same_support(points, found[0]) for points in found):
+        return {}
+    return {number: points for number, points in enumerate(found) if points is not None}
 
 
 def distinct_pushes(names: Sequence[str], tables: Sequence[PushTable]) -> list[PushTable]:
@@ -80,6 +98,14 @@ def _rig_of(path: Path) -> Rig:
 def _geometry(rig: Rig) -> tuple[str | None, ...]:
     record = rig.to_record()
     return tuple(record.get(key) for key in ("outline", "shape_parameters", "pusher_radius"))
+
+
+def _same_support(one: Array | None, other: Array | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
+
+
+def _numbered(number: int, table: PushTable) -> PushTable:
+    return replace(table, covariates={**table.covariates, "recording": np.full(len(table), float(number))})
 
 
 def _rows_by_push(table: PushTable) -> dict[str, bytes]:

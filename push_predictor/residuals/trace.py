@@ -18,7 +18,7 @@ from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.train import Watch, no_watch
+from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.corrections import correct

@@ -12,7 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from push_predictor.models.predictors import AnalyticalPredictor, ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.predictors import (
+    AnalyticalPredictor,
+    ExtendedPredictor,
+    GaussianProcessPredictor,
+    MechanicsPredictor,
+)
 from push_predictor.models.store.model_file import FORMAT_VERSION, is_model_file, load_model, save_model
 
 FILES = Path(__file__).parent / "model_files"
@@ -26,6 +31,7 @@ PREDICTORS = {
     3: ExtendedPredictor,
     4: ExtendedPredictor,
     5: GaussianProcessPredictor,
+    6: MechanicsPredictor,
 }
 
 
@@ -64,7 +70,7 @@ def test_model_is_saved_in_the_format_it_was_loaded_from(version: int, tmp_path:
 
 
 def test_parts_of_each_format_are_loaded() -> None:
-    second, third, fourth, fifth = (load_model(file_of(version)).predictor for version in (2, 3, 4, 5))
+    second, third, fourth, fifth, sixth = (load_model(file_of(version)).predictor for version in range(2, 7))
     assert isinstance(second, GaussianProcessPredictor)
     assert {regression.parameters.choice.family for regression in second.regressions} == {"matern52"}
     assert isinstance(third.base, AnalyticalPredictor)
@@ -72,3 +78,4 @@ def test_parts_of_each_format_are_loaded() -> None:
     assert [effect.mechanism for effect in fourth.effects] == ["contact_friction", "pusher_radius"]
     assert list(fourth.cross) == [(0, 1)]
     assert isinstance(fifth, GaussianProcessPredictor) and fifth.correlation is not None
+    assert isinstance(sixth, MechanicsPredictor) and "contact_friction" in sixth.fitted.values

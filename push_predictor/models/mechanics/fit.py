@@ -51,8 +51,8 @@ class FitRows:
 class JointFit:
     """Parameters fitted together.
 
-    values: by name, of the free parameters. residuals (n, 3): outcomes less displacements. scale (3,): of the residuals,
-    by Student's t. jacobian (n, 3, p): derivatives of the displacement in the order of `names`.
+    values: by name, of the free parameters. residuals (n, 3): outcomes less displacements. scale (3,): of the
+    residuals, by Student's t. jacobian (n, 3, p): derivatives of the displacement in the order of `names`.
     """
 
     rows: FitRows
@@ -130,7 +130,7 @@ def held_out_scores(fit: JointFit, names: Sequence[str]) -> Array:
         moved = problem_step.of(jacobian, fit.residuals, values, ~held) if names else np.zeros(0)
         left = fit.residuals[held] - jacobian[held] @ moved
         score[held] = _loss(left / fit.scale).sum(axis=1)
-    return np.bincount(push, score)
+    return np.bincount(push, score).astype(np.float64)
 
 
 def student_scale(residuals: Array) -> Array:

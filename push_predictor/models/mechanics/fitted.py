@@ -7,9 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.pressure import patch
 from push_predictor.types import Array
+
+RECORDING = "recording"  # the covariate that numbers recordings with different supports
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +31,28 @@ class FittedMechanics:
     @property
     def needs(self) -> tuple[str, ...]:
         """Names of the covariates that every push must bring."""
-        return tuple(dict.fromkeys(need for name in self.values for need in BY_NAME[name].needs))
+        names = [RECORDING] if self.mechanics.supports else []
+        names += [need for name in self.values for need in BY_NAME[name].needs]
+        return tuple(dict.fromkeys(names))
 
     def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
         """Displacement (n, 3: dx, dy in m, dtheta in rad); see PushMechanics.displacement."""
         return self.mechanics.displacement(self.values, inputs, duration, covariates)
+
+    def value(self, name: str) -> float:
+        """The value of a parameter: the fitted one, or the textbook's."""
+        return self.values.get(name, BY_NAME[name].textbook)
+
+    def ellipsoid(self) -> AnalyticalPush:
+        """The ellipsoidal model with the same contact friction, and the length and centre of the pressure.
+
+        Of recordings with different supports it takes the mean. Responses of effects are computed from it.
+        """
+        mechanics = self.mechanics
+        supports = [mechanics.support] if mechanics.support is not None else list(mechanics.supports.values())
+        supports = supports or [patch(mechanics.outline, self.value("rim_exponent"))]
+        x, y = np.mean([support.centre for support in supports], axis=0)
+        length = float(np.mean([support.length for support in supports]))
+        centre = float(x) + self.value("centre_x"), float(y) + self.value("centre_y")
+        friction = self.value("contact_friction")
+        return AnalyticalPush(mechanics.outline, mechanics.pusher_radius, friction, Support(centre, length))

@@ -39,14 +39,14 @@ def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> l
     """The rungs of the ladder, from the textbook's parameters on.
 
     Each step adds a parameter that improves the score of held-out pushes by more than one standard error of the gain
-    from push to push, and refits all of them together. Two parameters can mimic a third for some steps, so the BEAM best
-    ladders are continued at each step, and that with the best score wins. Candidates are all parameters whose covariates
-    the rows have, and that the support and the data can show.
+    from push to push, and refits all of them together. Two parameters can mimic a third for some steps, so the BEAM
+    best ladders are continued at each step, and that with the best score wins. Candidates are all parameters whose
+    covariates the rows have, and that the support and the data can show.
     """
     first = [Rung(None, fit_jointly(mechanics, rows, ()))]
     beam, ended = [first], [first]
     while beam and len(beam[0]) <= MOST_PARAMETERS and rows.pushes >= FEWEST_PUSHES:
-        watch(f"fit mechanics: step {len(beam[0])}", min(0.9, 0.1 * len(beam[0])))
+        watch(f"fit mechanics: step {len(beam[0])}", min(0.8, 0.08 * len(beam[0])))
         promising = [step for rungs in beam for step in _promising(mechanics, rungs)]
         unlike = {
             frozenset((*step.wide_names, step.added)): step for step in sorted(promising, key=_expected, reverse=True)

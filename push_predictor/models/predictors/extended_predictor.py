@@ -47,7 +47,8 @@ class ExtendedPredictor:
     @cached_property
     def covariates(self) -> tuple[str, ...]:
         """See Predictor."""
-        return tuple(dict.fromkeys(name for effect in self.effects for name in effect.needs))
+        of_effects = (name for effect in self.effects for name in effect.needs)
+        return tuple(dict.fromkeys((*self.base.covariates, *of_effects)))
 
     @cached_property
     def needs(self) -> tuple[str, ...]:

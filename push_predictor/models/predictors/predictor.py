@@ -61,7 +61,7 @@ class Predictor(Protocol):
 
     @property
     def covariates(self) -> tuple[str, ...]:
-        """Names of the covariates that the effects depend on, each once; some follow from the push's inputs."""
+        """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
 
     def completed(self, push: Push) -> Push:
         """The pushes with those of `covariates` that follow from their inputs."""

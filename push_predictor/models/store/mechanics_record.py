@@ -41,4 +41,5 @@ def mechanics_of(record: dict[str, Any], rig: Rig) -> FittedMechanics:
 
 
 def _points(support: PressureDistribution) -> list[list[float]]:
-    return np.column_stack([support.points, support.shares]).tolist()
+    points: list[list[float]] = np.column_stack([support.points, support.shares]).tolist()
+    return points

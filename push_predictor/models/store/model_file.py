@@ -28,8 +28,8 @@ from push_predictor.recordings.rig import rig_from_record
 
 FORMAT = "push_predictor model"
 # What each version added. 2: kernels other than the squared exponential, and a nugget. 3: effects. 4: effects that
-# share a covariance. 5: correlated outputs, and inducing inputs.
-FORMAT_VERSION = 5
+# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics.
+FORMAT_VERSION = 6
 PROBES = 5
 HEADER = "header"
 PREDICTOR = "body"  # the header's key of the predictor's record
@@ -100,7 +100,7 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     predictor = predictor_record(model.predictor, arrays)
     return {
         "format": FORMAT,
-        "format_version": 5 if has_inducing(0, arrays) else _version(predictor),
+        "format_version": _version(predictor, arrays),
         "written_by": __version__,
         "name": model.name,
         "kind": model.kind,
@@ -111,9 +111,12 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     }
 
 
-def _version(predictor: dict[str, Any]) -> int:
+def _version(predictor: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
     """The lowest version whose readers understand the record of a predictor."""
-    if "correlation" in predictor.get("base", predictor):
+    base = predictor.get("base", predictor)
+    if "mechanics" in base:
+        return 6
+    if "correlation" in base or has_inducing(0, arrays):
         return 5
     if "effects" in predictor:
         return 4 if "cross" in predictor else 3

@@ -19,15 +19,18 @@ from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,
     GaussianProcessPredictor,
+    MechanicsPredictor,
     Predictor,
     Scaling,
 )
 from push_predictor.models.store.correlation_record import correlation_of, correlation_record
 from push_predictor.models.store.effects_record import cross_of, cross_record, effects_of, effects_record
+from push_predictor.models.store.mechanics_record import mechanics_of, mechanics_record
 from push_predictor.models.store.regression_record import put_regression, regression_of, regression_record
 from push_predictor.models.store.table_record import finite
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
 
 LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
 BASE_OUTCOMES = "base_outcomes"
@@ -68,6 +71,11 @@ def _analytical_record(predictor: AnalyticalPredictor, arrays: dict[str, np.ndar
 
 
 @predictor_record.register
+def _mechanics_record(predictor: MechanicsPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    return {"mechanics": mechanics_record(predictor.fitted), "covariance": predictor.covariance.tolist()}
+
+
+@predictor_record.register
 def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     for k, regression in enumerate(predictor.regressions):
         put_regression(regression, k, arrays)
@@ -92,8 +100,12 @@ def predictor_of(record: dict[str, Any], source: Source) -> Predictor:
     return _extended(record, source) if "effects" in record else _base(record, source)
 
 
-def _base(record: dict[str, Any], source: Source) -> AnalyticalPredictor | GaussianProcessPredictor:
-    return _analytical(record, source.rig) if source.kind == "analytical" else _learnt(record, source)
+def _base(
+    record: dict[str, Any], source: Source
+) -> AnalyticalPredictor | MechanicsPredictor | GaussianProcessPredictor:
+    if source.kind != "analytical":
+        return _learnt(record, source)
+    return _mechanics(record, source) if "mechanics" in record else _analytical(record, source.rig)
 
 
 def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
@@ -124,9 +136,23 @@ def _physics(record: dict[str, Any], rig: Rig) -> AnalyticalPush:
 
 def _analytical(record: dict[str, Any], rig: Rig) -> AnalyticalPredictor:
     physics = _physics(record, rig)
+    return AnalyticalPredictor(physics, _covariance(record))
+
+
+def _mechanics(record: dict[str, Any], source: Source) -> MechanicsPredictor:
+    predictor = MechanicsPredictor(mechanics_of(record["mechanics"], source.rig), _covariance(record))
+    if missing := [name for name in predictor.needs if name not in source.training.covariates]:
+        raise ValueError(f"the mechanics need the covariate {missing[0]}, which the training rows lack")
+    return predictor
+
+
+def _covariance(record: dict[str, Any]) -> Array:
+    """Of the outcomes about the mechanics (3, 3). Raises LinAlgError or ValueError for a damaged one."""
     covariance = np.array(record["covariance"], dtype=np.float64)
-    np.linalg.cholesky(covariance)  # raises for a damaged one
-    return AnalyticalPredictor(physics, covariance)
+    if covariance.shape != (3, 3):
+        raise ValueError(f"covariance of shape {covariance.shape}, (3, 3) is needed")
+    np.linalg.cholesky(covariance)
+    return covariance
 
 
 def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:

@@ -1,0 +1,50 @@
+"""Fitting the mechanics of a slider to a push table: the ladder, and the predictor of its last step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.mechanics.fit import FitRows, fit_jointly
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.ladder import Rung, climb
+from push_predictor.models.predictors import MechanicsPredictor
+from push_predictor.models.watch import Watch, no_watch
+from push_predictor.recordings.table import PushTable
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedMechanics:
+    """A predictor of fitted mechanics, and the ladder that chose its parameters."""
+
+    predictor: MechanicsPredictor
+    ladder: list[Rung]
+
+
+def train_mechanics(
+    mechanics: PushMechanics, rows: PushTable, search: PushTable, watch: Watch = no_watch
+) -> TrainedMechanics:
+    """Choose the free parameters on the rows `search`, fit them to all rows, and take the covariance of those.
+
+    Raises TrainingError for fewer than two rows.
+    """
+    ladder = climb(mechanics, fit_rows(search), watch)
+    last = ladder[-1].fit
+    if len(search) < len(rows):
+        watch("fit mechanics: all rows", 0.9)
+        last = fit_jointly(mechanics, fit_rows(rows), last.names, last.values)
+    return TrainedMechanics(predictor_about(FittedMechanics(mechanics, last.values, last.covariance), rows), ladder)
+
+
+def predictor_about(fitted: FittedMechanics, rows: PushTable) -> MechanicsPredictor:
+    """The predictor with the covariance of its residuals on these rows."""
+    residuals = rows.outcomes - fitted.displacement(rows.inputs, rows.duration, rows.covariates)
+    return MechanicsPredictor(fitted, residuals.T @ residuals / len(residuals))
+
+
+def fit_rows(table: PushTable) -> FitRows:
+    """The rows of a table as the fit takes them."""
+    push = np.unique(table.push_id, return_inverse=True)[1]
+    return FitRows(table.inputs, table.duration, table.outcomes, push, table.covariates)

@@ -1,0 +1,123 @@
+"""Models of fitted mechanics: what they need, how they are saved, extended and retrained."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import square_pushes
+
+from push_predictor.errors import ModelFileError, RequestError
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
+from push_predictor.models.push_model import Provenance, PushModel
+from push_predictor.models.pushes import Pushes
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.train import retrain_model
+from push_predictor.models.train_mechanics import predictor_about
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+ON_CORNERS = supported_at(
+    np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+)
+IN_MIDDLE = supported_at(np.array([[0.01, 0.01, 0.25], [-0.01, 0.01, 0.25], [-0.01, -0.01, 0.25], [0.01, -0.01, 0.25]]))
+
+
+def mechanics_model(values: dict[str, float], **covariates: Array) -> PushModel:
+    """A model of 24 windows; with the covariate `recording`, recordings 0 and 1 have known supports."""
+    table, rig = square_pushes(24)
+    table = replace(table, covariates=covariates)
+    supports = {0: ON_CORNERS, 1: IN_MIDDLE} if "recording" in covariates else {}
+    mechanics = PushMechanics(rig.outline, rig.pusher_radius, None, supports)
+    fitted = FittedMechanics(mechanics, values, 1e-4 * np.eye(len(values)))
+    return PushModel("m", "analytical", rig, predictor_about(fitted, table), table, Provenance((), 8, 0, "0"))
+
+
+def saved(model: PushModel, tmp_path: Path) -> PushModel:
+    save_model(model, tmp_path / "m.pushmodel")
+    return load_model(tmp_path / "m.pushmodel")
+
+
+@pytest.fixture(scope="module")
+def by_recording() -> PushModel:
+    return mechanics_model({"contact_friction": 0.2}, recording=np.arange(24.0) % 2)
+
+
+def test_needs_the_covariates_of_its_parameters() -> None:
+    model = mechanics_model({"grain_x": 0.3}, push_heading=np.linspace(-3.0, 3.0, 24))
+    assert model.needs == ("push_heading",)
+    with pytest.raises(RequestError, match="push_heading"):
+        model.predict(Pushes(0.02, 0.1, 0.2))
+    along, across = (model.predict(Pushes(0.02, 0.1, 0.2, covariates={"push_heading": h})).mean for h in (0.0, 1.5))
+    assert not np.allclose(along, across)
+
+
+def test_range_of_a_needed_covariate_bounds_the_domain() -> None:
+    model = mechanics_model({"grain_x": 0.3}, push_heading=np.linspace(0.0, 0.5, 24))
+    found = model.predict(Pushes(0.02, 0.3, 0.2, covariates={"push_heading": [0.2, 2.0]}))
+    assert found.in_domain.tolist() == [True, False]
+
+
+def test_support_of_the_recording_is_used_and_saved(by_recording: PushModel, tmp_path: Path) -> None:
+    assert by_recording.needs == ("recording",)
+    again, push = saved(by_recording, tmp_path), Pushes(0.02, 0.05, 0.0, covariates={"recording": [0.0, 1.0]})
+    wide, narrow = abs(by_recording.predict(push).mean[:, 2])
+    assert narrow > 2.0 * wide
+    np.testing.assert_allclose(again.predict(push).mean, by_recording.predict(push).mean, rtol=1e-9)
+
+
+def test_saved_parameters_and_their_covariance_return(tmp_path: Path) -> None:
+    predictor = saved(mechanics_model({"contact_friction": 0.2, "rim_exponent": 1.0}), tmp_path).predictor
+    assert isinstance(predictor, MechanicsPredictor)
+    assert predictor.fitted.values == {"contact_friction": 0.2, "rim_exponent": 1.0}
+    np.testing.assert_array_equal(predictor.fitted.covariance, 1e-4 * np.eye(2))
+
+
+def test_rejects_a_file_whose_rows_lack_a_needed_covariate(by_recording: PushModel, tmp_path: Path) -> None:
+    table = by_recording.training
+    bare = PushTable(table.inputs, table.duration, table.outcomes, table.push_id)
+    with pytest.raises(ModelFileError, match="recording"):
+        saved(replace(by_recording, training=bare), tmp_path)
+
+
+def test_rejects_a_file_with_a_parameter_beyond_its_range(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match="contact_friction"):
+        saved(mechanics_model({"contact_friction": 1.6}), tmp_path)
+
+
+def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None:
+    model = mechanics_model({"contact_friction": 0.2})
+    table = replace(model.training, outcomes=model.training.outcomes + np.array([1e-3, 0.0, 0.0]))
+    again = retrain_model(model, table).predictor
+    assert isinstance(again, MechanicsPredictor) and isinstance(model.predictor, MechanicsPredictor)
+    assert again.fitted is model.predictor.fitted
+    assert again.covariance[0, 0] > 10.0 * model.predictor.covariance[0, 0]
+
+
+def test_ellipsoid_has_the_friction_and_the_pressure_of_the_mechanics(by_recording: PushModel) -> None:
+    physics = by_recording.predictor.physics
+    assert physics.contact_friction == 0.2
+    assert physics.support.length == pytest.approx(0.5 * (ON_CORNERS.length + IN_MIDDLE.length))
+    shifted = mechanics_model({"centre_x": 0.002, "rim_exponent": 3.0}).predictor.physics.support
+    assert shifted.centre == pytest.approx((0.002, 0.0), abs=1e-12)
+    assert shifted.length > 1.1 * mechanics_model({}).predictor.physics.support.length
+
+
+def test_effects_extend_it_and_are_saved(tmp_path: Path) -> None:
+    model = mechanics_model({"grain_x": 0.1}, push_heading=np.linspace(-3.0, 3.0, 24))
+    basis = DriverBasis("constant", (), (), (), 0.0, ())
+    effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
+    base = model.predictor.base
+    extended = ExtendedPredictor(base, model.predictor.physics, (effect,), np.ones(3))
+    assert extended.needs == ("push_heading",)
+    again = saved(replace(model, predictor=extended), tmp_path)
+    slipping = Pushes(0.02, 0.1, 1.0, covariates={"push_heading": 0.1})
+    assert np.abs(again.predict(slipping).mean - model.predict(slipping).mean).max() > 1e-4
+    assert isinstance(again.base.predictor, MechanicsPredictor)
