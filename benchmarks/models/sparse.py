@@ -73,8 +73,8 @@ def measured(data: Path, python: Path | None, steps: int, folds: int) -> None:
         print("GPflow: not run, give --python")
     else:
         models["GPflow SVGP 100"] = elsewhere("gpflow", python, steps)
-    for rows in square_rows(data, folds):
-        compare(rows, models)
+    for split in square_rows(data, folds):
+        compare(split.rows(len(split.training)), models)
 
 
 def dense(rows: Rows) -> Fitted:
