@@ -80,6 +80,17 @@ class Outline:
         return np.asarray(moments / (3.0 * np.sum(cross)))
 
     @cached_property
+    def polar_moment(self) -> float:
+        """Mean squared distance from the centroid over the enclosed area, m^2."""
+        if self.semi_axes is not None:
+            return (self.semi_axes[0] ** 2 + self.semi_axes[1] ** 2) / 4.0
+        here = self.vertices - self.centroid
+        after = np.roll(here, -1, axis=0)
+        cross = here[:, 0] * after[:, 1] - after[:, 0] * here[:, 1]
+        squares = np.sum(here * here + here * after + after * after, axis=1)
+        return float(np.sum(cross * squares) / (6.0 * np.sum(cross)))
+
+    @cached_property
     def rotational_symmetry(self) -> int:
         """Order of the rotational symmetry about the origin: square 4, ellipse 2, 1 for none, 0 for a circle."""
         if self.semi_axes is not None:

@@ -27,7 +27,7 @@ class Slider:
     @property
     def inertia(self) -> float:
         """Moment of inertia about the centroid, kg m^2."""
-        return self.mass * polar_moment(self.outline)
+        return self.mass * self.outline.polar_moment
 
 
 def slider_named(name: str) -> Slider:
@@ -35,16 +35,6 @@ def slider_named(name: str) -> Slider:
     if name not in MASSES:
         raise RigError(f"shape: {name!r} is not accepted, give one of {', '.join(MASSES)}")
     return Slider(name, shape_outline(name), MASSES[name])
-
-
-def polar_moment(outline: Outline) -> float:
-    """Mean squared distance from the centroid over the outline's area, m^2."""
-    if outline.semi_axes is not None:
-        return (outline.semi_axes[0] ** 2 + outline.semi_axes[1] ** 2) / 4.0
-    here, after = outline.vertices, np.roll(outline.vertices, -1, axis=0)
-    cross = here[:, 0] * after[:, 1] - after[:, 0] * here[:, 1]
-    squares = np.sum(here * here + here * after + after * after, axis=1)
-    return float(np.sum(cross * squares) / (6.0 * np.sum(cross)))
 
 
 def support_points(outline: Outline) -> Array:

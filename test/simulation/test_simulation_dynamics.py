@@ -11,7 +11,7 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.simulation.dynamics import DAMPING, STIFFNESS, Motion, run
 from push_predictor.simulation.physics import GRAVITY, Physics
 from push_predictor.simulation.pushes import PusherPath, PushPlan, pusher_path, random_pushes
-from push_predictor.simulation.slider import Slider, polar_moment, slider_named, support_points
+from push_predictor.simulation.slider import Slider, slider_named, support_points
 from push_predictor.types import Array
 
 RADIUS = 0.00475
@@ -246,5 +246,5 @@ def test_moment_of_inertia_equals_that_of_a_uniform_plate(shape: str) -> None:
     axis = (np.arange(300) + 0.5) / 150.0 * reach - reach
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     inside = grid[outline.project(grid).distance < 0.0]
-    assert polar_moment(outline) == pytest.approx(np.mean(np.sum(inside**2, axis=1)), rel=5e-3)
+    assert outline.polar_moment == pytest.approx(np.mean(np.sum(inside**2, axis=1)), rel=5e-3)
     assert np.allclose(np.mean(support_points(outline), axis=0), 0.0, atol=1e-12)

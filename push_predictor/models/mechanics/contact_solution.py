@@ -55,14 +55,12 @@ def driven(twist_of: TwistOf, touch: Touch, left_edge: Array, right_edge: Array)
     """
     right = _Edge(np.cos(right_edge), -np.sin(right_edge))
     left = _Edge(np.cos(left_edge), np.sin(left_edge))
-    pusher = np.arctan2(touch.across, np.maximum(touch.along, np.finfo(np.float64).tiny))
     at_right, at_left = _under(twist_of, touch, right), _under(twist_of, touch, left)
-    lag_right, lag_left = pusher - at_right.angle, pusher - at_left.angle
-    slip = (lag_left > 0.0).astype(np.int64) - (lag_right < 0.0).astype(np.int64)
+    lags = np.maximum(at_right.lag(touch), 0.0), np.minimum(at_left.lag(touch), 0.0)
+    slip = (at_left.lag(touch) > 0.0).astype(np.int64) - (at_right.lag(touch) < 0.0).astype(np.int64)
     sticks = (slip == 0) & (touch.along > 0.0)
     share, motion = np.where(slip > 0, 1.0, 0.0), _chosen(slip > 0, at_left, at_right)
     if sticks.any():
-        lags = np.maximum(at_right.lag(touch), 0.0), np.minimum(at_left.lag(touch), 0.0)
         root, inside = _root(twist_of, touch, (right, left), lags, sticks)
         share, motion = np.where(sticks, root, share), _chosen(sticks, inside, motion)
     moves = (touch.along > 0.0) & (motion.toward > 0.0)
@@ -87,13 +85,13 @@ class _Motion(NamedTuple):
     toward: Array
     sideways: Array
 
-    @property
-    def angle(self) -> Array:
-        return np.asarray(np.arctan2(self.sideways, self.toward))
-
     def lag(self, touch: Touch) -> Array:
-        """Cross product of the contact's velocity with the pusher's: above 0 where it must turn to the left."""
-        return self.toward * touch.across - self.sideways * touch.along
+        """Above 0 where the force must turn to the left, for the contact to move as the pusher does.
+
+        The cross product of the contact's velocity with the pusher's. The velocity is within a right angle of the
+        force, so one away from the pusher lies beyond the normal's left or right, whatever the pusher's is.
+        """
+        return np.maximum(self.toward, 0.0) * touch.across - self.sideways * touch.along
 
 
 def _under(twist_of: TwistOf, touch: Touch, force: _Edge) -> _Motion:
@@ -123,7 +121,7 @@ def _root(
     side, change = np.zeros(len(wanted)), (left.push - right.push, left.rub - right.rub)
     for step in range(1, ROOT_STEPS + 1):
         gap = f_low - f_high
-        share = np.where(gap > 0.0, f_low / np.where(gap > 0.0, gap, 1.0), 0.5)
+        share = np.where(f_low * f_high < 0.0, f_low / np.where(gap > 0.0, gap, 1.0), 0.5)
         middle = low + (high - low) * (0.5 if step % BISECT_EVERY == 0 else share)
         motion = _under(twist_of, touch, _Edge(right.push + middle * change[0], right.rub + middle * change[1]))
         lag = motion.lag(touch)

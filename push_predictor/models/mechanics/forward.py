@@ -1,33 +1,34 @@
 """The exact forward model: displacement(parameters, pushes), from any outline and pressure distribution.
 
 Four exchangeable parts: the limit surface (load_map, or surfaces for the cheap approximations), the contact
-(contact_solution, with a friction law of few numbers), the kinematics of the measurement, and the world.
+(contact_solution, with the friction law of friction_cone), the kinematics of the measurement (recorded_push), and the
+world (loaded_surface).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline, Projection
-from push_predictor.models.mechanics.contact_solution import Driven, Touch, TwistOf, driven
+from push_predictor.models.mechanics.contact_solution import Driven, Touch, driven
+from push_predictor.models.mechanics.friction_cone import friction_cone
 from push_predictor.models.mechanics.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.parameters import BY_NAME, ParameterValues
+from push_predictor.models.mechanics.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.parameters import ParameterValues, RowValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
-from push_predictor.models.mechanics.support_surfaces import RowSurfaces, SameSurface, row_surfaces
+from push_predictor.models.mechanics.recorded_push import TruePush, true_push
+from push_predictor.models.mechanics.support_surfaces import PushSurfaces, SameSurface, row_surfaces
 from push_predictor.models.mechanics.surfaces import PowerSurface
 from push_predictor.models.mechanics.sweep import swept
 from push_predictor.types import Array, IntArray
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
-REFERENCE_SPEED = 0.02  # m/s, at which friction_by_speed is zero
-SLOWEST = 1e-4  # m/s, of a tangential speed
 BEND_STEP = 5e-4  # m of the tip's path, over which the acceleration of the slider is taken
-SQUARE_OF_SPREAD = 9.0 / 16.0  # mean square of a coordinate over c squared, of an even disc
+MOST_INERTIA = 0.8  # of the largest load: more would not be a correction
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +37,14 @@ class PushMechanics:
 
     support: of every push: a known pressure distribution, a PowerSurface as a cheap approximation of the limit surface,
     or None for a patch over the outline, whose pressure the parameter rim_exponent changes. supports: others by the
-    covariate `recording`, where recordings had different supports.
+    covariate `recording`, where recordings had different supports. accuracy: of a displacement, relative.
     """
 
     outline: Outline
     pusher_radius: float
     support: PressureDistribution | PowerSurface | None = None
     supports: Mapping[int, PressureDistribution] = field(default_factory=dict)
+    accuracy: float = 1e-3
     _tables: dict[object, LoadMap] = field(default_factory=dict)
 
     def displacement(
@@ -53,8 +55,11 @@ class PushMechanics:
         values: of parameters.PARAMETERS, each a number or (n,). inputs (n, 3): velocity m/s, contact, angle rad;
         duration (n,) s. Raises KeyError for a covariate that a parameter needs.
         """
-        rows = _Values(values, len(inputs), covariates or {})
-        return _Sweep(self, self._surfaces(rows), rows, inputs, duration).displacement()
+        if not len(inputs):
+            return np.zeros((0, 3))
+        rows = RowValues(values, len(inputs), covariates or {})
+        push = true_push(self.outline, self.pusher_radius, rows, inputs, np.asarray(duration, dtype=np.float64))
+        return _Motion(self, self._surfaces(rows), rows, push).displacement()
 
     def _patch(self, exponent: float) -> LoadMap:
         if exponent not in self._tables:
@@ -66,10 +71,10 @@ class PushMechanics:
             self._tables[key] = load_map(support)
         return self._tables[key]
 
-    def _surfaces(self, values: _Values) -> RowSurfaces | SameSurface:
+    def _surfaces(self, values: RowValues) -> PushSurfaces:
         n = values.n
         if isinstance(self.support, PowerSurface):
-            return SameSurface(self.support, np.tile(self.support.centre, (n, 1)), np.full(n, self.support.length))
+            return SameSurface(self.support, n)
         known = [] if self.support is None else [self._known("support", self.support)]
         number = np.where(np.full(n, bool(known)), 0, -1)
         if self.supports and "recording" in values.covariates:
@@ -82,7 +87,7 @@ class PushMechanics:
         return row_surfaces(maps, low, np.minimum(low + 1, len(maps) - 1), share)
 
     def _exponents(self, exponent: Array, on_patch: np.ndarray) -> tuple[IntArray, Array, list[float]]:
-        """For each push, the index of the tabulated exponent below its own, the share of the next, and the used ones."""
+        """Per push, the index of the tabulated exponent below its own and the share of the next; the used ones."""
         if not on_patch.any():
             return np.zeros(len(exponent), dtype=np.int64), np.zeros(len(exponent)), []
         knots = np.asarray(EXPONENT_KNOTS)
@@ -93,149 +98,88 @@ class PushMechanics:
         return np.maximum(below - first, 0), share, list(EXPONENT_KNOTS[first : last + 1])
 
 
-class _Values:
-    """Values of the parameters of n pushes, and their covariates."""
+class _Motion:
+    """The motion of sliders under pushes."""
 
-    def __init__(self, values: ParameterValues, n: int, covariates: Mapping[str, Array]) -> None:
-        unknown = set(values) - set(BY_NAME)
-        if unknown:
-            raise KeyError(f"{sorted(unknown)[0]!r} is no parameter of the mechanics: {', '.join(BY_NAME)}")
-        self.n, self.covariates, self._values = n, covariates, values
-
-    def of(self, name: str) -> Array:
-        """(n,) of a parameter."""
-        return np.broadcast_to(np.asarray(self._values.get(name, BY_NAME[name].textbook), dtype=np.float64), self.n)
-
-    def active(self, *names: str) -> bool:
-        """Whether any of these differs from zero."""
-        return any(np.any(np.asarray(self._values.get(name, 0.0)) != 0.0) for name in names)
-
-    def pair(self, first: str, second: str) -> Array:
-        """(n, 2) of two parameters."""
-        return np.column_stack([self.of(first), self.of(second)])
-
-
-class _Sweep:
-    """The pushes as they truly were, and how they were recorded."""
-
-    def __init__(
-        self,
-        mechanics: PushMechanics,
-        surface: RowSurfaces | SameSurface,
-        values: _Values,
-        inputs: Array,
-        duration: Array,
-    ) -> None:
-        self.mechanics, self.surface, self.values = mechanics, surface, values
-        velocity, contact, angle = np.asarray(inputs, dtype=np.float64).T
-        outline, self.radius = mechanics.outline, mechanics.pusher_radius + values.of("radius_error")
-        normal = outline.inward_normal(contact)
-        self.recorded = rotate(normal, angle)  # direction of the push, in the recorded body frame
-        along = values.of("tip_offset_along") + velocity * values.of("clock_delay")
-        tip = outline.point(contact) - mechanics.pusher_radius * normal
-        tip = tip + along[:, None] * self.recorded + values.of("tip_offset_across")[:, None] * _left(self.recorded)
-        shift, turned = values.pair("outline_x", "outline_y"), values.of("tracker_rotation")
-        self.speed, self.travel = velocity, velocity * duration * (1.0 + values.of("travel_share"))
-        self.frame = rotate(self.recorded, -turned)  # the same direction in the true body frame
-        self.ahead = rotate(self.frame, values.of("push_rotation"))
-        self.origin = rotate(-shift, -turned)  # the recorded origin in the true body frame
-        self.tip = self._in_contact(rotate(tip - shift, -turned), normal, contact)
-        self._world()
-
-    def _in_contact(self, tip: Array, normal: Array, contact: Array) -> Array:
-        """The tips, moved along the outline's normal until they touch: a window begins in contact."""
-        moved = ("outline_x", "outline_y", "tracker_rotation", "radius_error")
-        if not self.values.active("tip_offset_along", "tip_offset_across", "clock_delay", *moved):
-            return tip
-        nearest = self.mechanics.outline.project(tip)
-        return np.asarray(nearest.point + nearest.normal * self.radius[:, None])
-
-    def _world(self) -> None:
-        """Heading of the true body in the world at the start, where a parameter needs it."""
-        values = self.values
-        self.heading = np.zeros(values.n)
+    def __init__(self, mechanics: PushMechanics, surfaces: PushSurfaces, values: RowValues, push: TruePush) -> None:
+        self.mechanics, self.surfaces, self.values, self.push = mechanics, surfaces, values, push
+        of_rows = surfaces.of_rows
+        self.length, self.centre = of_rows.length, of_rows.centre + values.pair("centre_x", "centre_y")
+        self.heading = np.zeros(values.n)  # of the slider in the world at the start, where a parameter needs it
         if values.active("grain_x", "grain_diagonal", "slope_x", "slope_y", "gradient_x", "gradient_y"):
-            self.heading = values.covariates["push_heading"] - np.arctan2(self.frame[:, 1], self.frame[:, 0])
+            self.heading = values.covariates["push_heading"] - push.recorded_angle
         self.stretch = values.pair("body_anisotropy", "body_anisotropy_diagonal")
-        self.grain = values.pair("grain_x", "grain_diagonal")
-        self.slope = values.pair("slope_x", "slope_y")
-        self.gradient = values.pair("gradient_x", "gradient_y") * (SQUARE_OF_SPREAD * self.surface.length[:, None] ** 2)
-        self.centre = self.surface.centre + values.pair("centre_x", "centre_y")
+        self.grain, self.slope = values.pair("grain_x", "grain_diagonal"), values.pair("slope_x", "slope_y")
+        self.gradient, self.square = values.pair("gradient_x", "gradient_y"), of_rows.square
 
     def displacement(self) -> Array:
         """See PushMechanics.displacement."""
-        pose = swept(self._rate, self.travel, self.surface.length)
-        moved = pose[:, :2] + rotate(self.origin, pose[:, 2]) - self.origin
-        heading = np.arctan2(self.frame[:, 1], self.frame[:, 0])
-        return np.column_stack([rotate(moved, -heading), pose[:, 2]])
+        return self.push.recorded_displacement(
+            swept(self._rate, self.push.travel, self.length, self.mechanics.accuracy)
+        )
 
     def _rate(self, rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
+        """Change of the poses per metre of the tip's path, gap (m) and the approach of the disc."""
+        found = self._quasi_static(rows, pose, done, None)
         if not self.values.active("inertia"):
-            return self._quasi_static(rows, pose, done, None)
-        rate, gap, along = self._quasi_static(rows, pose, done, None)
-        later = self._quasi_static(rows, pose + BEND_STEP * rate, done + BEND_STEP, None)[0]
-        bend = (later - rate) / BEND_STEP
-        # Moment of inertia over mass is twice the mean square of a coordinate.
+            return found
+        ahead = pose + BEND_STEP * found[0]
+        later = self._quasi_static(rows, ahead, done + BEND_STEP, None)[0]
+        centre = self.centre[rows]  # of mass: above that of the pressure while the slider rests
+        bend = _of_point(later, ahead, centre) - _of_point(found[0], pose, centre)
+        return self._quasi_static(rows, pose, done, self._inertial(rows, pose, bend / BEND_STEP))
+
+    def _inertial(self, rows: IntArray, pose: Array, bend: Array) -> Array:
+        """Load (k, 3) of the mass that accelerates (D'Alembert), in units of the largest friction; bend: per metre."""
         force = rotate(bend[:, :2], -pose[:, 2])
-        pull = np.column_stack([force, 2.0 * SQUARE_OF_SPREAD * self.surface.length[rows] * bend[:, 2]])
-        share = self.values.of("inertia")[rows] * self.speed[rows] ** 2
-        size = np.maximum(1.0, np.linalg.norm(pull, axis=1) * share / 0.8)  # more would not be a correction
-        return self._quasi_static(rows, pose, done, -(share / size)[:, None] * pull)
+        turning = self.mechanics.outline.polar_moment / self.length[rows] * bend[:, 2]
+        load = np.column_stack([force, turning])
+        share = self.values.of("inertia")[rows] * self.push.speed[rows] ** 2
+        size = np.maximum(1.0, np.linalg.norm(load, axis=1) * share / MOST_INERTIA)
+        return np.asarray(-(share / size)[:, None] * load)
 
     def _quasi_static(
         self, rows: IntArray, pose: Array, done: Array, inertial: Array | None
     ) -> tuple[Array, Array, Array]:
-        """Change of the poses per metre of the tip's path, gap (m) and the approach of the disc."""
-        heading, length = pose[:, 2], self.surface.length[rows]
-        tip = self.tip[rows] + done[:, None] * self.ahead[rows]
+        heading, length = pose[:, 2], self.length[rows]
+        tip = self.push.tip[rows] + done[:, None] * self.push.ahead[rows]
         nearest = self.mechanics.outline.project(to_body(tip, pose))
-        velocity = rotate(self.ahead[rows], -heading)
-        centre = self.centre[rows] + rotate(self.gradient[rows], -(self.heading[rows] + heading))
-        touch = _touch(nearest, velocity, centre, length)
+        centre = self._centre(rows, heading)
+        touch = _touch(nearest, rotate(self.push.ahead[rows], -heading), centre, length)
         motion = self._driven(rows, heading, touch, inertial)
-        if self.values.active("pushing_height"):
-            push, rub = np.cos(motion.force_angle), np.sin(motion.force_angle)
-            size = np.sqrt(1.0 + (push * touch.normal_arm + rub * touch.left_arm) ** 2)
-            x, y = push * touch.normal_x - rub * touch.normal_y, push * touch.normal_y + rub * touch.normal_x
-            centre = centre + (self.values.of("pushing_height")[rows] / size)[:, None] * np.column_stack([x, y])
-            touch = _touch(nearest, velocity, centre, length)
-            motion = self._driven(rows, heading, touch, inertial)
         spin = motion.spin / length
         vx, vy = motion.vx + spin * centre[:, 1], motion.vy - spin * centre[:, 0]
         cos, sin = np.cos(heading), np.sin(heading)
         rate = np.stack([cos * vx - sin * vy, sin * vx + cos * vy, spin], axis=1)
-        return rate, nearest.distance - self.radius[rows], touch.along
+        return rate, nearest.distance - self.push.radius[rows], touch.along
+
+    def _centre(self, rows: IntArray, heading: Array) -> Array:
+        """Centre of friction (k, 2): a friction that grows along a direction moves it by the mean square there."""
+        if not self.values.active("gradient_x", "gradient_y"):
+            return np.asarray(self.centre[rows])
+        (x, y), (xx, xy, yy) = rotate(self.gradient[rows], -(self.heading[rows] + heading)).T, self.square[rows].T
+        return np.asarray(self.centre[rows] + np.column_stack([xx * x + xy * y, xy * x + yy * y]))
 
     def _driven(self, rows: IntArray, heading: Array, touch: Touch, inertial: Array | None) -> Driven:
-        left, right = self._cone(rows, touch)
-        stretch = None
-        if self.values.active("body_anisotropy", "body_anisotropy_diagonal", "grain_x", "grain_diagonal"):
-            stretch = self.stretch[rows] + rotate(self.grain[rows], -2.0 * (self.heading[rows] + heading))
-        pull = inertial
-        if self.values.active("slope_x", "slope_y"):
-            slope = rotate(self.slope[rows], -(self.heading[rows] + heading))
-            steady = np.column_stack([slope, np.zeros(len(rows))])
+        values, world = self.values, self.heading[rows] + heading
+        stretch, pull = None, inertial
+        if values.active("body_anisotropy", "body_anisotropy_diagonal", "grain_x", "grain_diagonal"):
+            stretch = self.stretch[rows] + rotate(self.grain[rows], -2.0 * world)
+        if values.active("slope_x", "slope_y"):
+            steady = np.column_stack([rotate(self.slope[rows], -world), np.zeros(len(rows))])
             pull = steady if pull is None else pull + steady
-        return driven(_changed(partial(self.surface.twist, rows), stretch, pull), touch, left, right)
-
-    def _cone(self, rows: IntArray, touch: Touch) -> tuple[Array, Array]:
-        """Angles of the friction cone's edges to the left and to the right, rad."""
-        values = self.values
-        friction = values.of("contact_friction")[rows]
-        if values.active("friction_by_angle"):
-            friction = friction + values.of("friction_by_angle")[rows] * np.abs(np.arctan2(touch.across, touch.along))
-        if values.active("friction_by_speed"):
-            speed = np.maximum(self.speed[rows] * np.abs(touch.across), SLOWEST)
-            friction = friction + values.of("friction_by_speed")[rows] * np.log(speed / REFERENCE_SPEED)
+        height = values.of("pushing_height")[rows] if values.active("pushing_height") else None
+        surface = LoadedSurface(self.surfaces, rows, stretch, pull, height)
+        gauge = np.ones(0)
         if values.active("friction_by_load"):
-            force = 1.0 / np.sqrt(1.0 + touch.normal_arm**2)  # over the largest; that of an ellipsoid
-            friction = friction + values.of("friction_by_load")[rows] * np.log(force)
-        difference = values.of("friction_difference")[rows]
-        return np.arctan(np.maximum(friction + difference, 0.0)), np.arctan(np.maximum(friction - difference, 0.0))
+            gauge = self.surfaces.gauge(rows, touch.normal_x, touch.normal_y, touch.normal_arm)
+        return driven(surface.twist, touch, *friction_cone(values, rows, touch, self.push.speed[rows], gauge))
 
 
-def _left(direction: Array) -> Array:
-    return np.column_stack([-direction[:, 1], direction[:, 0]])
+def _of_point(rate: Array, pose: Array, point: Array) -> Array:
+    """Rates (k, 3) of a point of the body (k, 2) from those of its origin."""
+    x, y = rotate(point, pose[:, 2]).T
+    return np.asarray(rate + rate[:, 2:] * np.column_stack([-y, x, np.zeros(len(x))]))
 
 
 def _touch(nearest: Projection, velocity: Array, centre: Array, length: Array) -> Touch:
@@ -243,38 +187,3 @@ def _touch(nearest: Projection, velocity: Array, centre: Array, length: Array) -
     x, y = (nearest.point[:, 0] - centre[:, 0]) / length, (nearest.point[:, 1] - centre[:, 1]) / length
     vx, vy = velocity[:, 0], velocity[:, 1]
     return Touch(nx, ny, x * ny - y * nx, x * nx + y * ny, vx * nx + vy * ny, vy * nx - vx * ny)
-
-
-def _changed(surface: TwistOf, stretch: Array | None, pull: Array | None) -> TwistOf:
-    """The surface's twist with friction that depends on direction, and a steady load in addition to the pusher's.
-
-    A point at velocity u resists with S S u / |S u|, with S = W^-1/2: the same points with the velocity S v and the
-    arms det(S) S^-1 r have isotropic friction. The change of the arms is of second order and left out.
-    """
-    if stretch is None and pull is None:
-        return surface
-
-    def twist(force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, Array]:
-        x, y, m = force_x, force_y, moment
-        if pull is not None:
-            x, y, m = _with_pull(x, y, m, pull)
-        if stretch is None:
-            return surface(x, y, m)
-        a, b = 0.5 * stretch[:, 0], 0.5 * stretch[:, 1]  # of the root of W, to first order
-        vx, vy, spin = surface((1.0 + a) * x + b * y, b * x + (1.0 - a) * y, m)
-        return (1.0 + a) * vx + b * vy, b * vx + (1.0 - a) * vy, spin
-
-    return twist
-
-
-def _with_pull(x: Array, y: Array, m: Array, pull: Array) -> tuple[Array, Array, Array]:
-    """The load on the limit surface: the pusher's, as large as it must be, and the pull (n, 3) in units of the largest.
-
-    The size is that on an ellipsoid.
-    """
-    size = np.sqrt(x * x + y * y + m * m)
-    x, y, m = x / size, y / size, m / size
-    gx, gy, gm = pull.T
-    dot = x * gx + y * gy + m * gm
-    share = -dot + np.sqrt(np.maximum(dot * dot + 1.0 - (gx * gx + gy * gy + gm * gm), 1e-6))
-    return size * (share * x + gx), size * (share * y + gy), size * (share * m + gm)

@@ -8,53 +8,82 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from push_predictor.models.mechanics.point_friction import twist_of_load
+from push_predictor.models.mechanics.point_friction import power_of_twist, twist_of_load
 from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.surfaces import spread_by_direction
 from push_predictor.types import Array, IntArray
 
 AZIMUTHS, ELEVATIONS = 144, 49  # of the force's direction, and of the moment from none to a pure one
 REFINED = 3  # a smooth surface is solved at every third node and interpolated by cubic splines
 SMOOTH_POINTS = 20  # with fewer points of support the surface has flats, and every node is solved
+BEYOND = 3  # coarse nodes beyond both ends of the elevation, for the splines
 
 
 @dataclass(frozen=True, eq=False)
 class LoadMap:
     """The tabulated inverse of the limit surface of one pressure distribution, about its centre of pressure.
 
-    nodes (ELEVATIONS, AZIMUTHS + 1, 3): unit twists (vx, vy, w times length) of loads with that azimuth of their force
-    and that elevation of moment / length over force. A load with a negative moment has the opposite twist of its
-    opposite. centre (2,) m, length m: of the distribution.
+    nodes (ELEVATIONS, AZIMUTHS + 1, 4): unit twists (vx, vy, w times length) of loads with that azimuth of their force
+    and that elevation of moment / length over force, and the size of the load on the surface. A load with a negative
+    moment has the opposite twist of its opposite. centre (2,) m, length m, square (3,) m^2 and reach: see LimitSurface.
     """
 
     nodes: Array
     centre: Array
     length: float
+    square: Array
+    reach: Array
 
     @cached_property
     def cells(self) -> Array:
         """Per cell of the table, the bilinear polynomial of each part of the twist, (12, cells)."""
-        n = self.nodes
-        low, right = n[:-1, :-1], n[:-1, 1:] - n[:-1, :-1]
-        up, both = n[1:, :-1] - low, n[1:, 1:] - n[1:, :-1] - right
-        return np.ascontiguousarray(np.concatenate([low, right, up, both], axis=2).reshape(-1, 12).T)
+        return _polynomials(self.nodes[:, :, :3])
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Per cell of the table, the bilinear polynomial of the size of the load, (4, cells)."""
+        return _polynomials(self.nodes[:, :, 3:])
 
     def twist(self, force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, Array]:
         """See LimitSurface."""
         return interpolated(self.cells, 0, force_x, force_y, moment)
+
+    def gauge(self, force_x: Array, force_y: Array, moment: Array) -> Array:
+        """See LimitSurface."""
+        return interpolated_gauge(self.sizes, 0, force_x, force_y, moment)
 
 
 def load_map(pressure: PressureDistribution) -> LoadMap:
     """Tabulate a distribution; takes some tenths of a second."""
     centre, length = pressure.centre, pressure.length
     centred = PressureDistribution(pressure.points - centre, pressure.shares, pressure.spread)
+    (x, y), shares = centred.points.T, centred.shares
+    square = np.array([shares @ (x * x), shares @ (x * y), shares @ (y * y)])
+    square += [pressure.spread**2, 0.0, pressure.spread**2]
     every = REFINED if len(pressure.points) >= SMOOTH_POINTS else 1
-    return LoadMap(_refined(_solved(centred, length, every), every), centre, length)
+    reach = spread_by_direction(centred.points, shares)
+    return LoadMap(_refined(_solved(centred, length, every), every), centre, length, square, reach)
 
 
 def interpolated(
     cells: Array, first: IntArray | int, force_x: Array, force_y: Array, moment: Array
 ) -> tuple[Array, Array, Array]:
     """Twists (n,) each, from tables in `cells` that begin at the cell `first`; linear in the size of the load."""
+    sign, size, cell, right, up = _place(force_x, force_y, moment)
+    part, both, size = cells.take(first + cell, axis=1), right * up, sign * size
+    vx, vy, spin = (size * (part[k] + right * part[k + 3] + up * part[k + 6] + both * part[k + 9]) for k in range(3))
+    return vx, vy, spin
+
+
+def interpolated_gauge(sizes: Array, first: IntArray | int, force_x: Array, force_y: Array, moment: Array) -> Array:
+    """Sizes (n,) of loads in units of the load on the limit surface in the same direction."""
+    _, size, cell, right, up = _place(force_x, force_y, moment)
+    part = sizes.take(first + cell, axis=1)
+    return np.asarray(size / (part[0] + right * part[1] + up * part[2] + right * up * part[3]))
+
+
+def _place(force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, IntArray, Array, Array]:
+    """Sign and size of loads, the cells they lie in, and the shares of the way to the cells' next nodes, (n,) each."""
     sign = np.where(moment < 0.0, -1.0, 1.0)
     x, y, m = sign * force_x, sign * force_y, sign * moment
     force = np.sqrt(x * x + y * y)
@@ -64,34 +93,40 @@ def interpolated(
     column, row = turn.astype(np.int64), rise.astype(np.int64)
     np.minimum(column, AZIMUTHS - 1, out=column)
     np.minimum(row, ELEVATIONS - 2, out=row)
-    right, up = turn - column, rise - row
-    cell = cells.take(first + row * AZIMUTHS + column, axis=1)
-    size, both = sign * np.sqrt(force * force + m * m), right * up
-    vx, vy, spin = (size * (cell[k] + right * cell[k + 3] + up * cell[k + 6] + both * cell[k + 9]) for k in range(3))
-    return vx, vy, spin
+    return sign, np.sqrt(force * force + m * m), row * AZIMUTHS + column, turn - column, rise - row
+
+
+def _polynomials(nodes: Array) -> Array:
+    low, right = nodes[:-1, :-1], nodes[:-1, 1:] - nodes[:-1, :-1]
+    up, both = nodes[1:, :-1] - low, nodes[1:, 1:] - nodes[1:, :-1] - right
+    parts = np.concatenate([low, right, up, both], axis=2)
+    return np.ascontiguousarray(parts.reshape(-1, parts.shape[2]).T)
 
 
 def _solved(pressure: PressureDistribution, length: float, every: int) -> Array:
-    """Unit twists (rows, columns + 1, 3) at every n-th node; the last column is the first."""
+    """Unit twists and sizes of loads (rows, columns + 1, 4) at every n-th node; the last column is the first."""
     turn = np.arange(0, AZIMUTHS, every) * 2.0 * np.pi / AZIMUTHS
-    # one node beyond a pure moment, for the splines: a load of elevation 90 + a and azimuth t is one of 90 - a, t + 180
-    rise = np.linspace(0.0, 0.5 * np.pi, (ELEVATIONS - 1) // every + 1) if every == 1 else _coarse(every)
+    rise = np.linspace(0.0, 0.5 * np.pi, (ELEVATIONS - 1) // every + 1)
     rise_, turn_ = (grid.ravel() for grid in np.meshgrid(rise, turn, indexing="ij"))
-    load = np.column_stack([np.cos(rise_) * np.cos(turn_), np.cos(rise_) * np.sin(turn_), length * np.sin(rise_)])
-    twist = twist_of_load(pressure, load) * [1.0, 1.0, length]
-    twist = (twist / np.linalg.norm(twist, axis=1, keepdims=True)).reshape(len(rise), len(turn), 3)
-    return np.concatenate([twist, twist[:, :1]], axis=1)
+    load = np.column_stack([np.cos(rise_) * np.cos(turn_), np.cos(rise_) * np.sin(turn_), np.sin(rise_)])
+    twist = twist_of_load(pressure, load * [1.0, 1.0, length])
+    size = power_of_twist(pressure, twist)
+    twist = twist * [1.0, 1.0, length]
+    size = size / np.sum(load * twist, axis=1)
+    unit = twist / np.linalg.norm(twist, axis=1, keepdims=True)
+    nodes = np.column_stack([unit, size]).reshape(len(rise), len(turn), 4)
+    return np.concatenate([nodes, nodes[:, :1]], axis=1)
 
 
-def _coarse(every: int) -> Array:
-    return np.linspace(0.0, 0.5 * np.pi, round((ELEVATIONS - 1) / every) + 1)
-
-
-def _refined(twist: Array, every: int) -> Array:
+def _refined(nodes: Array, every: int) -> Array:
+    """All nodes, by cubic splines over azimuth and elevation."""
     if every == 1:
-        return twist
-    turn = np.linspace(0.0, 1.0, twist.shape[1])
-    fine = CubicSpline(turn, twist, axis=1, bc_type="periodic")(np.linspace(0.0, 1.0, AZIMUTHS + 1))
-    rise = np.linspace(0.0, 1.0, twist.shape[0])
-    fine = CubicSpline(rise, fine, axis=0)(np.linspace(0.0, 1.0, ELEVATIONS))
-    return np.asarray(fine)
+        return nodes
+    turn = np.linspace(0.0, 1.0, nodes.shape[1])
+    fine = CubicSpline(turn, nodes, axis=1, bc_type="periodic")(np.linspace(0.0, 1.0, AZIMUTHS + 1))
+    around = fine[:, (np.arange(AZIMUTHS + 1) + AZIMUTHS // 2) % AZIMUTHS]
+    below = around[BEYOND:0:-1] * [-1.0, -1.0, -1.0, 1.0]  # elevation -a is the opposite of a, half a turn on
+    beyond = around[-2 : -BEYOND - 2 : -1]  # elevation 90 + a is 90 - a, half a turn on
+    rise = np.arange(-BEYOND, len(nodes) + BEYOND) / (len(nodes) - 1)
+    spline = CubicSpline(rise, np.concatenate([below, fine, beyond]), axis=0)
+    return np.asarray(spline(np.linspace(0.0, 1.0, ELEVATIONS)))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+
 from push_predictor.types import Array
 
 # Values by name: a number, or one per push (n,). A name that is missing has its textbook value.
@@ -16,8 +18,8 @@ ParameterValues: TypeAlias = Mapping[str, "float | Array"]
 class MechanicsParameter:
     """A number of the forward model.
 
-    textbook: value without further knowledge. low, high: plausible range of a rig. spread: standard deviation of the weak
-    prior about the textbook value. part: contact, pressure, measurement or world. needs: covariates that it needs.
+    textbook: value without further knowledge. low, high: plausible range of a rig. spread: standard deviation of the
+    weak prior about the textbook value. part: contact, pressure, measurement or world. needs: covariates that it needs.
     """
 
     name: str
@@ -102,3 +104,25 @@ PARAMETERS: tuple[MechanicsParameter, ...] = (
     MechanicsParameter("inertia", "s^2/m", 0.0, 0.0, 2.0, 0.3, "world", "1 / (surface friction times gravity)"),
 )
 BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
+
+
+class RowValues:
+    """Values of the parameters of n pushes, and their covariates. Raises KeyError for a name that is no parameter."""
+
+    def __init__(self, values: ParameterValues, n: int, covariates: Mapping[str, Array]) -> None:
+        unknown = set(values) - set(BY_NAME)
+        if unknown:
+            raise KeyError(f"{sorted(unknown)[0]!r} is no parameter of the mechanics: {', '.join(BY_NAME)}")
+        self.n, self.covariates, self._values = n, covariates, values
+
+    def of(self, name: str) -> Array:
+        """(n,) of a parameter."""
+        return np.broadcast_to(np.asarray(self._values.get(name, BY_NAME[name].textbook), dtype=np.float64), self.n)
+
+    def active(self, *names: str) -> bool:
+        """Whether any of these differs from zero."""
+        return any(np.any(np.asarray(self._values.get(name, 0.0)) != 0.0) for name in names)
+
+    def pair(self, first: str, second: str) -> Array:
+        """(n, 2) of two parameters."""
+        return np.column_stack([self.of(first), self.of(second)])

@@ -26,6 +26,12 @@ def load_of_twist(pressure: PressureDistribution, twist: Array) -> Array:
     return _gradient(pressure.points, pressure.shares, pressure.spread, twist)[1]
 
 
+def power_of_twist(pressure: PressureDistribution, twist: Array) -> Array:
+    """Power (n,) in m/s of the friction against a twist (n, 3), over the friction force; as smooth as twist_of_load."""
+    spread = max(pressure.spread, POINT_SPREAD * pressure.length)
+    return np.asarray(_speeds(pressure.points, spread, twist)[2] @ pressure.shares)
+
+
 def twist_of_load(pressure: PressureDistribution, load: Array) -> Array:
     """Twist (n, 3), up to a positive factor, whose load is parallel to `load` (n, 3; no row zero).
 

@@ -4,31 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from push_predictor.models.mechanics.load_map import LoadMap, interpolated
+from push_predictor.models.mechanics.load_map import LoadMap, interpolated, interpolated_gauge
 from push_predictor.models.mechanics.surfaces import PowerSurface
 from push_predictor.types import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class RowQuantities:
+    """Per push: centre (n, 2) m, length (n,) m, square (n, 3) m^2 and reach (n, DIRECTIONS) of its limit surface."""
+
+    centre: Array
+    length: Array
+    square: Array
+    reach: Array
+
+
+class PushSurfaces(Protocol):
+    """Limit surfaces of n pushes."""
+
+    @property
+    def of_rows(self) -> RowQuantities:
+        """Quantities of each push."""
+
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
+        """See LimitSurface, for some of the rows (k,)."""
+
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+        """See LimitSurface, for some of the rows (k,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowSurfaces:
     """Limit surfaces of n pushes: row k blends the tables `low` and `high` (n,) by `share` (n,).
 
-    cells: all tables, one after the other. centre (n, 2) m, length (n,) m.
+    cells, sizes: those of all tables, one after the other.
     """
 
     cells: Array
+    sizes: Array
     per_table: int
     low: IntArray
     high: IntArray
     share: Array
-    centre: Array
-    length: Array
+    of_rows: RowQuantities
 
     def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
-        """See LimitSurface, for some of the rows (k,)."""
+        """See PushSurfaces."""
         one = interpolated(self.cells, self.low[rows] * self.per_table, x, y, moment)
         share = self.share[rows]
         if not share.any():
@@ -37,31 +62,50 @@ class RowSurfaces:
         vx, vy, spin = (a + share * (b - a) for a, b in zip(one, other, strict=True))
         return vx, vy, spin
 
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+        """See PushSurfaces."""
+        one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, x, y, moment)
+        other = interpolated_gauge(self.sizes, self.high[rows] * self.per_table, x, y, moment)
+        return np.asarray(one + self.share[rows] * (other - one))
+
 
 @dataclass(frozen=True, eq=False)
 class SameSurface:
     """One approximate limit surface for n pushes."""
 
     surface: PowerSurface
-    centre: Array
-    length: Array
+    n: int
+
+    @property
+    def of_rows(self) -> RowQuantities:
+        """See PushSurfaces."""
+        s = self.surface
+        centre, square, reach = (np.tile(values, (self.n, 1)) for values in (s.centre, s.square, s.reach))
+        return RowQuantities(centre, np.full(self.n, s.length), square, reach)
 
     def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
-        """See LimitSurface."""
+        """See PushSurfaces."""
         return self.surface.twist(x, y, moment)
+
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+        """See PushSurfaces."""
+        return self.surface.gauge(x, y, moment)
 
 
 def row_surfaces(maps: Sequence[LoadMap], low: IntArray, high: IntArray, share: Array) -> RowSurfaces:
     """Blends of `maps` for n pushes."""
-    centre, length = np.array([m.centre for m in maps]), np.array([m.length for m in maps])
-    cells = maps[0].cells if len(maps) == 1 else np.concatenate([m.cells for m in maps], axis=1)
-    part = share[:, None]
+
+    def blend(name: str) -> Array:
+        values = np.array([getattr(one, name) for one in maps])
+        part = share.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray((1.0 - part) * values[low] + part * values[high])
+
     return RowSurfaces(
-        cells,
+        maps[0].cells if len(maps) == 1 else np.concatenate([one.cells for one in maps], axis=1),
+        maps[0].sizes if len(maps) == 1 else np.concatenate([one.sizes for one in maps], axis=1),
         maps[0].cells.shape[1],
         low,
         high,
         share,
-        (1.0 - part) * centre[low] + part * centre[high],
-        (1.0 - share) * length[low] + share * length[high],
+        RowQuantities(blend("centre"), blend("length"), blend("square"), blend("reach")),
     )

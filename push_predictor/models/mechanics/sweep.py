@@ -13,22 +13,23 @@ import numpy as np
 from push_predictor.types import Array, IntArray
 
 LONGEST_STEP = 0.004  # m: about the radius of a pusher, so that no corner is stepped over
-RELATIVE_TOLERANCE = 1e-3  # of a step's own motion
-ABSOLUTE_TOLERANCE = 1e-5  # of the whole travel
+OF_TRAVEL = 0.1  # of the accuracy: the error of a step that is allowed for the whole travel
 TOUCHING = 2e-5  # m: a wider gap at the start of a step is no contact
-SHORTEST_STEP = 0.03  # of the longest: a jump of the rate is crossed in steps of this length
+SHORTEST_STEP = 30.0  # accuracies of the longest: a jump of the rate is crossed in steps of this length
 
 # From the rows (k,), their poses (k, 3) and the travel done (k,) m to the change of the pose (k, 3) per metre, the gap
 # between disc and slider (k,) m, and whether the disc comes closer (k,).
 RateOf: TypeAlias = Callable[[IntArray, Array, Array], tuple[Array, Array, Array]]
 
 
-def swept(rate_of: RateOf, travel: Array, length: Array) -> Array:
+def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Array:
     """Pose (n, 3: x, y in m, heading in rad) of the body after travel (n,) m, from the pose (0, 0, 0).
 
-    length (n,) m: of the arc that a turn counts as, in the tolerance. Bogacki and Shampine's method of third order with
-    steps chosen by its error of second order: displacements are accurate to about 1e-3 of themselves. Where the disc does not touch, the slider rests until it does.
+    length (n,) m: of the arc that a turn counts as. accuracy: of a displacement, relative. Bogacki and Shampine's
+    method of third order, with steps chosen by its error of second order. Where the disc does not touch, the slider
+    rests until it does.
     """
+    shortest = SHORTEST_STEP * accuracy * LONGEST_STEP
     pose, done, step = np.zeros((len(travel), 3)), np.zeros(len(travel)), np.minimum(travel, LONGEST_STEP)
     rows = np.flatnonzero(travel > 0.0)
     first, gap, nearing = rate_of(rows, pose[rows], done[rows]) if rows.size else (pose, done, done)
@@ -42,13 +43,13 @@ def swept(rate_of: RateOf, travel: Array, length: Array) -> Array:
         motion = wide * (2.0 * first + 3.0 * k2 + 4.0 * k3) / 9.0
         last, gap_after, nearing_after = rate_of(rows, before + motion, at + h)
         error = wide * (-5.0 * first + 6.0 * k2 + 8.0 * k3 - 9.0 * last) / 72.0
-        allowed = RELATIVE_TOLERANCE * _size(motion, length[rows]) + ABSOLUTE_TOLERANCE * travel[rows]
+        allowed = accuracy * (_size(motion, length[rows]) + OF_TRAVEL * travel[rows])
         ratio = _size(error, length[rows]) / allowed
-        agree = (ratio <= 1.0) | (h <= SHORTEST_STEP * LONGEST_STEP)
+        agree = (ratio <= 1.0) | (h <= shortest)
         pose[rows] = np.where(agree[:, None], before + motion, before)
         done[rows] = np.where(agree, at + h, at)
         factor = np.clip(0.9 * np.maximum(ratio, 1e-3) ** (-1.0 / 3.0), 0.2, 4.0)
-        step[rows] = np.clip(h * factor, SHORTEST_STEP * LONGEST_STEP, LONGEST_STEP)
+        step[rows] = np.clip(h * factor, shortest, LONGEST_STEP)
         first, gap = np.where(agree[:, None], last, first), np.where(agree, gap_after, gap)
         nearing = np.where(agree, nearing_after, nearing)
         on = travel[rows] - done[rows] > 1e-12 * travel[rows]

@@ -1,0 +1,132 @@
+"""A pushed slider moves as Coulomb friction allows: sticking inside the cone, sliding on its edges, never pulled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from supports import FOUR_POINTS, THREE_POINTS
+
+from push_predictor.geometry.shapes import square
+from push_predictor.models.mechanics.contact_solution import Driven, Touch, driven
+from push_predictor.models.mechanics.limit_surface import Support, body_twist
+from push_predictor.models.mechanics.load_map import LoadMap, load_map
+from push_predictor.models.mechanics.pressure import patch
+from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.types import Array
+
+SURFACES: dict[str, LoadMap | PowerSurface] = {
+    "ellipsoid": PowerSurface(np.zeros(2), 0.03),
+    "square": load_map(patch(square(0.09))),
+    "three points": load_map(THREE_POINTS),
+    "four points": load_map(FOUR_POINTS),
+}
+N = 200
+seeds = st.integers(0, 10**6)
+EVERY_SURFACE = pytest.mark.parametrize("name", SURFACES)
+
+
+def touches(seed: int, n: int = N) -> Touch:
+    """Random contacts, up to two lengths off the centre, and pushers that approach."""
+    draw = np.random.default_rng(seed)
+    turn, angle = draw.uniform(-np.pi, np.pi, n), draw.uniform(-1.5, 1.5, n)
+    p, q = draw.uniform(-2.0, 2.0, (2, n))
+    return Touch(np.cos(turn), np.sin(turn), p, q, np.cos(angle), np.sin(angle))
+
+
+def cones(seed: int, n: int = N) -> tuple[Array, Array]:
+    left, right = np.arctan(np.random.default_rng([seed, 1]).uniform(0.0, 1.5, (2, n)))
+    return left, right
+
+
+def contact_velocity(touch: Touch, motion: Driven) -> tuple[Array, Array]:
+    """Of the body at the contact, along the normal and along its left."""
+    toward = motion.vx * touch.normal_x + motion.vy * touch.normal_y + motion.spin * touch.normal_arm
+    return toward, motion.vy * touch.normal_x - motion.vx * touch.normal_y + motion.spin * touch.left_arm
+
+
+@EVERY_SURFACE
+@settings(max_examples=8, deadline=None)
+@given(seed=seeds)
+def test_contact_velocity_obeys_coulomb_friction(name: str, seed: int) -> None:
+    touch, (left, right) = touches(seed), cones(seed)
+    motion = driven(SURFACES[name].twist, touch, left, right)
+    toward, sideways = contact_velocity(touch, motion)
+    moving = np.abs(motion.vx) + np.abs(motion.vy) + np.abs(motion.spin) > 0.0
+    assert np.all(moving)
+    assert toward == pytest.approx(touch.along, abs=1e-9)  # neither separation nor penetration
+    sticks, lag = motion.slip == 0, touch.across - sideways
+    size = np.hypot(toward, sideways)
+    assert np.max(np.abs(lag[sticks]) / size[sticks], initial=0.0) < 2e-3
+    assert np.all(lag * motion.slip >= 0.0)  # the pusher slips to the side that is stated
+    assert np.all(motion.force_angle <= left + 1e-9)
+    assert np.all(motion.force_angle >= -right - 1e-9)
+    assert motion.force_angle[motion.slip > 0] == pytest.approx(left[motion.slip > 0])
+    assert motion.force_angle[motion.slip < 0] == pytest.approx(-right[motion.slip < 0])
+
+
+@EVERY_SURFACE
+def test_pushing_dissipates_energy(name: str) -> None:
+    touch, (left, right) = touches(1), cones(1)
+    motion = driven(SURFACES[name].twist, touch, left, right)
+    toward, sideways = contact_velocity(touch, motion)
+    assert np.all(np.cos(motion.force_angle) * toward + np.sin(motion.force_angle) * sideways > 0.0)
+    assert set(motion.slip.tolist()) == {-1, 0, 1}
+
+
+def test_ellipsoid_gives_the_closed_form() -> None:
+    support, draw = Support((0.0, 0.0), 0.03), np.random.default_rng(3)
+    normal_angle, angle, friction = draw.uniform(-np.pi, np.pi, N), draw.uniform(-1.5, 1.5, N), 0.4
+    normal = np.column_stack([np.cos(normal_angle), np.sin(normal_angle)])
+    velocity = np.column_stack([np.cos(normal_angle + angle), np.sin(normal_angle + angle)])
+    point = draw.uniform(-0.06, 0.06, (N, 2))
+    (x, y), (nx, ny) = (point / 0.03).T, normal.T
+    touch = Touch(nx, ny, x * ny - y * nx, x * nx + y * ny, np.cos(angle), np.sin(angle))
+    edge = np.full(N, np.arctan(friction))
+    motion = driven(SURFACES["ellipsoid"].twist, touch, edge, edge)
+    twist, slip = body_twist(point, normal, velocity, support, friction)
+    assert np.column_stack([motion.vx, motion.vy, motion.spin / 0.03]) == pytest.approx(twist, abs=1e-6, rel=1e-6)
+    assert motion.slip.tolist() == slip.tolist()
+
+
+@EVERY_SURFACE
+def test_receding_pusher_leaves_slider_at_rest(name: str) -> None:
+    touch, (left, right) = touches(4), cones(4)
+    motion = driven(SURFACES[name].twist, touch._replace(along=-touch.along), left, right)
+    assert not np.any([motion.vx, motion.vy, motion.spin, motion.slip])
+
+
+@EVERY_SURFACE
+def test_slip_begins_where_the_force_reaches_the_edge_of_the_cone(name: str) -> None:
+    """The pusher's angle at which a sticking force lies on the edge divides sticking from sliding."""
+    touch = touches(5)
+    wide, edge = np.full(N, np.arctan(1.5)), np.full(N, np.arctan(0.3))
+    free = driven(SURFACES[name].twist, touch, wide, wide)
+    narrow = driven(SURFACES[name].twist, touch, edge, edge)
+    outside = np.abs(free.force_angle) > edge + 1e-3
+    inside = np.abs(free.force_angle) < edge - 1e-3
+    assert np.all(narrow.slip[outside & (free.slip == 0)] == np.sign(free.force_angle[outside & (free.slip == 0)]))
+    assert np.all(narrow.slip[inside] == 0)
+    assert narrow.vx[inside] == pytest.approx(free.vx[inside], abs=2e-3)
+
+
+@EVERY_SURFACE
+def test_without_friction_the_force_is_along_the_normal(name: str) -> None:
+    touch, zero = touches(6), np.zeros(N)
+    motion = driven(SURFACES[name].twist, touch, zero, zero)
+    assert motion.force_angle == pytest.approx(0.0, abs=1e-12)
+    twist = SURFACES[name].twist(touch.normal_x, touch.normal_y, touch.normal_arm)
+    cross = np.cross(np.stack(twist, axis=1), np.stack([motion.vx, motion.vy, motion.spin], axis=1))
+    assert cross == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "square"])
+def test_mirrored_touch_gives_the_mirrored_motion_of_a_symmetric_surface(name: str) -> None:
+    touch, (left, right) = touches(7), cones(7)
+    mirrored = Touch(touch.normal_x, -touch.normal_y, -touch.normal_arm, touch.left_arm, touch.along, -touch.across)
+    here = driven(SURFACES[name].twist, touch, left, right)
+    there = driven(SURFACES[name].twist, mirrored, right, left)
+    assert there.vx == pytest.approx(here.vx, abs=1e-2)
+    assert there.vy == pytest.approx(-here.vy, abs=1e-2)
+    assert there.spin == pytest.approx(-here.spin, abs=1e-2)
