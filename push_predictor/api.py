@@ -31,6 +31,7 @@ from push_predictor.recordings.load import different_supports, load_data, load_r
 from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import empty_table
 from push_predictor.recordings.windows import finder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 
@@ -41,7 +42,7 @@ AnyPath = str | os.PathLike[str]
 
 
 def train(
-    data: AnyPath | Sequence[AnyPath],
+    data: AnyPath | Sequence[AnyPath] = (),
     *,
     kind: str = "vhgp",
     rig: Rig | AnyPath | None = None,
@@ -51,25 +52,26 @@ def train(
     fit: bool = False,
     watch: Watch | None = None,
 ) -> PushModel:
-    """Train a model on recordings or push tables.
+    """Train a model on recordings or push tables; a prior model needs none, but then a rig.
 
-    kind: vhgp, gp or analytical. rig: a Rig or a rig file, needed only where the data name none. name: of the model in
-    the services; the first file's stem unless given. n_train: that many windows at random by the seed; by default all
-    up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of an analytical
-    model. watch: called with each stage and the share of the work
-    done; by default stages are printed to stderr.
+    kind: vhgp, gp, analytical or prior. rig: a Rig or a rig file, needed only where the data name none. name: of the
+    model in the services; the first file's stem unless given. n_train: that many windows at random by the seed; by
+    default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
+    an analytical model. watch: called with each stage and the share of the work done; by default stages are printed to
+    stderr.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
-    paths, watch = _paths(data), watch or _print_stage
+    watch = watch or _print_stage
+    paths = [] if kind == "prior" and not data else _paths(data)
     watch("read the data", 0.0)
     known = _rig(rig) or load_rig_for(paths)
-    supports = different_supports(paths) if fit and rig is None else {}
-    table = load_data(paths, known, numbered=bool(supports))
+    supports = different_supports(paths) if (fit or kind == "prior") and rig is None else {}
+    table = load_data(paths, known, numbered=bool(supports)) if paths else empty_table()
     return train_model(
         table,
         known,
         kind,
-        name=name or paths[0].name.split(".")[0],
+        name=name or (paths[0].name.split(".")[0] if paths else kind),
         sources=[path.name for path in paths],
         options=TrainingOptions(n_train=n_train, seed=seed, fit=fit, supports=supports),
         watch=watch,

@@ -54,7 +54,7 @@ def model_predicts(given: Path | None) -> Finding:
 
         path = given or share_path(*DEFAULT_MODEL)
         model = load_model(path)
-        row = model.training.take(np.array([0]))
+        row = model.examples(1)
         prediction = model.predict_rows(row.inputs, row.duration, row.covariates)
         if not (np.isfinite(prediction.mean).all() and np.linalg.eigvalsh(prediction.covariance[0])[0] > 0.0):
             return _broken("model", f"{path} predicts {prediction.mean[0]}, or an invalid covariance", _OF_A_MODEL)

@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.commands.output import add_command, write_json
+
+if TYPE_CHECKING:
+    from push_predictor.types import Array
+
 
 UNITS = {"velocity_range": "m/s", "angle_range": "rad"}
 
@@ -45,7 +50,7 @@ def _describe_model(path: Path) -> dict[str, object]:
     from push_predictor.models.store.model_file import load_model
 
     model = load_model(path)
-    low, high = model.training.inputs.min(axis=0), model.training.inputs.max(axis=0)
+    velocity, _, angle = model.training.inputs.T
     return {
         "model": model.name,
         "kind": model.kind,
@@ -55,12 +60,16 @@ def _describe_model(path: Path) -> dict[str, object]:
         "pushes": model.provenance.pushes,
         "sources": list(model.provenance.sources),
         "written_by": model.provenance.version,
-        "velocity_range": [float(low[0]), float(high[0])],
-        "angle_range": [float(low[2]), float(high[2])],
+        "velocity_range": _range(velocity),
+        "angle_range": _range(angle),
         "covariates": list(model.training.covariates),
         "needs": list(model.needs),
         "covariate_ranges": {name: [known.low, known.high] for name, known in model.covariate_ranges.items()},
     }
+
+
+def _range(column: Array) -> list[float] | None:
+    return [float(column.min()), float(column.max())] if len(column) else None
 
 
 def _print(found: Mapping[str, object]) -> None:
@@ -70,7 +79,9 @@ def _print(found: Mapping[str, object]) -> None:
             value = _listed(value)
         if isinstance(value, dict):
             value = "".join(f"\n  {name}: {_entry(entry)}" for name, entry in value.items()) or "none"
-        unit = f" {UNITS[key]}" if key in UNITS else ""
+        if value is None:
+            value = "none"
+        unit = f" {UNITS[key]}" if key in UNITS and value != "none" else ""
         print(f"{key:{width}s}  {value}{unit}")
 
 

@@ -9,6 +9,8 @@ from push_predictor.commands.output import add_command, write_json
 from push_predictor.errors import RequestError
 
 INSIDE = "The push lies within the training data."
+INSIDE_PRIORS = "The push lies within the speeds and angles for which the priors are meant."
+OUTSIDE_PRIORS = "The push lies outside the speeds and angles for which the priors are meant."
 OUTSIDE = "The push lies outside the training data: the prediction is an extrapolation."
 
 
@@ -67,7 +69,8 @@ def run(options: argparse.Namespace) -> None:
             f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f} {unit}  "
             f"(process noise {noise[k] * scale:.3f} {unit})"
         )
-    print(INSIDE if result["in_domain"] else OUTSIDE)
+    inside, outside = (INSIDE_PRIORS, OUTSIDE_PRIORS) if model.kind == "prior" else (INSIDE, OUTSIDE)
+    print(inside if result["in_domain"] else outside)
 
 
 def _covariate(text: str) -> tuple[str, float]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from push_predictor.recordings.table import PushTable
     from push_predictor.types import Array
 
-KINDS = ("vhgp", "gp", "analytical")
+KINDS = ("vhgp", "gp", "analytical", "prior")
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,10 +35,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "train",
         "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
-        "mean with constant noise; analytical is quasi-static mechanics.",
+        "mean with constant noise; analytical is quasi-static mechanics. prior predicts from outline and priors before "
+        "the first push; DATA sharpen it.",
         "push_predictor train bags/square_abs_train --kind vhgp --out square_abs.pushmodel",
     )
-    parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    parser.add_argument(
+        "data", nargs="*", type=Path, metavar="DATA", help="recordings or push tables; --kind prior needs only --rig"
+    )
     kind = parser.add_mutually_exclusive_group(required=True)
     kind.add_argument("--kind", choices=KINDS, help="kind of model")
     kind.add_argument("--model", dest="old_kind", choices=KINDS, help="old name of --kind")
@@ -66,23 +69,27 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--name", help="name of the model in the services (default: the name of the file)")
     parser.add_argument("--out", required=True, type=Path, metavar="FILE.pushmodel", help="output: the model file")
     add_rig(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, call_is_wrong=parser.error)
 
 
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
     from push_predictor.recordings.load import different_supports, load_data, load_rig_for
+    from push_predictor.recordings.table import empty_table
     from push_predictor.recordings.windows.push_window import WindowOptions
 
     if options.old_kind is not None:
         warn("`train --model KIND` is now `train --kind KIND`. The old name still works.")
     kind = options.kind or options.old_kind
+    if not options.data and kind != "prior":
+        options.call_is_wrong("the following arguments are required: DATA (only --kind prior needs none)")
     _check(options, kind)
     rig = load_rig_for(options.data, options.rig)
-    supports = different_supports(options.data) if options.fit and options.rig is None else {}
+    supports = different_supports(options.data) if (options.fit or kind == "prior") and options.rig is None else {}
+    windows = WindowOptions(stride=options.stride)
     with progress("read"):
-        table = load_data(options.data, rig, WindowOptions(stride=options.stride), numbered=bool(supports))
+        table = load_data(options.data, rig, windows, numbered=bool(supports)) if options.data else empty_table()
     model = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     result = {
@@ -95,7 +102,7 @@ def run(options: argparse.Namespace) -> None:
     }
     if not write_json(options, result):
         used = f"{len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
-        print(f"{options.out}: {model.kind}, trained on {used}")
+        print(f"{options.out}: {model.kind}, {f'trained on {used}' if len(table) else 'from outline and priors alone'}")
 
 
 def _check(options: argparse.Namespace, kind: str) -> None:

@@ -21,7 +21,8 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
-KINDS = ("vhgp", "gp", "analytical")
+KINDS = ("vhgp", "gp", "analytical", "prior")
+USUAL_SPEED, USUAL_DURATION = 0.02, 0.2  # m/s, s: of the pushes of an untrained model
 DURATION_TOLERANCE = 0.1  # a learnt model predicts durations this close (relative) to those it was trained on
 DOMAIN_MARGIN = 1e-9  # rounding in unit conversions must not leave the domain
 
@@ -57,14 +58,21 @@ class PushModel:
         save_model(self, Path(path))
 
     def __repr__(self) -> str:
+        return (
+            f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
+            f"{self._training_in_words()}"
+            f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
+            f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
+        )
+
+    def _training_in_words(self) -> str:
+        if not len(self.training):
+            return "  trained on no push: outline and priors alone\n"
         speeds, durations = 1e3 * self.training.inputs[:, 0], self.training.duration
         origin = f" from {', '.join(self.provenance.sources)}" if self.provenance.sources else ""
         return (
-            f"PushModel {self.name!r} ({self.kind}): slider {self.rig.shape} on {self.rig.surface}\n"
             f"  trained on {len(self.training)} windows of {self.provenance.pushes} pushes{origin}\n"
             f"  pusher speed {speeds.min():.3g} to {speeds.max():.3g} mm/s, windows of {np.median(durations):.3g} s\n"
-            f"  needs covariates: {', '.join(self.needs) or 'none'}\n"
-            f"  made by push_predictor {self.provenance.version}, seed {self.provenance.seed}"
         )
 
     def predict(self, pushes: Pushes) -> Prediction:
@@ -113,8 +121,11 @@ class PushModel:
     def in_domain(self, inputs: Array) -> BoolArray:
         """Whether each of the pushes (n, 3) lies in the box that the training pushes span in feature space.
 
-        For covariates see `covariates_seen`.
+        The domain of a prior model are all pushes for which its priors are meant. For covariates see
+        `covariates_seen`.
         """
+        if (own := self.predictor.in_own_domain(inputs)) is not None:
+            return own
         low, high = self._feature_range
         features = push_features(self.rig.outline, inputs)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
@@ -146,8 +157,27 @@ class PushModel:
 
     @cached_property
     def training_mean(self) -> Array:
-        """Mean outcome (3,) of the training rows: the reference of the NMSE."""
-        return np.asarray(self.training.outcomes.mean(axis=0))
+        """Mean outcome (3,) of the training rows: the reference of the NMSE. Zero, no motion, if there are none."""
+        return np.asarray(self.training.outcomes.mean(axis=0)) if len(self.training) else np.zeros(3)
+
+    @cached_property
+    def usual_speed(self) -> float:
+        """Median speed of the training pushes, m/s."""
+        return float(np.median(self.training.inputs[:, 0])) if len(self.training) else USUAL_SPEED
+
+    @cached_property
+    def usual_duration(self) -> float:
+        """Median duration of the training windows, s."""
+        return float(np.median(self.training.duration)) if len(self.training) else USUAL_DURATION
+
+    def examples(self, count: int) -> Push:
+        """Some pushes that the model predicts: training rows, or pushes all around the slider if there are none."""
+        if len(self.training):
+            rows = self.training.take(np.linspace(0, len(self.training) - 1, count).astype(int))
+            return Push(rows.inputs, rows.duration, rows.covariates)
+        contact, angle = np.arange(count) / count, np.linspace(-1.0, 1.0, count)
+        inputs = np.column_stack([np.full(count, USUAL_SPEED), contact, angle])
+        return Push(inputs, np.full(count, USUAL_DURATION), {})
 
     @cached_property
     def duration_range(self) -> tuple[float, float]:

@@ -25,11 +25,13 @@ from push_predictor.models.predictors import (
     GaussianProcessPredictor,
     MechanicsPredictor,
     Predictor,
+    PriorPredictor,
     Scaling,
 )
 from push_predictor.models.predictors.correlation_fit import fit_correlation
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
 from push_predictor.models.train_mechanics import predictor_about, train_mechanics
+from push_predictor.models.train_prior import prior_predictor, sharpened
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
@@ -82,8 +84,8 @@ def train_model(
 
     name: the model's name in files and requests. sources: names of the recordings or tables, for its provenance.
     watch: called with each stage and the share of the work done, 0 to 1, when the stage begins.
-    Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or options that the kind does not
-    have.
+    A prior model needs no rows. Raises TrainingError for an unknown kind, too few rows, outcomes that do not vary, or
+    options that the kind does not have.
     """
     return train_with_ladder(table, rig, kind, name=name, sources=sources, options=options, watch=watch)[0]
 
@@ -103,7 +105,7 @@ def train_with_ladder(
         raise TrainingError(f"model: {kind!r} is not accepted, give one of {', '.join(KINDS)}")
     most = MOST_FITTED_ROWS if kind == "analytical" and options.fit else DEFAULT_ROWS
     rows = table.take(training_rows(table, options.n_train, options.seed, most))
-    if len(rows) < FEWEST_ROWS:
+    if len(rows) < FEWEST_ROWS and kind != "prior":
         raise TrainingError(f"{len(rows)} training windows are too few, give at least {FEWEST_ROWS}")
     with one_blas_thread():
         predictor, ladder = _predictor(rows, rig, kind, options, watch)
@@ -116,6 +118,9 @@ def _predictor(
     rows: PushTable, rig: Rig, kind: str, options: TrainingOptions, watch: Watch
 ) -> tuple[Predictor, list[Rung]]:
     inducing = inducing_inputs(kind, len(rows), options.inducing)
+    if kind == "prior":
+        watch("train prior", 0.1)
+        return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
         return _learnt(rows, rig, kind, options.kernels, inducing, watch), []
     if options.fit:
@@ -124,19 +129,23 @@ def _predictor(
 
 
 def _fitted(rows: PushTable, rig: Rig, options: TrainingOptions, watch: Watch) -> tuple[MechanicsPredictor, list[Rung]]:
+    search = rows.take(_even_over_pushes(rows, MOST_SEARCHED_ROWS, options.seed))
+    trained = train_mechanics(_mechanics(rig, options), rows, search, watch)
+    return trained.predictor, trained.ladder
+
+
+def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
     support = None if rig.support_points is None or options.supports else supported_at(rig.support_points)
     supports = {number: supported_at(points) for number, points in options.supports.items()}
-    mechanics = PushMechanics(rig.outline, rig.pusher_radius, support, supports)
-    search = rows.take(_even_over_pushes(rows, MOST_SEARCHED_ROWS, options.seed))
-    trained = train_mechanics(mechanics, rows, search, watch)
-    return trained.predictor, trained.ladder
+    return PushMechanics(rig.outline, rig.pusher_radius, support, supports)
 
 
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
     A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. An analytical one
-    keeps its parameters, and its covariance is estimated again. Raises TrainingError for too few rows.
+    keeps its parameters, and its covariance is estimated again. The priors of a prior model are updated by the table.
+    Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
@@ -146,6 +155,8 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     again: Predictor
     if isinstance(predictor, MechanicsPredictor):
         again = predictor_about(predictor.fitted, table)
+    elif isinstance(predictor, PriorPredictor):
+        again = sharpened(prior_predictor(predictor.fitted.mechanics, model.rig, seed), table, seed)
     else:
         again = _with_covariance(predictor.physics, table)
     return PushModel(name, model.kind, model.rig, again, table, provenance)

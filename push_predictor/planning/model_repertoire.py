@@ -34,8 +34,8 @@ def model_repertoire(
     trained = tabulated.model
     if trained.needs:
         raise RequestError("model", trained.name, f"one that needs no covariates, it needs {', '.join(trained.needs)}")
-    speed = float(np.median(trained.training.inputs[:, 0])) if velocity is None else velocity
-    duration = float(np.median(trained.training.duration))
+    speed = trained.usual_speed if velocity is None else velocity
+    duration = trained.usual_duration
 
     def predict(inputs: Array) -> Prediction:
         return tabulated.predict_rows(inputs, np.full(len(inputs), duration))

@@ -34,7 +34,7 @@ def windows_of(model: PushModel, duration: float) -> PushWindows:
     """
     if not (np.isfinite(duration) and duration > 0.0):
         raise RequestError("duration", duration, "a finite number above 0, in s")
-    usual = float(np.median(model.training.duration))
+    usual = model.usual_duration
     if duration > MOST_WINDOWS * usual:
         raise RequestError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
     if not model.predictor.learnt:

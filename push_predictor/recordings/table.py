@@ -62,6 +62,11 @@ class PushTable:
         )
 
 
+def empty_table() -> PushTable:
+    """A table without rows."""
+    return PushTable(np.empty((0, 3)), np.empty(0), np.empty((0, 3)), np.empty(0, dtype=np.str_))
+
+
 def concatenate(tables: Sequence[PushTable]) -> PushTable:
     """The rows of all tables; a covariate is kept if all tables have it.
 

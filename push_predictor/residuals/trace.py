@@ -75,7 +75,7 @@ def trace(
     watch: called with the name of each stage and the share of the work done when it begins. Raises RequestError for an
     alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
     """
-    _check(loaded.table, alpha, covariates)
+    _check(model, loaded.table, alpha, covariates)
     context = _Context.of(model, loaded, alpha, covariates, seed)
     analysis, training = context.evidence.table, model.training
     watch("measurement", 0.1)
@@ -338,9 +338,11 @@ def _of_trace(p_value: float, channel: str) -> float:
     return min(1.0, p_value / SHARES[channel])
 
 
-def _check(table: PushTable, alpha: float, covariates: Sequence[str] | None) -> None:
+def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequence[str] | None) -> None:
     if not 0.0 < alpha < 1.0:
         raise RequestError("alpha", alpha, "a probability above 0 and below 1")
+    if not len(model.training):
+        raise RequestError("model", model.name, "one that was trained on pushes: retrain it on those at hand")
     if len(table.pushes) < FEWEST_PUSHES:
         raise RequestError("pushes", len(table.pushes), f"at least {FEWEST_PUSHES}, preferably hundreds")
     for name in covariates or ():

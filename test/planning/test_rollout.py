@@ -361,6 +361,9 @@ class Attentive:
         covariance = np.zeros((len(push.inputs), 3, 3))
         return np.tile([1e-3, 0.0, 0.1], (len(push.inputs), 1)), covariance, covariance
 
+    def in_own_domain(self, inputs: Array) -> None:
+        """Its training rows bound its domain."""
+
 
 def test_pose_covariates_are_those_of_each_sample() -> None:
     predictor = Attentive(("slider_x", "slider_y", "slider_heading", "push_heading"))

@@ -114,21 +114,26 @@ def _root(
 ) -> tuple[Array, _Motion]:
     """Shares (n,) between the cone's edges at which the contact moves with the pusher, and the motion there.
 
-    The Illinois method. On an ellipsoid the velocity is linear in the force, and the first step is exact.
+    The Illinois method. On an ellipsoid the velocity is linear in the force, and the first step is exact. A solved
+    contact stays as it is, so that its motion does not depend on the others.
     """
     (low, high), (f_low, f_high) = (np.zeros(len(wanted)), np.ones(len(wanted))), lags
     right, left = edges
+    middle, unsolved = np.full(len(wanted), 0.5), wanted
     side, change = np.zeros(len(wanted)), (left.push - right.push, left.rub - right.rub)
     for step in range(1, ROOT_STEPS + 1):
         gap = f_low - f_high
         share = np.where(f_low * f_high < 0.0, f_low / np.where(gap > 0.0, gap, 1.0), 0.5)
-        middle = low + (high - low) * (0.5 if step % BISECT_EVERY == 0 else share)
+        between = low + (high - low) * (0.5 if step % BISECT_EVERY == 0 else share)
+        middle = np.where(unsolved, between, middle)
         motion = _under(twist_of, touch, _Edge(right.push + middle * change[0], right.rub + middle * change[1]))
         lag = motion.lag(touch)
-        if not np.any(wanted & (np.abs(lag) > ROOT_TOLERANCE * motion.toward) & (high - low > ROOT_TOLERANCE)):
+        unsolved = unsolved & (np.abs(lag) > ROOT_TOLERANCE * motion.toward) & (high - low > ROOT_TOLERANCE)
+        if not unsolved.any():
             break
-        up = lag > 0.0  # the force must turn further to the left
-        f_high = np.where(up, np.where(side > 0.0, 0.5 * f_high, f_high), lag)
-        f_low = np.where(up, lag, np.where(side < 0.0, 0.5 * f_low, f_low))
-        low, high, side = np.where(up, middle, low), np.where(up, high, middle), np.where(up, 1.0, -1.0)
+        up, down = unsolved & (lag > 0.0), unsolved & (lag <= 0.0)  # up: the force must turn further to the left
+        f_high = np.where(up & (side > 0.0), 0.5 * f_high, np.where(down, lag, f_high))
+        f_low = np.where(down & (side < 0.0), 0.5 * f_low, np.where(up, lag, f_low))
+        low, high = np.where(up, middle, low), np.where(down, middle, high)
+        side = np.where(up, 1.0, np.where(down, -1.0, side))
     return middle, motion

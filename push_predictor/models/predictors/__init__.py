@@ -1,4 +1,4 @@
-"""What a push model predicts with: learnt (Gaussian processes), analytical, or either of them extended by effects.
+"""What a push model predicts with: learnt (Gaussian processes), analytical, prior, or one of them extended by effects.
 
 Callers use the protocol `Predictor` and need not know the class. This folder may import from gaussian_process,
 mechanics, mechanisms and effects.
@@ -11,6 +11,7 @@ from push_predictor.models.predictors.extended_predictor import ExtendedPredicto
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
 from push_predictor.models.predictors.mechanics_predictor import MechanicsPredictor
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.models.predictors.prior_predictor import PriorPredictor
 from push_predictor.models.predictors.scaling import Scaling
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "MechanicsPredictor",
     "Moments",
     "Predictor",
+    "PriorPredictor",
     "Scaling",
     "Shift",
 ]

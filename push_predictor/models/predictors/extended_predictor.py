@@ -13,7 +13,7 @@ from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
 from push_predictor.recordings.table import INPUTS
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 SIDE = "edge"
 GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
@@ -54,6 +54,10 @@ class ExtendedPredictor:
     def needs(self) -> tuple[str, ...]:
         """See Predictor."""
         return tuple(name for name in self.covariates if name not in GIVEN_BY_INPUTS)
+
+    def in_own_domain(self, inputs: Array) -> BoolArray | None:
+        """See Predictor."""
+        return self.base.in_own_domain(inputs)
 
     def completed(self, push: Push) -> Push:
         """See Predictor."""

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
 
@@ -62,6 +62,9 @@ class Predictor(Protocol):
     @property
     def covariates(self) -> tuple[str, ...]:
         """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
+
+    def in_own_domain(self, inputs: Array) -> BoolArray | None:
+        """Whether the base is meant for each push (n, 3), (n,); None if its training pushes bound its domain."""
 
     def completed(self, push: Push) -> Push:
         """The pushes with those of `covariates` that follow from their inputs."""

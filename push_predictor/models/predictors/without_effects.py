@@ -9,6 +9,7 @@ import numpy as np
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.types import Array, BoolArray
 
 Self = TypeVar("Self")
 
@@ -40,6 +41,10 @@ class WithoutEffects:
     def covariates(self) -> tuple[str, ...]:
         """See Predictor: none."""
         return ()
+
+    def in_own_domain(self, inputs: Array) -> BoolArray | None:
+        """See Predictor: None."""
+        return None
 
     def completed(self, push: Push) -> Push:
         """See Predictor."""

@@ -28,7 +28,8 @@ from push_predictor.recordings.rig import rig_from_record
 
 FORMAT = "push_predictor model"
 # What each version added. 2: kernels other than the squared exponential, and a nugget. 3: effects. 4: effects that
-# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics.
+# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics, and draws of
+# their parameters, with which a model may have no training rows.
 FORMAT_VERSION = 6
 PROBES = 5
 HEADER = "header"
@@ -136,7 +137,7 @@ def _model(header: dict[str, Any], arrays: dict[str, np.ndarray], source: str) -
 
 def _check_answers(model: PushModel) -> None:
     """Raise ValueError unless some training pushes get finite predictions with positive definite covariances."""
-    rows = model.training.take(np.linspace(0, len(model.training) - 1, PROBES).astype(int))
+    rows = model.examples(PROBES)
     found = model.predict_rows(rows.inputs, rows.duration, rows.covariates)
     for name, values in (("mean", found.mean), ("covariance", found.covariance)):
         if not np.all(np.isfinite(values)):

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
 from push_predictor.models.store.model_file import is_model_file, load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.resources import DEFAULT_MODEL, share_path
+from push_predictor.types import Array
 
 SHIPPED = "default"  # in place of a path: the model that ships with the package
 
@@ -97,7 +96,6 @@ class ModelRegistry:
     def describe(self, name: str) -> str:
         """One line of `key=value; ...` about a loaded model: kind, outline, surface, training, covariates, file."""
         model = self._models[name].model
-        low, high = float(model.training.duration.min()), float(model.training.duration.max())
         values = {
             "kind": model.kind,
             "outline": model.rig.shape,
@@ -105,7 +103,7 @@ class ModelRegistry:
             "pushes": len(model.training.pushes),
             "windows": len(model.training),
             "covariates": ",".join(model.needs) or "-",  # that a request must contain
-            "duration": f"{low:g}" if high - low < 1e-6 else f"{low:g}..{high:g}",
+            "duration": _durations(model.training.duration),
             "file": self._files[name],
         }
         return "; ".join(f"{key}={value}" for key, value in values.items())
@@ -116,6 +114,13 @@ class ModelRegistry:
         except PushPredictorError as error:
             return [str(error)]
         return []
+
+
+def _durations(duration: Array) -> str:
+    if not len(duration):
+        return "any"
+    low, high = float(duration.min()), float(duration.max())
+    return f"{low:g}" if high - low < 1e-6 else f"{low:g}..{high:g}"
 
 
 def _located(path: Path) -> Path:
@@ -132,7 +137,7 @@ def _tabulated(path: Path) -> TabulatedModel:
     try:
         tabulated = tabulate(model)
         # The first prediction fills caches; no request should wait for that.
-        first = model.training.take(np.arange(1))
+        first = model.examples(1)
         tabulated.predict_rows(first.inputs, first.duration, first.covariates)
     except Exception as error:
         raise ModelFileError(f"{path}: the model cannot predict ({type(error).__name__}: {error})") from None

@@ -15,12 +15,15 @@ import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.limit_surface import Support
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.process_noise import VARYING, ProcessNoise
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,
     GaussianProcessPredictor,
     MechanicsPredictor,
     Predictor,
+    PriorPredictor,
     Scaling,
 )
 from push_predictor.models.store.correlation_record import correlation_of, correlation_record
@@ -34,6 +37,9 @@ from push_predictor.types import Array
 
 LARGEST_RATIO = 100.0  # of the support's or the pusher's size to the outline's
 BASE_OUTCOMES = "base_outcomes"
+DRAWS = "draws"
+MOST_DRAWS = 10_000
+LEARNT = ("vhgp", "gp")
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,12 @@ def _mechanics_record(predictor: MechanicsPredictor, arrays: dict[str, np.ndarra
 
 
 @predictor_record.register
+def _prior_record(predictor: PriorPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    arrays[DRAWS] = predictor.draws
+    return {"mechanics": mechanics_record(predictor.fitted), "noise": predictor.noise.factor.tolist()}
+
+
+@predictor_record.register
 def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     for k, regression in enumerate(predictor.regressions):
         put_regression(regression, k, arrays)
@@ -102,7 +114,9 @@ def predictor_of(record: dict[str, Any], source: Source) -> Predictor:
 
 def _base(
     record: dict[str, Any], source: Source
-) -> AnalyticalPredictor | MechanicsPredictor | GaussianProcessPredictor:
+) -> AnalyticalPredictor | MechanicsPredictor | PriorPredictor | GaussianProcessPredictor:
+    if source.kind == "prior":
+        return _prior(record, source)
     if source.kind != "analytical":
         return _learnt(record, source)
     return _mechanics(record, source) if "mechanics" in record else _analytical(record, source.rig)
@@ -113,7 +127,7 @@ def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
     if scale.shape != (3,) or not np.all(np.isfinite(scale)) or np.any(scale <= 0.0):
         raise ValueError(f"scale {record['scale']!r}, three finite numbers above 0 are needed")
     rows = source.training
-    if source.kind != "analytical":
+    if source.kind in LEARNT:
         rows = replace(rows, outcomes=finite(source.arrays, BASE_OUTCOMES))
     base = _base(record["base"], replace(source, training=rows))
     cross = cross_of(record.get("cross", []), effects, source.arrays)
@@ -144,6 +158,21 @@ def _mechanics(record: dict[str, Any], source: Source) -> MechanicsPredictor:
     if missing := [name for name in predictor.needs if name not in source.training.covariates]:
         raise ValueError(f"the mechanics need the covariate {missing[0]}, which the training rows lack")
     return predictor
+
+
+def _prior(record: dict[str, Any], source: Source) -> PriorPredictor:
+    fitted = mechanics_of(record["mechanics"], source.rig)
+    draws, factor = finite(source.arrays, DRAWS), np.array(record["noise"], dtype=np.float64)
+    if draws.ndim != 2 or draws.shape[1] != len(fitted.values) or not 2 <= len(draws) <= MOST_DRAWS:
+        raise ValueError(f"draws of shape {draws.shape}, 2 to {MOST_DRAWS} of {len(fitted.values)} are needed")
+    for name, column in zip(fitted.values, draws.T, strict=True):
+        if column.min() < BY_NAME[name].low or column.max() > BY_NAME[name].high:
+            raise ValueError(f"draws of {name}: {BY_NAME[name].low} to {BY_NAME[name].high} is accepted")
+    if factor.shape != (3,) or not np.all(np.isfinite(factor)) or np.any(factor <= 0.0):
+        raise ValueError(f"noise {record['noise']!r}, three finite numbers above 0 are needed")
+    if missing := [name for name in VARYING if name not in fitted.values]:
+        raise ValueError(f"the process noise needs the parameter {missing[0]}")
+    return PriorPredictor(fitted, draws, ProcessNoise(factor))
 
 
 def _covariance(record: dict[str, Any]) -> Array:

@@ -20,7 +20,7 @@ def table_arrays(table: PushTable) -> dict[str, np.ndarray]:
         "inputs": table.inputs,
         "duration": table.duration,
         "outcomes": table.outcomes,
-        "pushes": np.array(pushes),
+        "pushes": np.array(pushes, dtype=np.str_),
         "push_of_row": np.array([index[push] for push in table.push_id.tolist()], dtype=np.int32),
     }
     for k, column in enumerate(table.covariates.values()):

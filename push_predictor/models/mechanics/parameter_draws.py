@@ -1,0 +1,89 @@
+"""Draws of the forward model's parameters: from their priors, or from a normal distribution about fitted values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.types import Array
+
+DRAWS = 64
+# Their sign changes in a mirror along the body's x axis, where the others keep theirs.
+MIRRORED = (
+    "friction_difference",
+    "centre_y",
+    "body_anisotropy_diagonal",
+    "tracker_rotation",
+    "push_rotation",
+    "outline_y",
+    "tip_offset_across",
+)
+# Through the speed: they matter beyond quasi-static pushing, and without them only the distance travelled counts. The
+# height of a push shifts the pressure, as centre_x and centre_y do.
+NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height")
+ROWS_AT_ONCE = 20_000
+
+
+def drawn_parameters(known_support: bool) -> tuple[str, ...]:
+    """Names of the parameters that are drawn: those that need no covariate, and no patch if the support is known."""
+    left_out = (*NOT_DRAWN, "rim_exponent") if known_support else NOT_DRAWN
+    return tuple(p.name for p in PARAMETERS if not p.needs and p.name not in left_out)
+
+
+def prior_draws(names: Sequence[str], means: Array, seed: int, count: int = DRAWS) -> Array:
+    """Draws (count, p) from the priors, normal about `means` (p,) and cut off at the plausible ranges.
+
+    A scrambled Sobol' sequence of half of them; the other half are their mirror images, so that a symmetric outline
+    gets symmetric predictions. Deterministic for a seed.
+    """
+    table = [BY_NAME[name] for name in names]
+    spread = np.array([p.spread for p in table])
+    low = ndtr((np.array([p.low for p in table]) - means) / spread)
+    high = ndtr((np.array([p.high for p in table]) - means) / spread)
+    half = means + spread * ndtri(low + (high - low) * _sobol(len(names), count // 2, seed))
+    sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in names])
+    return np.concatenate([half, sign * half])
+
+
+def normal_draws(names: Sequence[str], means: Array, covariance: Array, seed: int, count: int = DRAWS) -> Array:
+    """Draws (count, p) in pairs on opposite sides of `means` (p,), moved into the plausible ranges."""
+    table = [BY_NAME[name] for name in names]
+    half = ndtri(_sobol(len(names), count // 2, seed)) @ np.linalg.cholesky(covariance).T
+    draws = means + np.concatenate([half, -half])
+    return np.asarray(np.clip(draws, [p.low for p in table], [p.high for p in table]))
+
+
+def displacements(
+    mechanics: PushMechanics,
+    names: Sequence[str],
+    draws: Array,
+    inputs: Array,
+    duration: Array,
+    covariates: Mapping[str, Array],
+) -> Array:
+    """Displacements (n, k, 3: m, m, rad) of n pushes under k draws (k, p) of the parameters.
+
+    inputs (n, 3), duration (n,) s, covariates as in PushMechanics.displacement.
+    """
+    k, step = len(draws), max(1, ROWS_AT_ONCE // len(draws))
+    parts = [np.empty((0, k, 3))]
+    for start in range(0, len(inputs), step):
+        part = slice(start, start + step)
+        count = len(inputs[part])
+        values = {name: np.tile(column, count) for name, column in zip(names, draws.T, strict=True)}
+        repeated = {name: np.repeat(column[part], k) for name, column in covariates.items()}
+        moved = mechanics.displacement(
+            values, np.repeat(inputs[part], k, axis=0), np.repeat(duration[part], k), repeated
+        )
+        parts.append(moved.reshape(-1, k, 3))
+    return np.concatenate(parts)
+
+
+def _sobol(dimensions: int, count: int, seed: int) -> Array:
+    uniform = qmc.Sobol(dimensions, scramble=True, seed=seed).random(count)
+    return np.asarray(np.clip(uniform, 1e-9, 1.0 - 1e-9))

@@ -1,0 +1,51 @@
+"""The noise of repeated pushes: pressure and contact friction vary along every push, and the rest is a share of it.
+
+Bauza and Rodriguez (2017, "A probabilistic data-driven model for planar pushing") find that repeated pushes of a slider
+differ by some 10 to 20 % of the motion, and that the spread depends on the push, because friction varies in space and
+time. So the noise is that of small changes of the friction and of the centre of pressure, passed through the mechanics:
+where a push is sensitive to them, its outcomes differ. A share of the distance travelled and the tracker's noise are
+added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.types import Array
+
+VARYING = {"contact_friction": 0.1, "centre_x": 0.004, "centre_y": 0.004}  # standard deviations within a session
+SHARE = 0.05  # of the distance travelled, and of the turn that moves a point at the length c that far
+TRACKER = (1e-4, 1e-4, 1e-3)  # m, m, rad: of the difference of two poses
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessNoise:
+    """factor (3,): on the variances of dx, dy and dtheta; 1 before there are data."""
+
+    factor: Array = field(default_factory=lambda: np.ones(3))
+
+    @staticmethod
+    def changed(names: Sequence[str], values: Array) -> Array:
+        """Rows (4, p) of parameters: the values (p,) and, one by one, those with a parameter that varies changed."""
+        rows = np.tile(values, (1 + len(VARYING), 1))
+        for row, (name, spread) in zip(rows[1:], VARYING.items(), strict=True):
+            k = names.index(name)
+            row[k] += spread if row[k] + spread <= BY_NAME[name].high else -spread
+        return rows
+
+    def covariance(self, displacements: Array, travel: Array, length: Array) -> Array:
+        """Covariance (n, 3, 3) of the noise.
+
+        displacements (n, 4, 3): under the parameters of `changed`. travel (n,), length c (n,) in m.
+        """
+        shift = displacements[:, 1:] - displacements[:, :1]
+        covariance = np.einsum("nka,nkb->nab", shift, shift)
+        unit = np.column_stack([travel, travel, travel / length])
+        index = np.arange(3)
+        covariance[:, index, index] += (SHARE * unit) ** 2 + np.square(TRACKER)
+        root = np.sqrt(self.factor)
+        return np.asarray(covariance * root[:, None] * root)
