@@ -1,0 +1,123 @@
+"""The forward model agrees with the rig simulator, which has Newton's and Coulomb's laws but no limit surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from even_physics import no_noise, uniform_field
+from supports import THREE_POINTS
+
+from push_predictor.geometry.frames import rotate
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.pressure import PressureDistribution
+from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.simulation.changes import PLAIN, Changes
+from push_predictor.simulation.dynamics import run
+from push_predictor.simulation.physics import GRAVITY, Physics
+from push_predictor.simulation.pushes import PushPlan, pusher_path
+from push_predictor.simulation.slider import slider_named
+from push_predictor.simulation.surface import CELL, HALF_EXTENT, FrictionField
+from push_predictor.types import Array
+
+SPEED, TRAVEL, RADIUS, FRICTION = 0.005, 0.008, 0.00475, 0.3
+SLIDER = slider_named("rect1")
+OUTLINE = SLIDER.outline
+IN_METRES = np.array([1.0, 1.0, 0.034])
+N = 60
+TABLE = 0.25  # friction
+WEIGHT = TABLE * SLIDER.mass * GRAVITY  # N: the largest friction force
+RIM = PressureDistribution(OUTLINE.point((np.arange(40) + 0.5) / 40.0), np.full(40, 1.0 / 40.0))
+SUPPORTS = {"three points": THREE_POINTS, "rim": RIM}
+
+
+def plan(n: int) -> PushPlan:
+    """Pushes off the corners, in which the tip sticks and slips to both sides."""
+    draw = np.random.default_rng(5)
+    contact = OUTLINE.contact_on_edge(draw.integers(0, 4, n), draw.uniform(0.15, 0.85, n))
+    return PushPlan(contact, draw.uniform(-1.0, 1.0, n), np.full(n, SPEED), np.full(n, TRAVEL))
+
+
+def simulated(
+    support: PressureDistribution, pushes: PushPlan, changes: Changes = PLAIN, table: FrictionField | None = None
+) -> Array:
+    """Displacements (n, 3) in the push frame when the tips have stopped."""
+    n, k = len(pushes), len(support.points)
+    physics = Physics(
+        outline=OUTLINE,
+        radius=RADIUS,
+        mass=np.full(n, SLIDER.mass),
+        inertia=np.full(n, SLIDER.inertia),
+        support=support.points,
+        shares=np.tile(support.shares, (n, 1)),
+        contact_friction=np.full(n, FRICTION),
+        surface=uniform_field(TABLE) if table is None else table,
+        load_noise=no_noise(n, k),
+        contact_noise=no_noise(n, 1),
+        changes=changes,
+    )
+    path = pusher_path(pushes, OUTLINE, RADIUS, np.zeros((n, 3)), acceleration=2.5)
+    pose = run(physics, path, np.zeros((n, 3)), path.push_time).slider[:, -1]
+    heading = np.arctan2(path.direction[:, 1], path.direction[:, 0])
+    return np.column_stack([rotate(pose[:, :2], -heading), pose[:, 2]])
+
+
+def predicted(
+    support: PressureDistribution | PowerSurface, pushes: PushPlan, values: dict[str, float] | None = None
+) -> Array:
+    inputs = np.column_stack([pushes.speed, pushes.contact, pushes.angle])
+    normal = OUTLINE.inward_normal(pushes.contact)
+    heading = {"push_heading": np.arctan2(normal[:, 1], normal[:, 0]) + pushes.angle}
+    model = PushMechanics(OUTLINE, RADIUS, support)
+    return model.displacement(values or {}, inputs, pushes.travel / pushes.speed, heading)
+
+
+def relative_error(found: Array, truth: Array) -> float:
+    """Root mean square of the error over that of the truth, in metres."""
+    return float(np.sqrt(np.sum(((found - truth) * IN_METRES) ** 2) / np.sum((truth * IN_METRES) ** 2)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_slow_pushes_in_the_simulator_move_as_predicted(name: str) -> None:
+    support, pushes = SUPPORTS[name], plan(N)
+    truth = simulated(support, pushes)
+    ellipsoid = PowerSurface(support.centre, support.length)
+    exact, approximate = (relative_error(predicted(s, pushes), truth) for s in (support, ellipsoid))
+    assert exact < 0.015
+    assert approximate > 3.0 * exact
+
+
+WORLD = {
+    "body_anisotropy": (
+        0.3,
+        Changes(grain=lambda moment: rotate(np.tile([0.3, 0.0], (N, 1)), 2.0 * moment.pose[:, 2])),
+    ),
+    "body_anisotropy_diagonal": (
+        -0.4,
+        Changes(grain=lambda moment: rotate(np.tile([0.0, -0.4], (N, 1)), 2.0 * moment.pose[:, 2])),
+    ),
+    "grain_x": (0.2, Changes(grain=lambda moment: np.tile([0.2, 0.0], (N, 1)))),
+    "grain_diagonal": (0.2, Changes(grain=lambda moment: np.tile([0.0, 0.2], (N, 1)))),
+    "slope_x": (0.5, Changes(pull=lambda moment: np.tile([0.5 * WEIGHT, 0.0, 0.0], (N, 1)))),
+    "slope_y": (0.2, Changes(pull=lambda moment: np.tile([0.0, 0.2 * WEIGHT, 0.0], (N, 1)))),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WORLD)
+def test_large_effects_in_the_simulator_are_those_of_the_parameter(name: str) -> None:
+    (value, changes), pushes = WORLD[name], plan(N)
+    truth = simulated(RIM, pushes, changes)
+    with_it, without = (relative_error(predicted(RIM, pushes, v), truth) for v in ({name: value}, {}))
+    assert with_it < 0.04  # direction-dependent friction changes the shape of the surface, which is left out
+    assert with_it < 0.3 * without
+
+
+@pytest.mark.slow
+def test_friction_that_grows_over_the_table_turns_the_slider_as_predicted() -> None:
+    row = np.linspace(-HALF_EXTENT, HALF_EXTENT, round(2.0 * HALF_EXTENT / CELL) + 1)
+    table, pushes = FrictionField(0.25 * np.tile(1.0 + 2.0 * row, (len(row), 1))), plan(N)
+    truth = simulated(RIM, pushes, table=table)
+    with_it, without = (relative_error(predicted(RIM, pushes, v), truth) for v in ({"gradient_x": 2.0}, {}))
+    assert with_it < 0.01
+    assert with_it < 0.2 * without
