@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from push_predictor import __version__
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.errors import TrainingError
-from push_predictor.models.features import push_features
-from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
-from push_predictor.models.gaussian_process.regression import Regression
-from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING, fit_sparse_vhgp
-from push_predictor.models.gaussian_process.vhgp import fit_vhgp
+from push_predictor.models.gaussian_process.sparse.fit import DEFAULT_INDUCING
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung
@@ -26,23 +22,22 @@ from push_predictor.models.predictors import (
     MechanicsPredictor,
     Predictor,
     PriorPredictor,
-    Scaling,
 )
-from push_predictor.models.predictors.correlation_fit import fit_correlation
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
+from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_learnt
 from push_predictor.models.train_mechanics import predictor_about, train_mechanics
 from push_predictor.models.train_prior import prior_predictor, sharpened
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
-from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
 
 DEFAULT_ROWS = 1000
 MOST_FITTED_ROWS = 4000  # of fitted mechanics, unless n_train is given
 MOST_SEARCHED_ROWS = 1200  # by the ladder of fitted mechanics
+MOST_MEAN_ROWS = 500  # to which the mechanics of a learnt model are fitted
 FEWEST_ROWS = 10
 MOST_DENSE_ROWS = 2000  # a dense VHGP takes 46 CPU s and 240 MB; with twice the rows eight and four times as much
-CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,8 @@ class TrainingOptions:
     analytical model; otherwise the textbook's values are used. supports: support points (k, 3) as in Rig, by the
     covariate `recording`, where recordings had others than the rig; used with fit. kernels: of a learnt model.
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
-    that a sparse one with DEFAULT_INDUCING.
+    that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about which the residual is
+    learnt, zero, or auto for the better of both by held-out pushes.
     """
 
     n_train: int | None = None
@@ -62,12 +58,15 @@ class TrainingOptions:
     fit: bool = False
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
+    mean: MeanChoice = "zero"
     supports: Mapping[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, value in (("n_train", self.n_train), ("inducing", self.inducing)):
             if value is not None and value < 1:
                 raise TrainingError(f"{name}: {value} is not accepted, give 1 or more")
+        if self.mean not in MEANS:
+            raise TrainingError(f"mean: {self.mean!r} is not accepted, give one of {', '.join(MEANS)}")
 
 
 def train_model(
@@ -122,14 +121,15 @@ def _predictor(
         watch("train prior", 0.1)
         return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
-        return _learnt(rows, rig, kind, options.kernels, inducing, watch), []
+        learnt = LearntOptions(kind, options.kernels, inducing, options.mean)
+        return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
     if options.fit:
         return _fitted(rows, rig, options, watch)
     return _with_covariance(AnalyticalPush(rig.outline, rig.pusher_radius), rows), []
 
 
 def _fitted(rows: PushTable, rig: Rig, options: TrainingOptions, watch: Watch) -> tuple[MechanicsPredictor, list[Rung]]:
-    search = rows.take(_even_over_pushes(rows, MOST_SEARCHED_ROWS, options.seed))
+    search = _spread(rows, MOST_SEARCHED_ROWS, options.seed)
     trained = train_mechanics(_mechanics(rig, options), rows, search, watch)
     return trained.predictor, trained.ladder
 
@@ -143,13 +143,14 @@ def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. An analytical one
-    keeps its parameters, and its covariance is estimated again. The priors of a prior model are updated by the table.
-    Raises TrainingError for too few rows.
+    A learnt one is refitted with its kernels and kind of mean, on at most 1000 rows drawn evenly over the pushes. An
+    analytical one keeps its parameters, and its covariance is estimated again. The priors of a prior model are updated
+    by the table. Raises TrainingError for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
-        options = TrainingOptions(seed=seed, kernels=predictor.regressions[0].parameters.choice)
+        mean: MeanChoice = "zero" if predictor.mean is None else "mechanics"
+        options = TrainingOptions(seed=seed, kernels=predictor.kernels, mean=mean)
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor
@@ -181,6 +182,11 @@ def training_rows(table: PushTable, n_train: int | None, seed: int, most: int = 
     return np.sort(np.random.default_rng(seed).permutation(count)[:n_train])
 
 
+def _spread(rows: PushTable, most: int, seed: int) -> PushTable:
+    """The rows, or as many of them, drawn evenly over the pushes."""
+    return rows.take(_even_over_pushes(rows, most, seed)) if len(rows) > most else rows
+
+
 def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
     """Draw one random row of each push, then a second one of each, until there are n_train."""
     order = np.random.default_rng(seed).permutation(len(table))
@@ -190,50 +196,6 @@ def _even_over_pushes(table: PushTable, n_train: int, seed: int) -> IntArray:
         push = table.push_id[row]
         turn[row] = taken[push] = taken.get(push, -1) + 1
     return np.sort(order[np.argsort(turn[order], kind="stable")][:n_train])
-
-
-def _learnt(
-    rows: PushTable, rig: Rig, kind: str, kernels: KernelChoice, inducing: int | None, watch: Watch
-) -> GaussianProcessPredictor:
-    scaling = _scaling(rows, rig)
-    features, scaled = scaling.features(rig.outline, rows.inputs), scaling.outcomes(rows.outcomes)
-    regressions: list[Regression] = []
-    for output, column in zip(OUTPUTS, scaled.T, strict=True):
-        watch(f"train {kind}: {output}", 0.3 * len(regressions))
-        regressions.append(_regression(features, column, kind, kernels, inducing))
-    watch(f"train {kind}: correlation of the outputs", 0.9)
-    predictor = GaussianProcessPredictor(rig, scaling, tuple(regressions))
-    return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
-
-
-def _regression(features: Array, column: Array, kind: str, kernels: KernelChoice, inducing: int | None) -> Regression:
-    if kind == "gp":
-        return fit_gp(features, column, kernels)
-    if inducing is None:
-        return fit_vhgp(features, column, kernels)
-    if kernels != DEFAULT_CHOICE:
-        raise TrainingError(f"{kernels}: a sparse VHGP has squared exponential kernels and no nugget")
-    return fit_sparse_vhgp(features, column, inducing)
-
-
-def _scaling(rows: PushTable, rig: Rig) -> Scaling:
-    features = push_features(rig.outline, rows.inputs)
-    spread = np.ptp(features, axis=0)
-    columns = np.flatnonzero(spread > CONSTANT * (1.0 + np.abs(features).max(axis=0)))
-    outcome_sd = rows.outcomes.std(axis=0)
-    for name, sd in zip(OUTPUTS, outcome_sd, strict=True):
-        if not sd > 0.0:
-            raise TrainingError(
-                f"{name}: does not vary over the {len(rows)} training windows: there is nothing to learn"
-            )
-    if not columns.size:
-        raise TrainingError(
-            "velocity, contact and angle are the same in all training windows: there is nothing to learn"
-        )
-    used = features[:, columns]
-    return Scaling(
-        tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), rows.outcomes.mean(axis=0), outcome_sd
-    )
 
 
 def _with_covariance(physics: AnalyticalPush, rows: PushTable) -> AnalyticalPredictor:

@@ -48,6 +48,11 @@ class GpParameters:
         return KernelChoice(self.family)
 
     @property
+    def count(self) -> int:
+        """Number of hyperparameters."""
+        return len(self.log_lengthscales) + 2
+
+    @property
     def kernel(self) -> ArdKernel:
         """Kernel of f."""
         return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)

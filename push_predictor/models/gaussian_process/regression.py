@@ -1,11 +1,31 @@
-"""A regression of one output: any of the Gaussian processes of this folder."""
+"""A regression of one output, any of this folder, and the choice between several."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
+from push_predictor.models.gaussian_process.constant import ConstantNoise
 from push_predictor.models.gaussian_process.gp import GaussianProcess
+from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
+from push_predictor.types import IntArray
 
-Regression: TypeAlias = GaussianProcess | VHGP | SparseVHGP
+KernelRegression: TypeAlias = GaussianProcess | VHGP | SparseVHGP
+Regression: TypeAlias = KernelRegression | ConstantNoise
+
+
+def held_out_score(regression: Regression, block: IntArray) -> float:
+    """Log density of the training rows when their blocks (n,) are held out, less the number of hyperparameters, nats.
+
+    The hyperparameters are those of all rows, which makes the held-out density too good by about their number (Akaike
+    1974, for fits by maximum likelihood).
+    """
+    density = exact_log_density(regression.held_out(block), regression.outputs)
+    return float(density.sum()) - regression.parameters.count
+
+
+def best_held_out(regressions: Sequence[Regression], block: IntArray) -> Regression:
+    """The regression with the highest held-out score; of equal ones the first."""
+    return max(regressions, key=lambda regression: held_out_score(regression, block))

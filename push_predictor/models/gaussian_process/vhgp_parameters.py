@@ -39,6 +39,11 @@ class VhgpParameters:
         return KernelChoice(self.family, self.log_nugget_sd is not None)
 
     @property
+    def count(self) -> int:
+        """Number of hyperparameters."""
+        return len(self.to_vector())
+
+    @property
     def signal(self) -> ArdKernel:
         """Kernel of f."""
         return ard_kernel(self.family, self.log_lengthscales, self.log_signal_sd)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,6 +30,12 @@ from push_predictor.types import Array, IntArray
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)
 BEND_STEP = 5e-4  # m of the tip's path, over which the acceleration of the slider is taken
 MOST_INERTIA = 0.8  # of the largest load: more would not be a correction
+
+
+@lru_cache(maxsize=64)
+def _patch_map(outline: Outline, exponent: float) -> LoadMap:
+    """The inverse of an outline's patch, 0.2 s to tabulate; kept for all models of the outline."""
+    return load_map(patch(outline, exponent))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +68,6 @@ class PushMechanics:
         push = true_push(self.outline, self.pusher_radius, rows, inputs, np.asarray(duration, dtype=np.float64))
         return _Motion(self, self._surfaces(rows), rows, push).displacement()
 
-    def _patch(self, exponent: float) -> LoadMap:
-        if exponent not in self._tables:
-            self._tables[exponent] = load_map(patch(self.outline, exponent))
-        return self._tables[exponent]
-
     def _known(self, key: str, support: PressureDistribution) -> LoadMap:
         if key not in self._tables:
             self._tables[key] = load_map(support)
@@ -82,7 +84,7 @@ class PushMechanics:
                 number[values.covariates["recording"] == recording] = len(known)
                 known.append(self._known(f"recording {recording}", support))
         below, share, used = self._exponents(values.of("rim_exponent"), number < 0)
-        maps = [*known, *(self._patch(exponent) for exponent in used)]
+        maps = [*known, *(_patch_map(self.outline, exponent) for exponent in used)]
         low = np.where(number < 0, len(known) + below, number)
         return row_surfaces(maps, low, np.minimum(low + 1, len(maps) - 1), share)
 

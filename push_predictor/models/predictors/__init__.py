@@ -9,6 +9,7 @@ from __future__ import annotations
 from push_predictor.models.predictors.analytical_predictor import AnalyticalPredictor
 from push_predictor.models.predictors.extended_predictor import ExtendedPredictor
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
+from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.mechanics_predictor import MechanicsPredictor
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
@@ -20,6 +21,7 @@ __all__ = [
     "Cross",
     "ExtendedPredictor",
     "GaussianProcessPredictor",
+    "MechanicsMean",
     "MechanicsPredictor",
     "Moments",
     "Predictor",

@@ -1,18 +1,22 @@
-"""The learnt predictor: three Gaussian process regressions and the correlation of their outputs."""
+"""The learnt predictor: three regressions and the correlation of their outputs, alone or about fitted mechanics."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.constant import ConstantNoise
+from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
+from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.without_effects import WithoutEffects
@@ -24,13 +28,16 @@ from push_predictor.types import Array, IntArray
 class GaussianProcessPredictor(WithoutEffects):
     """Three independent regressions on standardised features (Bauza and Rodriguez 2017, section IV).
 
-    correlation: of the outputs given the push; None where they are independent.
+    correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
+    regressions have learnt the residuals; None where they have learnt the outcomes themselves. The scaling is that of
+    what they have learnt.
     """
 
     rig: Rig
     scaling: Scaling
     regressions: tuple[Regression, ...]
     correlation: Correlation | None = None
+    mean: MechanicsMean | None = None
 
     @property
     def learnt(self) -> bool:
@@ -40,21 +47,39 @@ class GaussianProcessPredictor(WithoutEffects):
     @property
     def gaussian(self) -> bool:
         """See BasePredictor: with known noise."""
-        return any(regression.gaussian for regression in self.regressions)
+        return all(regression.gaussian for regression in self.regressions)
 
     @property
     def integrates(self) -> bool:
         """See Predictor."""
-        return False
+        return self.mean is not None
 
-    @property
+    @cached_property
     def physics(self) -> AnalyticalPush:
-        """See Predictor: the textbook's."""
+        """See Predictor: the ellipsoidal model nearest to the mean, or the textbook's."""
+        if self.mean is not None:
+            return self.mean.fitted.ellipsoid()
         return AnalyticalPush(self.rig.outline, self.rig.pusher_radius)
 
     @property
-    def outcomes(self) -> Array:
-        """The outcomes (n, 3) that it was trained on, SI."""
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor: those of the mean."""
+        return self.mean.fitted.needs if self.mean is not None else ()
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor: those that the mean depends on."""
+        return self.needs
+
+    @property
+    def kernels(self) -> KernelChoice:
+        """The kernels of its regressions; the default where all have constant noise."""
+        learnt = [r.parameters.choice for r in self.regressions if not isinstance(r, ConstantNoise)]
+        return learnt[0] if learnt else DEFAULT_CHOICE
+
+    @property
+    def targets(self) -> Array:
+        """What the regressions were trained on (n, 3), SI: outcomes, or residuals about the mean."""
         scaled = np.column_stack([regression.outputs for regression in self.regressions])
         return np.asarray(scaled * self.scaling.outcome_sd + self.scaling.outcome_mean)
 
@@ -62,23 +87,26 @@ class GaussianProcessPredictor(WithoutEffects):
         """See Predictor. Every outcome takes the duration of the training windows; the caller has checked it."""
         features = self.scaling.features(self.rig.outline, push.inputs)
         latent = [regression.predict(features) for regression in self.regressions]
-        return self._moments_of(latent, self.correlation.at(features) if self.correlation else None)
+        return self.about_mean(
+            self._moments_of(latent, self.correlation.at(features) if self.correlation else None), push
+        )
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor. The correlation at a row is that of the other blocks' rows."""
+        """See Predictor. The correlation at a row is that of the other blocks' rows; the mean is that of all rows."""
         latent = [regression.held_out(block) for regression in self.regressions]
         features = self.regressions[0].inputs
-        return self._moments_of(latent, self.correlation.held_out(features, block) if self.correlation else None)
+        correlation = self.correlation.held_out(features, block) if self.correlation else None
+        return self.about_mean(self._moments_of(latent, correlation), rows)
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""
-        return None if self.gaussian else self._log_density(self.latent(push.inputs), outcomes)
+        return None if self.gaussian else self._log_density(self.latent(push.inputs), push, outcomes)
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
         """See BasePredictor: the latent function is shifted and less certain, its noise is scaled."""
         if self.gaussian:
             return None
-        sd = self.scaling.outcome_sd
+        sd = self._units(push)
         mean, variance = shift.mean / sd, np.diagonal(shift.covariance, axis1=1, axis2=2) / sd**2
         latent = [
             replace(
@@ -89,20 +117,37 @@ class GaussianProcessPredictor(WithoutEffects):
             )
             for k, p in enumerate(self.latent(push.inputs))
         ]
-        return self._log_density(latent, outcomes)
+        return self._log_density(latent, push, outcomes)
 
     def latent(self, inputs: Array) -> list[LatentPrediction]:
         """Per output, the latent predictions in standardised units."""
         features = self.scaling.features(self.rig.outline, inputs)
         return [regression.predict(features) for regression in self.regressions]
 
+    def standardised(self, push: Push, outcomes: Array) -> Array:
+        """Outcomes (n, 3) in the units of `latent`."""
+        return self.scaling.outcomes(outcomes if self.mean is None else self.mean.residuals(push, outcomes))
+
+    def about_mean(self, residuals: Moments, push: Push) -> Moments:
+        """Moments of the outcomes from those of what was learnt."""
+        return residuals if self.mean is None else self.mean.outcomes(push, residuals)
+
+    def without_mean(self) -> GaussianProcessPredictor:
+        """The predictor of the residuals alone; itself if it has no mean."""
+        return self if self.mean is None else replace(self, mean=None)
+
     def with_independent_outputs(self) -> GaussianProcessPredictor:
         """See Predictor."""
         return replace(self, correlation=None)
 
     def with_scalar_mechanics(self) -> GaussianProcessPredictor:
-        """See Predictor: it computes no mechanics."""
+        """See Predictor."""
         return self
+
+    def _units(self, push: Push) -> Array:
+        """Standard deviations of what was learnt, in units of the outcomes, (3,) or (n, 3)."""
+        sd = self.scaling.outcome_sd
+        return sd if self.mean is None else np.asarray(self.mean.size(push)[:, None] * sd)
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""
@@ -112,8 +157,8 @@ class GaussianProcessPredictor(WithoutEffects):
         of_process = np.column_stack([p.process_variance for p in latent]) * sd**2
         return Moments(mean, *covariances(of_function, of_process, correlation))
 
-    def _log_density(self, latent: Sequence[LatentPrediction], outcomes: Array) -> Array:
+    def _log_density(self, latent: Sequence[LatentPrediction], push: Push, outcomes: Array) -> Array:
         """Log density (n, 3) of outcomes (n, 3) under latent predictions in standardised units, one per output."""
-        scaled = self.scaling.outcomes(outcomes)
+        scaled = self.standardised(push, outcomes)
         columns = [exact_log_density(p, scaled[:, k]) for k, p in enumerate(latent)]
-        return np.column_stack(columns) - np.log(self.scaling.outcome_sd)
+        return np.column_stack(columns) - np.log(self._units(push))

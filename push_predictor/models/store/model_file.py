@@ -28,8 +28,8 @@ from push_predictor.recordings.rig import rig_from_record
 
 FORMAT = "push_predictor model"
 # What each version added. 2: kernels other than the squared exponential, and a nugget. 3: effects. 4: effects that
-# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics, and draws of
-# their parameters, with which a model may have no training rows.
+# share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics, alone or as mean,
+# and draws of their parameters, with which a model may have no training rows.
 FORMAT_VERSION = 6
 PROBES = 5
 HEADER = "header"
@@ -115,7 +115,7 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 def _version(predictor: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
     """The lowest version whose readers understand the record of a predictor."""
     base = predictor.get("base", predictor)
-    if "mechanics" in base:
+    if {"mechanics", "mean"} & base.keys():
         return 6
     if "correlation" in base or has_inducing(0, arrays):
         return 5

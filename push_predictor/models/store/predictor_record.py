@@ -17,10 +17,12 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.limit_surface import Support
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.process_noise import VARYING, ProcessNoise
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     ExtendedPredictor,
     GaussianProcessPredictor,
+    MechanicsMean,
     MechanicsPredictor,
     Predictor,
     PriorPredictor,
@@ -50,6 +52,7 @@ class Source:
     rig: Rig
     training: PushTable
     arrays: Mapping[str, np.ndarray]
+    targets: Array | None = None  # what the regressions were trained on, if not the outcomes of the training rows
 
 
 @singledispatch
@@ -61,7 +64,7 @@ def predictor_record(predictor: Predictor, arrays: dict[str, np.ndarray]) -> dic
 @predictor_record.register
 def _extended_record(predictor: ExtendedPredictor, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     if isinstance(predictor.base, GaussianProcessPredictor):
-        arrays[BASE_OUTCOMES] = predictor.base.outcomes  # those of the training rows minus the effects
+        arrays[BASE_OUTCOMES] = predictor.base.targets  # those of the training rows minus the effects
     return {
         "base": predictor_record(predictor.base, arrays),
         "physics": _physics_record(predictor.physics),
@@ -95,7 +98,12 @@ def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.nda
         "scaling": {key: np.asarray(value).tolist() for key, value in vars(predictor.scaling).items()},
         "regressions": [regression_record(regression) for regression in predictor.regressions],
         **({"correlation": correlation_record(predictor.correlation, arrays)} if predictor.correlation else {}),
+        **({"mean": _mean_record(predictor.mean)} if predictor.mean else {}),
     }
+
+
+def _mean_record(mean: MechanicsMean) -> dict[str, Any]:
+    return {"mechanics": mechanics_record(mean.fitted), "travel": mean.travel}
 
 
 def _physics_record(physics: AnalyticalPush) -> dict[str, Any]:
@@ -126,10 +134,9 @@ def _extended(record: dict[str, Any], source: Source) -> ExtendedPredictor:
     effects, scale = effects_of(record["effects"], source.arrays), np.array(record["scale"], dtype=np.float64)
     if scale.shape != (3,) or not np.all(np.isfinite(scale)) or np.any(scale <= 0.0):
         raise ValueError(f"scale {record['scale']!r}, three finite numbers above 0 are needed")
-    rows = source.training
     if source.kind in LEARNT:
-        rows = replace(rows, outcomes=finite(source.arrays, BASE_OUTCOMES))
-    base = _base(record["base"], replace(source, training=rows))
+        source = replace(source, targets=finite(source.arrays, BASE_OUTCOMES))
+    base = _base(record["base"], source)
     cross = cross_of(record.get("cross", []), effects, source.arrays)
     predictor = ExtendedPredictor(base, _physics(record["physics"], source.rig), effects, scale, cross)
     if missing := [name for name in predictor.needs if name not in source.training.covariates]:
@@ -188,13 +195,33 @@ def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:
     found = dict(record["scaling"])
     columns = tuple(int(c) for c in found.pop("columns"))
     scaling = Scaling(columns, **{key: np.array(value, dtype=np.float64) for key, value in found.items()})
+    mean = _mean(record["mean"], source) if "mean" in record else None
     features = scaling.features(source.rig.outline, source.training.inputs)
-    outcomes = scaling.outcomes(source.training.outcomes)
+    targets = scaling.outcomes(_targets(source, mean))
     regressions = [
-        regression_of(parameters, source.kind, features, outcomes[:, k], k, source.arrays)
+        regression_of(parameters, source.kind, features, targets[:, k], k, source.arrays)
         for k, parameters in enumerate(record["regressions"])
     ]
-    if len(regressions) != outcomes.shape[1]:
+    if len(regressions) != targets.shape[1]:
         raise ValueError(f"{len(regressions)} regressions, three are needed")
     correlation = correlation_of(record["correlation"], features, source.arrays) if "correlation" in record else None
-    return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation)
+    return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation, mean)
+
+
+def _mean(record: dict[str, Any], source: Source) -> MechanicsMean:
+    mean = MechanicsMean(mechanics_of(record["mechanics"], source.rig), float(record["travel"]))
+    if not (np.isfinite(mean.travel) and mean.travel > 0.0):
+        raise ValueError(f"travel {mean.travel!r} of the mean, a finite number above 0 is needed")
+    if missing := [name for name in mean.fitted.needs if name not in source.training.covariates]:
+        raise ValueError(f"the mechanics need the covariate {missing[0]}, which the training rows lack")
+    return mean
+
+
+def _targets(source: Source, mean: MechanicsMean | None) -> Array:
+    """What the regressions were trained on (n, 3)."""
+    if source.targets is not None:
+        return source.targets
+    rows = source.training
+    if mean is None:
+        return rows.outcomes
+    return mean.residuals(Push(rows.inputs, rows.duration, rows.covariates), rows.outcomes)

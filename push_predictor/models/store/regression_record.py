@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.models.gaussian_process.constant import ConstantNoise, ConstantParameters
 from push_predictor.models.gaussian_process.gp import GaussianProcess, GpParameters
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, FAMILIES
 from push_predictor.models.gaussian_process.regression import Regression
@@ -19,11 +20,14 @@ from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameter
 from push_predictor.models.store.sparse_record import has_inducing, put_inducing, sparse_regression
 from push_predictor.types import Array
 
+CONSTANT = "noise_spread"  # only constant noise has this hyperparameter
+LARGEST_SPREAD = 10.0
+
 
 def regression_record(regression: Regression) -> dict[str, Any]:
     """The hyperparameters; those that format 1 lacks are omitted if they have the values it took for granted."""
     values = dict(vars(regression.parameters))
-    if values["family"] == DEFAULT_CHOICE.family:
+    if values.get("family") == DEFAULT_CHOICE.family:
         del values["family"]
     chosen = {key: value for key, value in values.items() if value is not None}
     return {key: value if key == "family" else np.asarray(value).tolist() for key, value in chosen.items()}
@@ -41,6 +45,8 @@ def regression_of(
     record: dict[str, Any], kind: str, features: Array, outcomes: Array, output: int, arrays: Mapping[str, np.ndarray]
 ) -> Regression:
     """The regression of one output on standardised features (n, D) and outcomes (n,). Raises ValueError."""
+    if CONSTANT in record:
+        return ConstantNoise(features, outcomes, _constant(record))
     values, sites = _hyperparameters(record), arrays.get(f"site_precisions_{output}")
     if kind == "gp":
         return GaussianProcess(features, outcomes, GpParameters(**values))
@@ -49,6 +55,13 @@ def regression_of(
     if has_inducing(output, arrays):
         return sparse_regression(features, outcomes, VhgpParameters(**values), sites, output, arrays)
     return VHGP(features, outcomes, VhgpParameters(**values), sites)
+
+
+def _constant(record: dict[str, Any]) -> ConstantParameters:
+    parameters = ConstantParameters(**{key: float(value) for key, value in record.items()})
+    if not (np.isfinite(parameters.noise_mean) and 0.0 <= parameters.noise_spread < LARGEST_SPREAD):
+        raise ValueError(f"{parameters}: a finite mean and a spread from 0 to {LARGEST_SPREAD} are needed")
+    return parameters
 
 
 def _hyperparameters(record: dict[str, Any]) -> dict[str, Any]:

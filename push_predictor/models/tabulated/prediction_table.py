@@ -12,11 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from math import exp, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
 from push_predictor.errors import PushPredictorError
+from push_predictor.models.gaussian_process.constant import ConstantNoise
 from push_predictor.models.gaussian_process.kernels import ArdKernel, SquaredExponential
+from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.predictors.correlation import Correlation, correlations, covariances
@@ -27,6 +30,8 @@ from push_predictor.models.tabulated.push_chart import Chart, Whole
 from push_predictor.models.tabulated.sparse_grid import sparse_grid_regression
 from push_predictor.models.tabulated.table_sides import Side, table_sides
 from push_predictor.types import Array
+
+OnGrid: TypeAlias = GridRegression | ConstantNoise
 
 MOST_KNOTS = 1_000_000  # 96 MB
 MOST_NODES = 150_000  # of one posterior and edge: some seconds
@@ -97,11 +102,8 @@ def tabulate(
     refinement: factor on the usual number of nodes and knots along each axis. Raises TooFineError, also for kernels
     that are not products over the axes.
     """
-    regressions = [
-        sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
-        for regression in predictor.regressions
-    ]
-    if not all(isinstance(regression.signal.kernel, SquaredExponential) for regression in regressions):
+    regressions = [_on_grid(regression) for regression in predictor.regressions]
+    if not all(isinstance(kernel, SquaredExponential) for kernel, _ in _resolved(regressions, None)):
         raise TooFineError("only squared exponential kernels are products over the axes of a table")
     sides = table_sides(predictor.scaling, chart, low, high)
     resolved = _resolved(regressions, predictor.correlation)
@@ -113,12 +115,22 @@ def tabulate(
     values = np.repeat(
         values, chart.boxes // len(values), axis=0
     )  # where the place does not vary, all edges share one box
-    least = predictor.scaling.outcome_sd**2 * [regression.signal.least_variance for regression in regressions]
+    least = predictor.scaling.outcome_sd**2 * [_least_variance(regression) for regression in regressions]
     columns = _as_slice([side.column for side in sides])
     return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
 
 
-def _values(grid: _Grid, predictor: GaussianProcessPredictor, regressions: Sequence[GridRegression]) -> Array:
+def _on_grid(regression: Regression) -> OnGrid:
+    if isinstance(regression, ConstantNoise):
+        return regression
+    return sparse_grid_regression(regression) if isinstance(regression, SparseVHGP) else grid_regression(regression)
+
+
+def _least_variance(regression: OnGrid) -> float:
+    return regression.variance if isinstance(regression, ConstantNoise) else regression.signal.least_variance
+
+
+def _values(grid: _Grid, predictor: GaussianProcessPredictor, regressions: Sequence[OnGrid]) -> Array:
     """At the knots: means, variances of f, log process variances, SI units, and the correlation's three numbers."""
     outputs = [grid.outputs(regression) for regression in regressions]
     values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
@@ -137,15 +149,16 @@ def _as_slice(columns: Sequence[int]) -> slice:
     return slice(columns[0], columns[-1] + 1, columns[-1] - columns[0] if len(columns) == 2 else 1)
 
 
-def _resolved(regressions: Sequence[GridRegression], correlation: Correlation | None) -> list[tuple[ArdKernel, float]]:
+def _resolved(regressions: Sequence[OnGrid], correlation: Correlation | None) -> list[tuple[ArdKernel, float]]:
     """The kernels that the knots must resolve, each with the number of cells per lengthscale."""
-    wanted = [(r.signal.kernel, SIGNAL.cells) for r in regressions]
-    wanted += [(r.noise.kernel, NOISE.cells) for r in regressions if r.noise]
+    learnt = [regression for regression in regressions if isinstance(regression, GridRegression)]
+    wanted = [(r.signal.kernel, SIGNAL.cells) for r in learnt]
+    wanted += [(r.noise.kernel, NOISE.cells) for r in learnt if r.noise]
     return wanted + ([(correlation.kernel, COUPLING_CELLS)] if correlation else [])
 
 
 def _cells(side: Side, resolved: Sequence[tuple[ArdKernel, float]], refinement: float) -> int:
-    wanted = max(cells * side.lengthscales(kernel) for kernel, cells in resolved)
+    wanted = max((cells * side.lengthscales(kernel) for kernel, cells in resolved), default=0.0)
     return max(FEWEST_CELLS, int(np.ceil(refinement * wanted)))
 
 
@@ -157,11 +170,20 @@ class _Grid:
     axes: Sequence[Axis]
     refinement: float
 
-    def outputs(self, regression: GridRegression) -> list[Array]:
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(boxes, cells_1 + 1, ...) of the knots."""
+        boxes = [len(side.features(np.array([side.low]))) for side in self.sides]
+        return int(np.prod(boxes)), *(axis.cells + 1 for axis in self.axes)
+
+    def outputs(self, regression: OnGrid) -> list[Array]:
         """Mean and variance of f, and log process variance, at the knots, (boxes, cells_1 + 1, ...) each.
 
         If the place is not one of the sides, there is one box.
         """
+        if isinstance(regression, ConstantNoise):
+            log_noise = float(np.log(regression.noise_variance))
+            return [np.full(self.shape, value) for value in (0.0, regression.variance, log_noise)]
         mean, variance = self._moments(regression.signal, SIGNAL)
         if regression.noise is None:
             return [mean, variance, np.full_like(mean, regression.log_noise)]

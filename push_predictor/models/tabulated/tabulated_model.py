@@ -4,8 +4,9 @@ A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but i
 inputs. So it is tabulated once. The table is compared with the model and used only if it is accurate. Every other push
 and every other model is predicted by the model itself.
 
-The analytical model and the effects that follow from it have no table: they have kinks where contacts begin to
-slip, and a table would have to be very fine there. A single push is computed in plain numbers instead.
+The mechanics have no table, neither alone nor as the mean of a learnt model nor in effects: they have kinks where
+contacts begin to slip, and a table would have to be very fine there. A single push is computed in plain numbers
+instead.
 """
 
 from __future__ import annotations
@@ -75,20 +76,19 @@ class TabulatedModel:
         """
         if self.domain is None:
             return self._exact.predict_rows(inputs, duration, covariates)
-        prediction, predictor = self._of_base(self.domain, inputs, duration), self._exact.predictor
+        push, predictor = Push(inputs, duration, covariates or {}), self._exact.predictor
+        prediction = self._of_base(self._learnt(self.domain, inputs, duration), push)
         if not predictor.effects:
             return prediction
-        push = Push(inputs, duration, covariates or {})
-        base = Moments(prediction.mean, prediction.covariance, prediction.process_covariance)
-        moments = predictor.with_effects(base, push)
+        moments = predictor.with_effects(_moments(prediction), push)
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
     def predict_one(self, push: PushRequest) -> Prediction:
         """The same for one push (n = 1); the table is read in plain numbers."""
-        prediction = None
+        learnt = None
         if self.domain is not None and self.model.base is self.model:
-            prediction = self.domain.predict_one((push.velocity, push.contact, push.angle))
-        return prediction or self.predict_rows(*push.arrays)
+            learnt = self.domain.predict_one((push.velocity, push.contact, push.angle))
+        return self.predict_rows(*push.arrays) if learnt is None else self._of_base(learnt, push)
 
     def exact_count(self, inputs: Array) -> int:
         """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
@@ -99,35 +99,59 @@ class TabulatedModel:
         """The same model, which computes the mechanics and effects of single pushes in plain numbers."""
         return replace(self.model, predictor=self.model.predictor.with_scalar_mechanics())
 
-    def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
-        base = self.model.base
+    @cached_property
+    def _residual(self) -> PushModel:
+        """The model of what is tabulated: the base, without the mechanics about which it has learnt residuals."""
+        return _without_mean(self.model.base)
+
+    def _of_base(self, learnt: Prediction, push: Push | PushRequest) -> Prediction:
+        """Predictions of the base from those of what it has learnt."""
+        predictor = self._exact.predictor.base
+        if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+            return learnt
+        pushes = Push(*push.arrays) if isinstance(push, PushRequest) else push
+        return Prediction(*predictor.about_mean(_moments(learnt), pushes), learnt.in_domain)
+
+    def _learnt(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
+        """Predictions of what the base has learnt, from the table where it can."""
         if len(inputs) == 1:
-            return domain.predict_one(inputs[0].tolist()) or base.predict_rows(inputs, duration)
+            return domain.predict_one(inputs[0].tolist()) or self._residual.predict_rows(inputs, duration)
         inside, prediction = domain.predict(inputs)
         if prediction is not None:
             return prediction
-        exact = base.predict_rows(inputs[~inside], duration[~inside])
+        exact = self._residual.predict_rows(inputs[~inside], duration[~inside])
         if not inside.any():
             return exact
-        return _merged(inside, self._of_base(domain, inputs[inside], duration[inside]), exact)
+        return _merged(inside, self._learnt(domain, inputs[inside], duration[inside]), exact)
 
 
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
-    base = model.base
-    if not isinstance(base.predictor, GaussianProcessPredictor):
+    learnt = _without_mean(model.base)
+    if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, "exact: only learnt models have a table")
     how = ""
     for refinement in REFINEMENTS:
         try:
-            domain = tabulated_domain(base, base.predictor, refinement)
+            domain = tabulated_domain(learnt, learnt.predictor, refinement)
         except TooFineError as too_fine:
             return TabulatedModel(model, f"exact: {how}{too_fine}")
-        error = _error(base, domain)
+        error = _error(learnt, domain)
         if error.accepted:
             return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "
     return TabulatedModel(model, f"exact: {how}too far off")
+
+
+def _without_mean(model: PushModel) -> PushModel:
+    predictor = model.predictor
+    if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+        return model
+    return replace(model, predictor=predictor.without_mean())
+
+
+def _moments(prediction: Prediction) -> Moments:
+    return Moments(prediction.mean, prediction.covariance, prediction.process_covariance)
 
 
 def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:

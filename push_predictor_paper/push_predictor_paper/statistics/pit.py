@@ -11,6 +11,7 @@ from push_predictor.evaluation.push_scores import PushScores, pooled, push_score
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import compare, pit
 from push_predictor.models.gaussian_process.quadrature import exact_cdf
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
@@ -65,7 +66,8 @@ def exact_pit(model: PushModel, table: PushTable) -> Array:
     """Probabilities (n, 3) of outcomes below a table's under the exact predictive; for a Gaussian one, `pit`'s."""
     if not isinstance(model.predictor, GaussianProcessPredictor):
         return pit(compare(model, table))
-    scaled = model.predictor.scaling.outcomes(table.outcomes)
+    push = Push(table.inputs, table.duration, table.covariates)
+    scaled = model.predictor.standardised(push, table.outcomes)
     latent = model.predictor.latent(table.inputs)
     return np.column_stack([exact_cdf(prediction, scaled[:, k]) for k, prediction in enumerate(latent)])
 

@@ -1,0 +1,88 @@
+"""Regression of residuals that have nothing to learn: a function of zero and noise that is the same everywhere.
+
+    y = f + e,  f = 0,  e ~ N(0, exp(g)),  g ~ N(noise_mean, noise_spread^2)
+
+With a spread above zero the noise has heavy tails, as the exact predictive of a VHGP has. It is what mechanics alone
+predict, so that a learnt residual must be better than this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from push_predictor.models.gaussian_process.gp import check_rows
+from push_predictor.models.gaussian_process.prediction import LatentPrediction
+from push_predictor.models.gaussian_process.quadrature import exact_log_density
+from push_predictor.types import Array, IntArray
+
+_WIDEST = 1.5  # spread of the log noise variance, up to which the quadrature of the density is accurate
+_USUAL_LOG_SPREAD, _LOG_SPREAD_SD = 0.0, 0.5  # weak prior of the spread's logarithm
+_SMALLEST_VARIANCE = 1e-12  # of standardised outputs
+
+
+@dataclass(frozen=True)
+class ConstantParameters:
+    """Mean and spread (standard deviation) of the log noise variance; spread 0: Gaussian noise."""
+
+    noise_mean: float
+    noise_spread: float
+
+    @property
+    def count(self) -> int:
+        """Number of hyperparameters that were fitted."""
+        return 1 if self.noise_spread == 0.0 else 2
+
+
+class ConstantNoise:
+    """The same prediction at all inputs; inputs (n, D) and outputs (n,) are the rows that it was fitted to."""
+
+    def __init__(self, inputs: Array, outputs: Array, parameters: ConstantParameters) -> None:
+        self.inputs, self.outputs, self.parameters = check_rows(inputs, outputs), outputs, parameters
+        self.gaussian = parameters.noise_spread == 0.0
+
+    @property
+    def variance(self) -> float:
+        """Variance of f: how well n rows determine that their mean is zero."""
+        return self.noise_variance / len(self.outputs)
+
+    @property
+    def noise_variance(self) -> float:
+        """Variance of the noise."""
+        return float(np.exp(self.parameters.noise_mean + 0.5 * self.parameters.noise_spread**2))
+
+    def predict(self, inputs: Array) -> LatentPrediction:
+        """Predict f and the noise at inputs (m, D)."""
+        return _same_everywhere(self.parameters, self.variance, len(inputs))
+
+    def held_out(self, block: IntArray) -> LatentPrediction:
+        """Predict f and g at the n training rows; without a function, the rows of a block make no difference."""
+        return self.predict(self.inputs)
+
+
+def fit_constant(inputs: Array, outputs: Array, *, heavy_tails: bool) -> ConstantNoise:
+    """Fit the noise by maximum likelihood: Gaussian, or with a spread (weak prior about 1) of its log variance.
+
+    inputs (n, D) and outputs (n,), of mean about zero. Raises TrainingError when the rows do not match or are not
+    finite.
+    """
+    check_rows(inputs, outputs)
+    gaussian = float(np.log(np.mean(outputs**2) + _SMALLEST_VARIANCE))
+    if not heavy_tails:
+        return ConstantNoise(inputs, outputs, ConstantParameters(gaussian, 0.0))
+
+    def cost(vector: Array) -> float:
+        spread = min(float(np.exp(vector[1])), _WIDEST)
+        latent = _same_everywhere(ConstantParameters(float(vector[0]), spread), 0.0, len(outputs))
+        penalty = 0.5 * ((vector[1] - _USUAL_LOG_SPREAD) / _LOG_SPREAD_SD) ** 2
+        return float(penalty - exact_log_density(latent, outputs).sum())
+
+    found = minimize(cost, [gaussian - 0.5, _USUAL_LOG_SPREAD], method="Nelder-Mead", options={"xatol": 1e-4}).x
+    return ConstantNoise(inputs, outputs, ConstantParameters(float(found[0]), min(float(np.exp(found[1])), _WIDEST)))
+
+
+def _same_everywhere(parameters: ConstantParameters, variance: float, n: int) -> LatentPrediction:
+    spread = np.full(n, parameters.noise_spread**2)
+    return LatentPrediction(np.zeros(n), np.full(n, variance), np.full(n, parameters.noise_mean), spread)
