@@ -1,10 +1,11 @@
-"""The nearest boundary point of a single point, computed with floats instead of arrays.
+"""The nearest boundary point of a single point, and the point of a contact, in floats instead of arrays.
 
-The result equals that of Outline.project up to rounding, and is ten times faster than with an array of one row.
+The results equal those of Outline up to rounding, and are ten times faster than with an array of one row.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 from math import atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 from typing import TypeAlias
@@ -15,6 +16,8 @@ from push_predictor.geometry.outline import NEWTON_STEPS, PARAMETER_TOLERANCE, O
 
 # From x, y in m to: x, y of the nearest point, x, y of its outward normal, signed distance in m (negative inside).
 Nearest: TypeAlias = Callable[[float, float], tuple[float, float, float, float, float]]
+# From a contact to: x, y of its point in m, x, y of the inward normal there.
+ContactAt: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 
 
 def nearest_on(outline: Outline) -> Nearest:
@@ -76,3 +79,38 @@ def _parameter(a: float, b: float, x: float, y: float) -> float:
         if abs(t - before) < PARAMETER_TOLERANCE:
             break
     return t
+
+
+def contact_on(outline: Outline) -> ContactAt:
+    """The function from a contact to its point and inward normal, in the body frame."""
+    if outline.semi_axes is not None:
+        return _contact_on_ellipse(outline, *outline.semi_axes)
+    starts = outline.edge_starts.tolist()
+    ends = np.roll(outline.vertices, -1, axis=0)
+    along = ends - outline.vertices
+    inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+    edges = [tuple(row) for row in np.column_stack([outline.vertices, along, inward]).tolist()]
+
+    def at(contact: float) -> tuple[float, float, float, float]:
+        k = min(max(bisect_right(starts, contact) - 1, 0), len(edges) - 1)
+        share = (contact - starts[k]) / (starts[k + 1] - starts[k])
+        share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+        x, y, along_x, along_y, nx, ny = edges[k]
+        return x + share * along_x, y + share * along_y, nx, ny
+
+    return at
+
+
+def _contact_on_ellipse(outline: Outline, a: float, b: float) -> ContactAt:
+    lengths, parameters = outline.curve_table
+    arc, table, perimeter = lengths.tolist(), parameters.tolist(), outline.perimeter
+
+    def at(contact: float) -> tuple[float, float, float, float]:
+        place = min(max(contact * perimeter, 0.0), arc[-1])
+        k = min(bisect_right(arc, place) - 1, len(arc) - 2)
+        t = table[k] + (place - arc[k]) * (table[k + 1] - table[k]) / (arc[k + 1] - arc[k])
+        c, s = cos(t), sin(t)
+        size = hypot(b * c, a * s)
+        return a * c, b * s, -b * c / size, -a * s / size
+
+    return at

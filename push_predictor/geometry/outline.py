@@ -196,6 +196,11 @@ class Outline:
         first = np.arctan2(self.vertices[0, 1] / b, self.vertices[0, 0] / a)
         return np.asarray(first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
 
+    @property
+    def curve_table(self) -> tuple[Array, Array]:
+        """Lengths along a smooth outline's curve in m, and the curve's parameters there, both increasing."""
+        return self._arc, self._table
+
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
         return np.stack([a * np.cos(parameter), b * np.sin(parameter)], axis=-1)

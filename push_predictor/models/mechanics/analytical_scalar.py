@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
 from math import cos, inf, isfinite, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
 
-from push_predictor.geometry.nearest import Nearest, nearest_on
+from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.quasi_static import ABSOLUTE_TOLERANCE, LONGEST_STEP, RELATIVE_TOLERANCE, TOUCHING
 from push_predictor.types import Array
 
-Start: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 Pose: TypeAlias = tuple[float, float, float]
 Rates: TypeAlias = tuple[float, float, float, float, bool]  # of x, y, heading per metre; the gap, m; is it closing?
 Rate: TypeAlias = Callable[[float, float, float, float], Rates]  # at a pose (x, y, heading) and a distance travelled
@@ -36,7 +34,7 @@ class ScalarAnalyticalPush(AnalyticalPush):
     """
 
     nearest: Nearest = field(kw_only=True)
-    start: Start = field(kw_only=True)
+    start: ContactAt = field(kw_only=True)
 
     def displacement(self, inputs: Array, duration: Array) -> Array:
         """See AnalyticalPush."""
@@ -60,20 +58,13 @@ class ScalarAnalyticalPush(AnalyticalPush):
 def scalar_analytical(physics: AnalyticalPush) -> ScalarAnalyticalPush:
     """The same model, prepared for single pushes."""
     outline = physics.outline
-
-    @lru_cache(maxsize=FEW)  # a response evaluates one push several times
-    def start(contact: float) -> tuple[float, float, float, float]:
-        at = np.array([contact])
-        (x, y), (nx, ny) = outline.point(at)[0].tolist(), outline.inward_normal(at)[0].tolist()
-        return x, y, nx, ny
-
     return ScalarAnalyticalPush(
         outline,
         physics.pusher_radius,
         physics.contact_friction,
         physics.support,
         nearest=nearest_on(outline),
-        start=start,
+        start=contact_on(outline),
     )
 
 

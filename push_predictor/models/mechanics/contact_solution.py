@@ -10,7 +10,7 @@ import numpy as np
 from push_predictor.types import Array, IntArray
 
 ROOT_STEPS = 40
-ROOT_TOLERANCE = 1e-6  # rad
+ROOT_TOLERANCE = 1e-5  # rad
 BISECT_EVERY = 6  # steps: next to a flat or an edge of the limit surface, secants converge slowly
 
 # From a load's force (x, y) and its moment over length, (n,) each, to a twist (vx, vy, w times length) up to a factor.

@@ -66,14 +66,15 @@ class PushMechanics:
             return np.zeros((0, 3))
         rows = RowValues(values, len(inputs), covariates or {})
         push = true_push(self.outline, self.pusher_radius, rows, inputs, np.asarray(duration, dtype=np.float64))
-        return _Motion(self, self._surfaces(rows), rows, push).displacement()
+        return _Motion(self, self.surfaces(rows), rows, push).displacement()
 
     def _known(self, key: str, support: PressureDistribution) -> LoadMap:
         if key not in self._tables:
             self._tables[key] = load_map(support)
         return self._tables[key]
 
-    def _surfaces(self, values: RowValues) -> PushSurfaces:
+    def surfaces(self, values: RowValues) -> PushSurfaces:
+        """Limit surfaces of pushes with these values; tabulates what is not tabulated yet."""
         n = values.n
         if isinstance(self.support, PowerSurface):
             return SameSurface(self.support, n)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.scalar_mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.without_effects import WithoutEffects
@@ -75,5 +76,5 @@ class MechanicsPredictor(WithoutEffects):
         return self
 
     def with_scalar_mechanics(self) -> MechanicsPredictor:
-        """See Predictor: itself."""
-        return self
+        """See Predictor."""
+        return replace(self, fitted=scalar_mechanics(self.fitted))

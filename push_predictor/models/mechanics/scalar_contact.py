@@ -1,0 +1,81 @@
+"""One contact in plain numbers: the same mathematics as contact_solution, with a start from the last contact."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from push_predictor.models.mechanics.contact_solution import BISECT_EVERY, ROOT_STEPS, ROOT_TOLERANCE
+from push_predictor.models.mechanics.scalar_surface import Three, Twist
+
+
+class ScalarTouch(NamedTuple):
+    """One contact; see Touch."""
+
+    normal_x: float
+    normal_y: float
+    normal_arm: float
+    left_arm: float
+    along: float
+    across: float
+
+
+class LastContact:
+    """Where the force lay in the friction cone at the last contact, from 0 at its right edge to 1 at its left.
+
+    slope: change of that share over the change of the lag, 0 if unknown.
+    """
+
+    def __init__(self) -> None:
+        self.share, self.slope = 0.5, 0.0
+
+
+_AT_REST = 0.0, 0.0, 0.0
+
+
+def driven_scalar(twist: Twist, touch: ScalarTouch, left: float, right: float, last: LastContact) -> Three:
+    """Velocity of the centre of friction and spin times length, with friction `left` and `right` of the normal."""
+    nx, ny, normal_arm, left_arm, along, across = touch
+    if along <= 0.0:
+        return _AT_REST
+    a, b = 1.0 / sqrt(1.0 + right * right), 1.0 / sqrt(1.0 + left * left)
+    push_right, push_change, rub_right, rub_change = a, b - a, -right * a, left * b + right * a
+
+    def under(share: float) -> tuple[float, float, float, float, float]:
+        """Twist, velocity towards the normal, and lag, of a force in the cone."""
+        push, rub = push_right + share * push_change, rub_right + share * rub_change
+        vx, vy, spin = twist(push * nx - rub * ny, push * ny + rub * nx, push * normal_arm + rub * left_arm)
+        toward = vx * nx + vy * ny + spin * normal_arm
+        sideways = vy * nx - vx * ny + spin * left_arm
+        return vx, vy, spin, toward, (toward if toward > 0.0 else 0.0) * across - sideways * along
+
+    low, high, known_low, known_high = 0.0, 1.0, False, False
+    share, before, lag_before = last.share, -1.0, 0.0
+    for step in range(1, ROOT_STEPS + 1):
+        vx, vy, spin, toward, lag = under(share)
+        if (
+            abs(lag) <= ROOT_TOLERANCE * toward
+            or high - low <= ROOT_TOLERANCE
+            or (share == 1.0 and lag > 0.0)
+            or (share == 0.0 and lag < 0.0)
+        ):
+            break
+        if lag > 0.0:
+            low, known_low = share, True
+        else:
+            high, known_high = share, True
+        if before >= 0.0 and lag != lag_before:
+            last.slope = (share - before) / (lag - lag_before)
+        before, lag_before = share, lag
+        share -= lag * last.slope if last.slope < 0.0 else (-1.0 if lag > 0.0 else 1.0)
+        if share >= high and not known_high:
+            share = 1.0
+        elif share <= low and not known_low:
+            share = 0.0
+        elif not low < share < high or step % BISECT_EVERY == 0:
+            share = 0.5 * (low + high)
+    last.share = share
+    if toward <= 0.0:
+        return _AT_REST
+    size = along / toward
+    return vx * size, vy * size, spin * size

@@ -1,0 +1,172 @@
+"""Limit surfaces in plain numbers: the same mathematics as load_map, surfaces and loaded_surface, for single pushes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, pi, sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from push_predictor.models.mechanics.load_map import AZIMUTHS, ELEVATIONS
+from push_predictor.models.mechanics.loaded_surface import COS, MOST_STRETCH, PULL_ROUNDS, SIN, SMALLEST_MARGIN
+from push_predictor.models.mechanics.support_surfaces import PushSurfaces, RowSurfaces, SameSurface
+from push_predictor.types import Array
+
+Three: TypeAlias = tuple[float, float, float]
+Twist: TypeAlias = Callable[[float, float, float], Three]  # of a load (force x, y, moment over length)
+Gauge: TypeAlias = Callable[[float, float, float], float]
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarSurface:
+    """One limit surface: see LimitSurface."""
+
+    centre: tuple[float, float]
+    length: float
+    square: Three
+    reach: Array
+    twist: Twist
+    gauge: Gauge
+
+
+class Stretch(NamedTuple):
+    """The root of the direction-dependent friction: see loaded_surface."""
+
+    xx: float
+    xy: float
+    yy: float
+    turn: float
+
+
+def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
+    """The surface of the first push."""
+    of_rows = surfaces.of_rows
+    if isinstance(surfaces, RowSurfaces):
+        twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
+    elif isinstance(surfaces, SameSurface):
+        twist, gauge = _of_arrays(surfaces)
+    else:
+        raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
+    x, y = of_rows.centre[0].tolist()
+    xx, xy, yy = of_rows.square[0].tolist()
+    return ScalarSurface((x, y), float(of_rows.length[0]), (xx, xy, yy), of_rows.reach[0], twist, gauge)
+
+
+def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
+    """See loaded_surface."""
+    factor = min(1.0, MOST_STRETCH / max(sqrt(a * a + b * b), MOST_STRETCH))
+    a, b = a * factor, b * factor
+    determinant = sqrt(1.0 - a * a - b * b)
+    trace = sqrt(2.0 + 2.0 * determinant)
+    turn = determinant / float(reach @ np.sqrt(1.0 + a * COS + b * SIN))
+    return Stretch((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)
+
+
+def loaded(surface: ScalarSurface, stretch: Stretch | None, pull: Three | None, height: float) -> Twist:
+    """The twist of the surface under a pusher's load; see LoadedSurface."""
+    if stretch is None and pull is None and height == 0.0:
+        return surface.twist
+    xx, xy, yy, turn = stretch or Stretch(1.0, 0.0, 1.0, 1.0)
+    if pull is not None:
+        pull = xx * pull[0] + xy * pull[1], xy * pull[0] + yy * pull[1], turn * pull[2]
+
+    def twist(force_x: float, force_y: float, moment: float) -> Three:
+        load = xx * force_x + xy * force_y, xy * force_x + yy * force_y, turn * moment
+        factor = 0.0
+        if pull is not None:
+            factor, load = _with_pull(surface.gauge, load, pull)
+        elif height:
+            factor = 1.0 / surface.gauge(*load)
+        vx, vy, spin = surface.twist(*load)
+        vx, vy, spin = xx * vx + xy * vy, xy * vx + yy * vy, turn * spin
+        shift = height * factor * spin / surface.length
+        return vx + shift * force_y, vy - shift * force_x, spin
+
+    return twist
+
+
+def _with_pull(gauge: Gauge, pusher: Three, pull: Three) -> tuple[float, Three]:
+    x, y, m = pusher
+    gx, gy, gm = pull
+    given = sqrt(x * x + y * y + m * m)
+    x, y, m = x / given, y / given, m / given
+    dot, square, radius = x * gx + y * gy + m * gm, gx * gx + gy * gy + gm * gm, 1.0
+    for _ in range(PULL_ROUNDS):
+        share = -dot + sqrt(max(dot * dot + radius * radius - square, SMALLEST_MARGIN))
+        lx, ly, lm = share * x + gx, share * y + gy, share * m + gm
+        radius = sqrt(lx * lx + ly * ly + lm * lm) / gauge(lx, ly, lm)
+    return share / given, (given * lx, given * ly, given * lm)
+
+
+def _cells(surfaces: RowSurfaces, tables: Array) -> list[tuple[float, ...]]:
+    """The first push's table, blended; a tuple of coefficients per cell."""
+    count, share = surfaces.per_table, float(surfaces.share[0])
+    low, high = (tables[:, int(k[0]) * count : (int(k[0]) + 1) * count] for k in (surfaces.low, surfaces.high))
+    return [tuple(cell) for cell in ((1.0 - share) * low + share * high).T.tolist()]
+
+
+def _of_cells(cells: list[tuple[float, ...]]) -> Twist:
+    per_turn, per_rise = AZIMUTHS / (2.0 * pi), (ELEVATIONS - 1) / (0.5 * pi)
+    last_column, last_row = AZIMUTHS - 1, ELEVATIONS - 2
+
+    def twist(x: float, y: float, m: float) -> Three:
+        sign = 1.0
+        if m < 0.0:
+            sign, x, y, m = -1.0, -x, -y, -m
+        force = x * x + y * y
+        turn, rise = atan2(y, x) * per_turn, atan2(m, sqrt(force)) * per_rise
+        if turn < 0.0:
+            turn += AZIMUTHS
+        column, row = int(turn), int(rise)
+        if column > last_column:
+            column = last_column
+        if row > last_row:
+            row = last_row
+        a, b, c, ar, br, cr, au, bu, cu, ab, bb, cb = cells[row * AZIMUTHS + column]
+        right, up, size = turn - column, rise - row, sign * sqrt(force + m * m)
+        both = right * up
+        return (
+            size * (a + right * ar + up * au + both * ab),
+            size * (b + right * br + up * bu + both * bb),
+            size * (c + right * cr + up * cu + both * cb),
+        )
+
+    return twist
+
+
+def _gauge_of_cells(cells: list[tuple[float, ...]]) -> Gauge:
+    per_turn, per_rise = AZIMUTHS / (2.0 * pi), (ELEVATIONS - 1) / (0.5 * pi)
+
+    def gauge(x: float, y: float, m: float) -> float:
+        if m < 0.0:
+            x, y, m = -x, -y, -m
+        force = x * x + y * y
+        turn, rise = atan2(y, x) * per_turn, atan2(m, sqrt(force)) * per_rise
+        turn += AZIMUTHS * (turn < 0.0)
+        column, row = min(int(turn), AZIMUTHS - 1), min(int(rise), ELEVATIONS - 2)
+        low, along, above, across = cells[row * AZIMUTHS + column]
+        right, up = turn - column, rise - row
+        return sqrt(force + m * m) / (low + right * along + up * above + right * up * across)
+
+    return gauge
+
+
+def _of_arrays(surfaces: SameSurface) -> tuple[Twist, Gauge]:
+    surface = surfaces.surface
+
+    def ellipsoid(x: float, y: float, m: float) -> Three:
+        return x, y, m
+
+    def size(x: float, y: float, m: float) -> float:
+        return sqrt(x * x + y * y + m * m)
+
+    def twist(x: float, y: float, m: float) -> Three:
+        vx, vy, spin = surface.twist(*(np.array([part]) for part in (x, y, m)))
+        return float(vx[0]), float(vy[0]), float(spin[0])
+
+    def gauge(x: float, y: float, m: float) -> float:
+        return float(surface.gauge(*(np.array([part]) for part in (x, y, m)))[0])
+
+    return (ellipsoid, size) if surface.power == 2.0 else (twist, gauge)

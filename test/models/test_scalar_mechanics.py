@@ -1,0 +1,130 @@
+"""Single pushes of fitted mechanics in plain numbers equal those computed as arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from supports import FOUR_POINTS, THREE_POINTS
+
+from push_predictor.geometry.nearest import contact_on
+from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.models.mechanics.scalar_mechanics import FEW, scalar_mechanics
+from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.types import Array
+
+SQUARE = shape_outline("rect1")
+SUPPORTS = {
+    "patch": PushMechanics(SQUARE, 0.00475),
+    "three": PushMechanics(SQUARE, 0.00475, THREE_POINTS),
+    "ellipse": PushMechanics(shape_outline("ellip3"), 0.00475),
+    "power": PushMechanics(SQUARE, 0.00475, PowerSurface(np.array([0.002, 0.0]), 0.03, 2.5)),
+    "ellipsoid": PushMechanics(SQUARE, 0.0, PowerSurface(np.zeros(2), 0.03)),
+    "recordings": PushMechanics(SQUARE, 0.00475, None, {1: THREE_POINTS, 2: FOUR_POINTS}),
+}
+IN_METRES = np.array([1.0, 1.0, 0.034])
+
+
+def pushes(n: int, seed: int = 0) -> tuple[Array, Array, dict[str, Array]]:
+    """Short and long pushes at all angles; some slide off."""
+    draw = np.random.default_rng(seed)
+    inputs = np.column_stack([draw.uniform(0.0, 0.1, n), draw.random(n), draw.uniform(-1.4, 1.4, n)])
+    covariates = {"push_heading": draw.uniform(-3.0, 3.0, n), "recording": draw.integers(0, 3, n).astype(float)}
+    return inputs, draw.uniform(0.01, 0.4, n), covariates
+
+
+def one_by_one(fitted: FittedMechanics, inputs: Array, duration: Array, covariates: dict[str, Array]) -> Array:
+    rows = [slice(k, k + 1) for k in range(len(inputs))]
+    return np.concatenate([
+        fitted.displacement(inputs[k], duration[k], {name: column[k] for name, column in covariates.items()})
+        for k in rows
+    ])  # fmt: skip
+
+
+def assert_same(fitted: FittedMechanics, n: int = 12, seed: int = 0) -> None:
+    given = pushes(n, seed)
+    alone, together = one_by_one(scalar_mechanics(fitted), *given), fitted.displacement(*given)
+    assert alone * IN_METRES == pytest.approx(together * IN_METRES, rel=2e-5, abs=2e-7)
+
+
+def computed_as_arrays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Numbers of pushes of the calls that were computed as arrays."""
+    calls: list[int] = []
+    plain = FittedMechanics.displacement
+
+    def counted(self, inputs, duration, covariates=None):  # type: ignore[no-untyped-def]
+        calls.append(len(inputs))
+        return plain(self, inputs, duration, covariates)
+
+    monkeypatch.setattr(FittedMechanics, "displacement", counted)
+    return calls
+
+
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_single_push_equals_the_same_push_in_a_batch(name: str) -> None:
+    assert_same(FittedMechanics(SUPPORTS[name], {"contact_friction": 0.25}), n=20)
+
+
+@pytest.mark.parametrize("name", [p.name for p in PARAMETERS if p.name not in ("inertia", "rim_exponent")])
+def test_every_parameter_has_the_same_effect(name: str) -> None:
+    parameter = BY_NAME[name]
+    assert_same(FittedMechanics(SUPPORTS["three"], {name: 0.3 * parameter.high}), seed=1)
+
+
+@pytest.mark.parametrize("exponent", [-0.3, 0.5, 0.8])
+def test_rim_exponent_has_the_same_effect(exponent: float) -> None:
+    assert_same(FittedMechanics(SUPPORTS["patch"], {"rim_exponent": exponent}), seed=2)
+
+
+def test_all_parameters_together_have_the_same_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    values = {p.name: p.textbook + p.spread for p in PARAMETERS if p.name != "inertia"}
+    assert_same(FittedMechanics(SUPPORTS["ellipse"], values), seed=3)
+    calls, given = computed_as_arrays(monkeypatch), pushes(3)
+    scalar_mechanics(FittedMechanics(SUPPORTS["ellipse"], values)).displacement(*given)
+    assert not calls
+
+
+def test_strong_friction_that_depends_on_direction_has_the_same_effect() -> None:
+    values = {"body_anisotropy": 0.7, "grain_diagonal": -0.6, "slope_x": 0.4, "pushing_height": 0.01}
+    assert_same(FittedMechanics(SUPPORTS["patch"], values), seed=4)
+
+
+@pytest.mark.parametrize("count", [0, 2, FEW, FEW + 1])
+def test_few_pushes_equal_many_pushes(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted, given = FittedMechanics(SUPPORTS["three"], {"contact_friction": 0.2}), pushes(count)
+    expected = fitted.displacement(*given)
+    calls = computed_as_arrays(monkeypatch)
+    found = scalar_mechanics(fitted).displacement(*given)
+    assert found * IN_METRES == pytest.approx(expected * IN_METRES, rel=2e-5, abs=2e-7)
+    assert found.shape == (count, 3)
+    assert calls == ([count] if count in (0, FEW + 1) else [])
+
+
+def test_inertia_is_computed_as_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted, given = FittedMechanics(SUPPORTS["three"], {"inertia": 0.3}), pushes(2)
+    calls = computed_as_arrays(monkeypatch)
+    assert np.array_equal(scalar_mechanics(fitted).displacement(*given), fitted.displacement(*given))
+    assert calls == [2, 2]
+
+
+def test_demands_the_covariate_that_a_parameter_needs() -> None:
+    inputs, duration, _ = pushes(1)
+    with pytest.raises(KeyError, match="push_heading"):
+        scalar_mechanics(FittedMechanics(SUPPORTS["three"], {"slope_x": 0.1})).displacement(inputs, duration)
+
+
+def test_no_travel_and_a_receding_pusher_move_nothing() -> None:
+    still = scalar_mechanics(FittedMechanics(SUPPORTS["three"]))
+    inputs = np.array([[0.0, 0.1, 0.2], [0.02, 0.1, 2.0]])
+    assert not np.any(still.displacement(inputs, np.array([0.2, 0.2])))
+
+
+@pytest.mark.parametrize("shape", ["rect1", "hex", "ellip3", "ellip1"])
+def test_point_and_normal_of_a_contact_are_those_of_the_outline(shape: str) -> None:
+    outline = shape_outline(shape)
+    contacts = np.concatenate([np.random.default_rng(0).random(50), outline.edge_starts[:-1], [np.nextafter(1.0, 0.0)]])
+    found = np.array([contact_on(outline)(c) for c in contacts.tolist()])
+    expected = np.column_stack([outline.point(contacts), outline.inward_normal(contacts)])
+    assert found == pytest.approx(expected, abs=1e-12)
