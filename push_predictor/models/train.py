@@ -34,7 +34,7 @@ from push_predictor.types import Array, IntArray
 
 DEFAULT_ROWS = 1000
 MOST_FITTED_ROWS = 4000  # of fitted mechanics, unless n_train is given
-MOST_SEARCHED_ROWS = 1200  # by the ladder of fitted mechanics
+MOST_SEARCHED_ROWS = 800  # by the ladder of fitted mechanics
 MOST_MEAN_ROWS = 500  # to which the mechanics of a learnt model are fitted
 FEWEST_ROWS = 10
 MOST_DENSE_ROWS = 2000  # a dense VHGP takes 46 CPU s and 240 MB; with twice the rows eight and four times as much

@@ -1,4 +1,4 @@
-"""Joint fit of the forward model's parameters, and how well a choice of them predicts held-out pushes."""
+"""Joint fit of the forward model's parameters."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ import numpy as np
 from push_predictor.errors import TrainingError
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
 DEGREES = 4.0  # of freedom of Student's t: single windows that slip or hit a corner must not decide
 MOST_STEPS = 12
-CONVERGED = 0.01  # prior standard deviations
+CONVERGED = 0.02  # nats: a step that gains less is the last
+NEARLY_CONVERGED = 0.5  # the same while parameters are chosen
 LONG_STEP = 0.5  # prior standard deviations
 DIFFERENCE = 0.05  # prior standard deviations
-FOLDS = 10
 SHORTENINGS = 6
+ROWS_AT_ONCE = 20000  # of the forward model, which takes little longer for ten times as many rows
+SLOW = ("inertia", "pushing_height")  # with them the forward model takes much longer: not together with others
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +66,22 @@ class JointFit:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (p, p) of the values from push to push: the sandwich estimate, small-sample corrected."""
-        weight = _weights(self.residuals / self.scale) / self.scale**2
-        curvature = _curvature(self.jacobian, weight, self.names)
-        slopes = np.einsum("nkp,nk,nk->np", self.jacobian, weight, self.residuals)
-        of_push = np.zeros((self.rows.pushes, len(self.names)))
-        np.add.at(of_push, self.rows.push, slopes)
-        spread = of_push.T @ of_push * (self.rows.pushes / max(self.rows.pushes - len(self.names), 1))
-        bread = np.linalg.inv(curvature)
-        return np.asarray(bread @ spread @ bread)
+        """Covariance (p, p) of the values from push to push: the jackknife over pushes, each a Gauss-Newton step.
+
+        Few pushes decide on some parameters, such as friction, which only those show that slip. The sandwich estimate
+        is then too small, because the residuals of these pushes have shrunk.
+        """
+        scaled = self.residuals / self.scale
+        weight, bend = student_weights(scaled) / self.scale**2, student_curvature(scaled) / self.scale**2
+        curvature = _curvature(self.jacobian, bend, self.names)
+        change = np.zeros((self.rows.pushes, len(self.names)))
+        for push in range(self.rows.pushes):
+            of_push = self.rows.push == push
+            jacobian = self.jacobian[of_push]
+            slope = np.einsum("nkp,nk,nk->p", jacobian, weight[of_push], self.residuals[of_push])
+            without = curvature - np.einsum("nkp,nk,nkq->pq", jacobian, bend[of_push], jacobian)
+            change[push] = np.linalg.solve(without, slope)
+        return np.asarray(change.T @ change * (1.0 - 1.0 / self.rows.pushes))
 
     @property
     def effective_parameters(self) -> float:
@@ -100,10 +109,13 @@ def fit_jointly(
 
 
 def refit(mechanics: PushMechanics, fit: JointFit, names: Sequence[str]) -> JointFit:
-    """Fit some of the parameters of `fit`, and no others, from its values and derivatives."""
+    """Fit some of the parameters of `fit`, and no others, from its values and derivatives, to NEARLY_CONVERGED."""
     columns = [fit.names.index(name) for name in names]
     problem = _Problem(mechanics, fit.rows, tuple(names))
-    return problem.solved(np.array([fit.values[n] for n in names]), fit.residuals, fit.jacobian[:, :, columns])
+    values = np.array([fit.values[name] for name in names])
+    same = all(fit.values[name] == BY_NAME[name].textbook for name in fit.names if name not in names)
+    residuals = fit.residuals if same else problem.residuals(values)
+    return problem.solved(values, residuals, fit.jacobian[:, :, columns], NEARLY_CONVERGED)
 
 
 def with_candidates(mechanics: PushMechanics, fit: JointFit, candidates: Sequence[str]) -> JointFit:
@@ -122,62 +134,37 @@ def with_candidates(mechanics: PushMechanics, fit: JointFit, candidates: Sequenc
     )
 
 
-def held_out_scores(fit: JointFit, names: Sequence[str]) -> Array:
-    """Score (pushes,) of each push under the parameters fitted without its fold: negative log of Student's t.
-
-    Up to a constant. Each fold's fit is one Gauss-Newton step from the joint one, the scale that of `fit`.
-    """
-    columns = [fit.names.index(name) for name in names]
-    jacobian, push = fit.jacobian[:, :, columns], fit.rows.push
-    fold = np.random.default_rng(0).permutation(fit.rows.pushes) % min(FOLDS, fit.rows.pushes)
-    score = np.zeros(len(push))
-    values = np.array([fit.values[name] for name in names])
-    problem_step = _Step(tuple(names), fit.scale)
-    for k in range(int(fold.max()) + 1):
-        held = fold[push] == k
-        moved = problem_step.of(jacobian, fit.residuals, values, ~held) if names else np.zeros(0)
-        left = fit.residuals[held] - jacobian[held] @ moved
-        score[held] = _loss(left / fit.scale).sum(axis=1)
-    return np.bincount(push, score).astype(np.float64)
-
-
 def student_scale(residuals: Array) -> Array:
     """Scale (k,) of Student's t for residuals (n, k) about zero, by its maximum likelihood."""
     scale = np.sqrt(np.mean(residuals**2, axis=0)) + np.finfo(np.float64).tiny
     for _ in range(50):
-        scale = np.sqrt(np.mean(_weights(residuals / scale) * residuals**2, axis=0)) + np.finfo(np.float64).tiny
+        scale = np.sqrt(np.mean(student_weights(residuals / scale) * residuals**2, axis=0)) + np.finfo(np.float64).tiny
     return np.asarray(scale)
 
 
-def _weights(scaled: Array) -> Array:
+def student_weights(scaled: Array) -> Array:
+    """Weights with which residuals in units of their scale enter a least squares step."""
     return np.asarray((DEGREES + 1.0) / (DEGREES + scaled**2))
 
 
-def _loss(scaled: Array) -> Array:
+def student_curvature(scaled: Array) -> Array:
+    """Weights with the mean of the loss's second derivative, for each output: those of the least squares are larger.
+
+    A fit to other rows moves by a step with these. Single second derivatives can be negative, so all are in proportion.
+    """
+    weight = student_weights(scaled)
+    second = weight - 2.0 * (weight * scaled) ** 2 / (DEGREES + 1.0)
+    return np.asarray(weight * np.maximum(second.mean(axis=0) / weight.mean(axis=0), 0.1))
+
+
+def student_loss(scaled: Array) -> Array:
+    """Negative log density of residuals in units of their scale, up to a constant."""
     return np.asarray(0.5 * (DEGREES + 1.0) * np.log1p(scaled**2 / DEGREES))
 
 
 def _curvature(jacobian: Array, weight: Array, names: Sequence[str]) -> Array:
     prior = np.array([BY_NAME[name].spread for name in names]) ** -2.0
     return np.asarray(np.einsum("nkp,nk,nkq->pq", jacobian, weight, jacobian) + np.diag(prior))
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Gauss-Newton steps of the penalised, reweighted least squares."""
-
-    names: tuple[str, ...]
-    scale: Array
-
-    def of(self, jacobian: Array, residuals: Array, values: Array, used: BoolArray | None = None) -> Array:
-        """Change (p,) of the values; used (n,): rows that count."""
-        weight = _weights(residuals / self.scale) / self.scale**2
-        if used is not None:
-            weight = weight * used[:, None]
-        prior = np.array([BY_NAME[name].spread for name in self.names]) ** -2.0
-        textbook = np.array([BY_NAME[name].textbook for name in self.names])
-        slope = np.einsum("nkp,nk,nk->p", jacobian, weight, residuals) + prior * (textbook - values)
-        return np.asarray(np.linalg.solve(_curvature(jacobian, weight, self.names), slope))
 
 
 class _Problem:
@@ -200,29 +187,41 @@ class _Problem:
 
     def jacobian(self, values: Array, residuals: Array, only: Sequence[str] | None = None) -> Array:
         """Derivatives of the displacement by the parameters, (n, 3, p), by differences away from a bound."""
-        columns = []
-        for k, name in enumerate(self.names):
-            if only is None or name in only:
-                step = (
-                    DIFFERENCE
-                    * self.spread[k]
-                    * (-1.0 if values[k] + DIFFERENCE * self.spread[k] > self.high[k] else 1.0)
-                )
-                moved = values.copy()
-                moved[k] += step
-                columns.append((residuals - self.residuals(moved)) / step)
-        return np.stack(columns, axis=2) if columns else np.zeros((*residuals.shape, 0))
+        wanted = [k for k, name in enumerate(self.names) if only is None or name in only]
+        derivatives = np.zeros((*residuals.shape, len(self.names)))
+        step = DIFFERENCE * self.spread
+        step = np.where(values + step > self.high, -step, step)
+        most = max(1, ROWS_AT_ONCE // len(residuals))
+        for alone in (None, *SLOW):
+            group = [k for k in wanted if (self.names[k] if self.names[k] in SLOW else None) == alone]
+            for first in range(0, len(group), most):
+                part = group[first : first + most]
+                derivatives[:, :, part] = (residuals[:, :, None] - self._moved(values, step, part)) / step[part]
+        return derivatives[:, :, wanted]
 
-    def solved(self, values: Array, residuals: Array, jacobian: Array | None) -> JointFit:
+    def _moved(self, values: Array, step: Array, moved: Sequence[int]) -> Array:
+        """Residuals (n, 3, k) with one of the k parameters moved at a time, computed as one set of pushes."""
+        rows, n, count = self.rows, len(self.rows.duration), len(moved)
+        given: dict[str, float | Array] = dict(zip(self.names, values.tolist(), strict=True))
+        for turn, k in enumerate(moved):
+            column = np.full(n * count, values[k])
+            column[turn * n : (turn + 1) * n] += step[k]
+            given[self.names[k]] = column
+        inputs, duration = np.tile(rows.inputs, (count, 1)), np.tile(rows.duration, count)
+        covariates = {name: np.tile(column, count) for name, column in rows.covariates.items()}
+        found = self.mechanics.displacement(given, inputs, duration, covariates).reshape(count, n, 3)
+        return np.moveaxis(rows.outcomes - found, 0, 2)
+
+    def solved(self, values: Array, residuals: Array, jacobian: Array | None, enough: float = CONVERGED) -> JointFit:
         """The fit from a start. Derivatives are taken again after a long step, and at the end."""
-        scale, moved = student_scale(residuals), np.inf
+        scale = student_scale(residuals)
         for _ in range(MOST_STEPS if self.names else 0):
             if jacobian is None:
                 jacobian = self.jacobian(values, residuals)
-            stepped, residuals = self._stepped(values, residuals, scale, jacobian)
+            stepped, residuals, fall = self._stepped(values, residuals, scale, jacobian)
             moved = float(np.max(np.abs(stepped - values) / self.spread))
             values, scale = stepped, student_scale(residuals)
-            if moved < CONVERGED:
+            if fall < enough:
                 break
             if moved > LONG_STEP:
                 jacobian = None
@@ -230,18 +229,25 @@ class _Problem:
         named = dict(zip(self.names, values.tolist(), strict=True))
         return JointFit(self.rows, self.names, named, residuals, scale, jacobian)
 
-    def _stepped(self, values: Array, residuals: Array, scale: Array, jacobian: Array) -> tuple[Array, Array]:
-        """Values and residuals after a step, shortened until the objective falls; the same if none helps."""
-        change, before = (
-            _Step(self.names, scale).of(jacobian, residuals, values),
-            self._objective(values, residuals, scale),
-        )
+    def _stepped(self, values: Array, residuals: Array, scale: Array, jacobian: Array) -> tuple[Array, Array, float]:
+        """Values and residuals after a step, shortened until the objective falls, and its fall in nats."""
+        change = self._change(values, residuals, scale, jacobian)
+        before = self._objective(values, residuals, scale)
         for k in range(SHORTENINGS):
             trial = self.within(values + change * 0.4**k)
             after = self.residuals(trial)
-            if self._objective(trial, after, scale) < before:
-                return trial, after
-        return values, residuals
+            if (fall := before - self._objective(trial, after, scale)) > 0.0:
+                return trial, after, fall
+        return values, residuals, 0.0
+
+    def _change(self, values: Array, residuals: Array, scale: Array, jacobian: Array) -> Array:
+        """A Gauss-Newton step of the penalised, reweighted least squares, (p,)."""
+        weight = student_weights(residuals / scale) / scale**2
+        pull = self.spread**-2.0 * (self.textbook - values)
+        slope = np.einsum("nkp,nk,nk->p", jacobian, weight, residuals) + pull
+        return np.asarray(np.linalg.solve(_curvature(jacobian, weight, self.names), slope))
 
     def _objective(self, values: Array, residuals: Array, scale: Array) -> float:
-        return float(_loss(residuals / scale).sum() + 0.5 * np.sum(((values - self.textbook) / self.spread) ** 2))
+        return float(
+            student_loss(residuals / scale).sum() + 0.5 * np.sum(((values - self.textbook) / self.spread) ** 2)
+        )

@@ -2,103 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from push_predictor.models.mechanics.fit import FitRows, JointFit, fit_jointly, held_out_scores, refit, with_candidates
+from push_predictor.models.mechanics.fit import FitRows, JointFit, fit_jointly, refit, with_candidates
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.held_out import CrossValidation, held_out_scores
 from push_predictor.models.mechanics.parameters import PARAMETERS
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.types import Array
 
+MOST_STEPS = 20
 MOST_PARAMETERS = 12
-LEAST_GAIN = 0.1  # nats per push: less is not worth a parameter
-BEAM = 2  # ladders that are continued
+LEAST_GAIN = 0.1  # nats per push and parameter: less is not worth it
 FEWEST_PUSHES = 3  # of a cross-validation
 CLEARLY = 1.0  # standard errors from push to push: the one standard error rule
+REFITTED = 3  # changes with the largest expected gains that are refitted before one is chosen
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the set of free parameters, with the gain that is expected to first order."""
+
+    added: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
+    expected: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Rung:
-    """A step of the ladder: the parameter that it adds, None for the textbook, and the joint fit with it.
+    """A step of the ladder: the parameters that it adds and drops, and the joint fit after it. The first has neither.
 
-    gain, error: of the held-out score when it was chosen, nats over all pushes, and its standard error from push to
-    push. rivals: the next best parameters with their gains.
+    gain, error: of the held-out log density, nats over all pushes, and its standard error from push to push. rivals:
+    the next best changes.
     """
 
-    added: str | None
     fit: JointFit
+    added: tuple[str, ...] = ()
+    dropped: tuple[str, ...] = ()
     gain: float = 0.0
     error: float = 0.0
-    rivals: tuple[tuple[str, float], ...] = ()
+    rivals: tuple[Change, ...] = ()
 
 
 def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> list[Rung]:
     """The rungs of the ladder, from the textbook's parameters on.
 
-    Each step adds a parameter that improves the score of held-out pushes by more than one standard error of the gain
-    from push to push, and refits all of them together. Two parameters can mimic a third for some steps, so the BEAM
-    best ladders are continued at each step, and that with the best score wins. Candidates are all parameters whose
-    covariates the rows have, and that the support and the data can show.
+    Each step adds the parameter that improves the log density of held-out pushes most, if by more than one standard
+    error from push to push, and refits all of them together. Some parameters show only in pairs, and others mimic a
+    pair for a while. So where no single parameter helps, the step adds two, or takes one or two in place of one.
+    Candidates are all parameters whose covariates the rows have, and that the support and the data can show.
     """
-    first = [Rung(None, fit_jointly(mechanics, rows, ()))]
-    beam, ended = [first], [first]
-    while beam and len(beam[0]) <= MOST_PARAMETERS and rows.pushes >= FEWEST_PUSHES:
-        watch(f"fit mechanics: step {len(beam[0])}", min(0.8, 0.08 * len(beam[0])))
-        promising = [step for rungs in beam for step in _promising(mechanics, rungs)]
-        unlike = {
-            frozenset((*step.wide_names, step.added)): step for step in sorted(promising, key=_expected, reverse=True)
-        }
-        beam = [step.taken(mechanics) for step in sorted(unlike.values(), key=_expected)[:BEAM]]
-        ended += beam
-    return min(ended, key=_score)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """A parameter that a ladder may add. wide: the fit of its last rung with the derivatives of all candidates."""
-
-    rungs: list[Rung]
-    wide: JointFit
-    added: str
-    gain: float
-    error: float
-    rivals: tuple[tuple[str, float], ...]
-
-    @property
-    def wide_names(self) -> tuple[str, ...]:
-        """Names of the parameters that are free already."""
-        return self.rungs[-1].fit.names
-
-    def taken(self, mechanics: PushMechanics) -> list[Rung]:
-        """The ladder with the parameter, refitted."""
-        fit = refit(mechanics, self.wide, (*self.wide_names, self.added))
-        return [*self.rungs, Rung(self.added, fit, self.gain, self.error, self.rivals)]
-
-
-def _expected(step: _Step) -> float:
-    return _score(step.rungs) - step.gain
-
-
-def _promising(mechanics: PushMechanics, rungs: list[Rung]) -> list[_Step]:
-    """The BEAM best parameters that a ladder may add."""
-    fit = rungs[-1].fit
-    names = [name for name in candidates(mechanics, fit.rows) if name not in fit.names]
-    wide = with_candidates(mechanics, fit, names)
-    least = LEAST_GAIN * fit.rows.pushes
-    gains = [(name, g, e) for name, g, e in _gains(wide, fit.names, names) if g > max(CLEARLY * e, least)]
-    return [
-        _Step(rungs, wide, name, gain, error, tuple((rival, value) for rival, value, _ in gains if rival != name)[:3])
-        for name, gain, error in gains[:BEAM]
-    ]
-
-
-def _score(rungs: list[Rung]) -> float:
-    """Negative log density of held-out pushes under the last rung, nats up to a constant."""
-    fit = rungs[-1].fit
-    return float(held_out_scores(fit, fit.names).sum() + len(fit.rows.push) * np.log(fit.scale).sum())
+    rungs = [Rung(fit_jointly(mechanics, rows, ()))]
+    while len(rungs) <= MOST_STEPS and rows.pushes >= FEWEST_PUSHES:
+        watch(f"fit mechanics: step {len(rungs)}", min(0.8, 0.08 * len(rungs)))
+        found = _next(mechanics, rungs[-1].fit)
+        if found is None:
+            break
+        rungs.append(found)
+    return rungs
 
 
 def candidates(mechanics: PushMechanics, rows: FitRows) -> list[str]:
@@ -118,11 +83,58 @@ def _all_known(mechanics: PushMechanics, rows: FitRows) -> bool:
     return recording is not None and set(np.unique(recording).tolist()) <= set(mechanics.supports)
 
 
-def _gains(wide: JointFit, free: Sequence[str], names: Sequence[str]) -> list[tuple[str, float, float]]:
-    """Names with the gain of the held-out score and its standard error, best first."""
-    now = held_out_scores(wide, free)
-    gains = [(name, now - held_out_scores(wide, (*free, name))) for name in names]
-    return sorted(((name, float(gain.sum()), _error(gain)) for name, gain in gains), key=lambda g: -g[1])
+def _next(mechanics: PushMechanics, fit: JointFit) -> Rung | None:
+    """The next rung, None if no change of the free parameters helps."""
+    others = [name for name in candidates(mechanics, fit.rows) if name not in fit.names]
+    wide = with_candidates(mechanics, fit, others)
+    known = CrossValidation(wide)
+    now = known.scores(fit.names)
+    for changes in (_single(others), _exchanges(fit.names, others)):
+        ranked = [Change(c.added, c.dropped, float((now - known.scores(_after(fit, c))).sum())) for c in changes]
+        ranked = sorted((c for c in ranked if c.expected > _least(fit, c)), key=lambda c: -c.expected)
+        rungs = [_taken(mechanics, fit, wide, change, ranked) for change in ranked[:REFITTED]]
+        if good := [rung for rung in rungs if _accepted(fit, rung)]:
+            return max(good, key=lambda rung: rung.gain)
+    return None
+
+
+def _single(others: list[str]) -> Iterator[Change]:
+    return (Change((name,)) for name in others)
+
+
+def _exchanges(free: tuple[str, ...], others: list[str]) -> Iterator[Change]:
+    """Pairs to add, parameters to drop, and one or two in place of one."""
+    pairs = list(combinations(others, 2))
+    yield from (Change(pair) for pair in pairs)
+    for name in free:
+        yield Change((), (name,))
+        yield from (Change((other,), (name,)) for other in others)
+        yield from (Change(pair, (name,)) for pair in pairs)
+
+
+def _after(fit: JointFit, change: Change) -> tuple[str, ...]:
+    """Names of the free parameters after a change."""
+    return (*(name for name in fit.names if name not in change.dropped), *change.added)
+
+
+def _least(fit: JointFit, change: Change) -> float:
+    """The smallest gain that is worth a change, nats."""
+    return LEAST_GAIN * fit.rows.pushes * max(len(change.added) - len(change.dropped), 0.5)
+
+
+def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
+    """The rung with a change, refitted."""
+    after = refit(mechanics, wide, _after(fit, change))
+    gain = held_out_scores(fit) - held_out_scores(after)
+    rivals = tuple(rival for rival in ranked if rival is not change)[:3]
+    return Rung(after, change.added, change.dropped, float(gain.sum()), _error(gain), rivals)
+
+
+def _accepted(fit: JointFit, rung: Rung) -> bool:
+    more = len(rung.fit.names) > len(fit.names)
+    least = _least(fit, Change(rung.added, rung.dropped))
+    clear = CLEARLY * rung.error if more else 0.0
+    return len(rung.fit.names) <= MOST_PARAMETERS and rung.gain > max(least, clear)
 
 
 def _error(gain: Array) -> float:

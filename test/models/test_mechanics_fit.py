@@ -1,0 +1,113 @@
+"""The joint fit of the mechanics' parameters and the ladder that chooses them, on simulated outcomes with noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import square_rig
+
+from push_predictor.errors import TrainingError
+from push_predictor.models.mechanics.fit import FitRows, fit_jointly
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.held_out import CrossValidation
+from push_predictor.models.mechanics.ladder import candidates, climb
+from push_predictor.models.mechanics.limit_surface import uniform_support
+from push_predictor.models.mechanics.surfaces import PowerSurface
+
+NOISE = np.array([3e-5, 3e-5, 1e-3])
+TRUE = {"contact_friction": 0.15, "centre_y": 0.006}
+
+
+def ellipsoidal_mechanics() -> PushMechanics:
+    rig = square_rig()
+    support = uniform_support(rig.outline)
+    return PushMechanics(rig.outline, rig.pusher_radius, PowerSurface(np.array(support.centre), support.length))
+
+
+def simulated(values: dict[str, float], n: int = 90, seed: int = 0, noise: float = 1.0) -> FitRows:
+    """Windows of 0.2 s, three alike per push, each push with a disturbance of its own in addition to the windows'."""
+    rng, push = np.random.default_rng(seed), np.arange(n) // 3
+    inputs = np.column_stack([np.full(n // 3, 0.02), rng.random(n // 3), rng.uniform(-1.0, 1.0, n // 3)])[push]
+    duration = np.full(n, 0.2)
+    outcomes = ellipsoidal_mechanics().displacement(values, inputs, duration)
+    disturbed = rng.standard_normal((n, 3)) + rng.standard_normal((n // 3, 3))[push]
+    return FitRows(inputs, duration, outcomes + noise * NOISE * disturbed, push)
+
+
+def test_fit_recovers_parameters_within_their_intervals() -> None:
+    fit = fit_jointly(ellipsoidal_mechanics(), simulated(TRUE), tuple(TRUE))
+    error = np.sqrt(np.diag(fit.covariance))
+    found = np.array(list(fit.values.values()))
+    assert np.all(np.abs(found - list(TRUE.values())) < 3.0 * error)
+    assert np.all(error < [0.02, 5e-4]) and np.all(error > [1e-3, 2e-5])
+
+
+def test_intervals_cover_the_true_value_as_often_as_they_state() -> None:
+    deviation = []
+    for seed in range(12):
+        fit = fit_jointly(ellipsoidal_mechanics(), simulated(TRUE, n=60, seed=seed), ("centre_y",))
+        deviation.append((fit.values["centre_y"] - TRUE["centre_y"]) / np.sqrt(fit.covariance[0, 0]))
+    assert 0.7 < np.std(deviation) < 1.4
+
+
+def test_interval_grows_with_the_noise_shared_by_a_push() -> None:
+    rows = simulated(TRUE)
+    shared = fit_jointly(ellipsoidal_mechanics(), rows, ("contact_friction",))
+    alone = replace(shared, rows=replace(rows, push=np.arange(len(rows.push))))
+    assert shared.covariance[0, 0] > 1.2 * alone.covariance[0, 0]
+
+
+def test_ladder_finds_the_parameters_that_differ_from_the_textbook() -> None:
+    ladder = climb(ellipsoidal_mechanics(), simulated(TRUE))
+    assert set(ladder[-1].fit.names) == set(TRUE)
+    assert [len(rung.fit.names) for rung in ladder] == [0, 1, 2]
+    assert all(rung.gain > rung.error > 0.0 for rung in ladder[1:])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ladder_adds_nothing_to_textbook_outcomes_with_noise(seed: int) -> None:
+    ladder = climb(ellipsoidal_mechanics(), simulated({}, seed=seed))
+    assert [rung.fit.names for rung in ladder] == [()]
+
+
+def test_dropping_a_parameter_of_the_fit_predicts_as_the_fit_without_it() -> None:
+    rows = simulated({"contact_friction": 0.3, "centre_y": 0.001})
+    wide = fit_jointly(ellipsoidal_mechanics(), rows, ("contact_friction", "centre_y"))
+    alone = fit_jointly(ellipsoidal_mechanics(), rows, ("contact_friction",))
+    dropped, never = (CrossValidation(fit).residuals(("contact_friction",)) for fit in (wide, alone))
+    np.testing.assert_allclose(dropped / NOISE, never / NOISE, atol=0.5)
+    kept = CrossValidation(wide).residuals(wide.names)
+    assert np.abs(kept - never).max(axis=0)[2] > NOISE[2]
+
+
+def test_held_out_residuals_are_larger_than_those_of_the_fit() -> None:
+    rows = simulated({}, n=30)
+    fit = fit_jointly(ellipsoidal_mechanics(), rows, ("contact_friction", "centre_x", "centre_y", "tracker_rotation"))
+    held = CrossValidation(fit).residuals(fit.names)
+    assert np.mean((held / fit.scale) ** 2) > 1.05 * np.mean((fit.residuals / fit.scale) ** 2)
+
+
+def test_candidates_are_those_that_the_rows_can_show() -> None:
+    rows, mechanics = simulated({}), ellipsoidal_mechanics()
+    names = candidates(mechanics, rows)
+    assert not {"grain_x", "inertia", "clock_delay", "rim_exponent"} & set(names)
+    headed = replace(rows, covariates={"push_heading": np.zeros(len(rows.push))})
+    assert "grain_x" in candidates(mechanics, headed)
+    faster = replace(rows, inputs=rows.inputs * [1.0 + np.arange(len(rows.push))[0], 1.0, 1.0])
+    faster.inputs[0, 0] *= 2.0
+    assert {"inertia", "clock_delay"} <= set(candidates(mechanics, faster))
+    on_patch = PushMechanics(mechanics.outline, mechanics.pusher_radius)
+    assert "rim_exponent" in candidates(on_patch, rows)
+
+
+def test_rejects_an_unknown_parameter_by_name() -> None:
+    with pytest.raises(TrainingError, match="'stickiness' is no parameter"):
+        fit_jointly(ellipsoidal_mechanics(), simulated({}), ("stickiness",))
+
+
+def test_rejects_rows_that_are_not_finite() -> None:
+    rows = simulated({})
+    with pytest.raises(TrainingError, match="not finite"):
+        replace(rows, outcomes=rows.outcomes * np.nan)
