@@ -86,7 +86,7 @@ class JointFit:
     @property
     def effective_parameters(self) -> float:
         """How many of the parameters the rows determine, and not the priors."""
-        weight = _weights(self.residuals / self.scale) / self.scale**2
+        weight = student_curvature(self.residuals / self.scale) / self.scale**2
         curvature = _curvature(self.jacobian, weight, self.names)
         prior = np.array([BY_NAME[name].spread for name in self.names]) ** -2.0
         return len(self.names) - float(np.sum(np.diagonal(np.linalg.inv(curvature)) * prior))
