@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from server_bench import GOOD, MANY, server_of
 from service_msgs.msg import ServiceEventInfo
-from synthetic import square_pushes
+from synthetic import square_pushes, square_rig
 
 from msg_adapters.predictions import (
     PushQuery,
@@ -36,8 +37,10 @@ from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
 from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push_batch
+from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
+CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
 
 
@@ -63,6 +66,18 @@ def server(folder):
 
 
 # --- predictions ------------------------------------------------------------------------------------------------
+
+
+def test_serves_a_model_that_was_trained_on_no_push(tmp_path):
+    model = train_model(empty_table(), replace(square_rig(), support_points=CORNERS), "prior", name="prior")
+    save_model(model, tmp_path / "prior.model")
+    with server_of([tmp_path / "prior.model"]) as running:
+        assert "windows=0; covariates=-; duration=any" in running.list().descriptions[0]
+        assert running.push([0.02, 0.1, 0.2], duration=0.7).success
+        assert not running.push([0.5, 0.1, 0.2]).in_domain
+        answered = prediction_from_response(running.batch(MANY))
+    expected = model.predict_rows(MANY, np.full(len(MANY), 0.2))
+    np.testing.assert_allclose(answered.covariance, expected.covariance, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["analytical", "gp", "vhgp"])

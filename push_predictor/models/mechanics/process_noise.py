@@ -30,19 +30,21 @@ class ProcessNoise:
 
     @staticmethod
     def changed(names: Sequence[str], values: Array) -> Array:
-        """Rows (4, p) of parameters: the values (p,) and, one by one, those with a parameter that varies changed."""
-        rows = np.tile(values, (1 + len(VARYING), 1))
-        for row, (name, spread) in zip(rows[1:], VARYING.items(), strict=True):
-            k = names.index(name)
-            row[k] += spread if row[k] + spread <= BY_NAME[name].high else -spread
+        """Rows (1 + 2 v, p) of parameters: the values (p,), and each of those that vary increased, then decreased."""
+        rows = np.tile(values, (1 + 2 * len(VARYING), 1))
+        for k, (name, spread) in enumerate(VARYING.items()):
+            column, low, high = names.index(name), BY_NAME[name].low, BY_NAME[name].high
+            above, below = min(values[column] + spread, high), max(values[column] - spread, low)
+            rows[1 + k, column], rows[1 + len(VARYING) + k, column] = above, below
         return rows
 
     def covariance(self, displacements: Array, travel: Array, length: Array) -> Array:
         """Covariance (n, 3, 3) of the noise.
 
-        displacements (n, 4, 3): under the parameters of `changed`. travel (n,), length c (n,) in m.
+        displacements (n, 1 + 2 v, 3): under the parameters of `changed`. travel (n,), length c (n,) in m.
         """
-        shift = displacements[:, 1:] - displacements[:, :1]
+        varied = displacements[:, 1:]
+        shift = 0.5 * (varied[:, : len(VARYING)] - varied[:, len(VARYING) :])
         covariance = np.einsum("nka,nkb->nab", shift, shift)
         unit = np.column_stack([travel, travel, travel / length])
         index = np.arange(3)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import RECORDING, FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_draws import displacements
 from push_predictor.models.mechanics.process_noise import ProcessNoise
 from push_predictor.models.mechanisms import Push
@@ -17,6 +18,7 @@ from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.without_effects import WithoutEffects
 from push_predictor.types import Array, BoolArray, IntArray
 
+ACCURACY = 0.01  # of a draw's displacement: moves means by less than 0.3 % of a standard deviation, in half the time
 FASTEST = 0.15  # m/s: beyond it inertia, which the draws lack, changes the motion by more than the noise
 STEEPEST = 1.4  # rad: in a grazing push the tip soon leaves the slider, or misses it if the outline is shifted
 
@@ -70,9 +72,8 @@ class PriorPredictor(WithoutEffects):
     def moments(self, push: Push) -> Moments:
         """See Predictor. The covariance is that of the draws plus the process noise."""
         rows = np.concatenate([self._around, self.draws])
-        found = displacements(
-            self.fitted.mechanics, self._names, rows, push.inputs, push.duration, self._used(push.covariates)
-        )
+        covariates = self._used(push.covariates)
+        found = displacements(self._mechanics, self._names, rows, push.inputs, push.duration, covariates)
         around, drawn = found[:, : len(self._around)], found[:, len(self._around) :]
         travel = push.inputs[:, 0] * push.duration
         noise = self.noise.covariance(around, travel, np.full(len(travel), self.physics.support.length))
@@ -102,12 +103,16 @@ class PriorPredictor(WithoutEffects):
         return self
 
     @cached_property
+    def _mechanics(self) -> PushMechanics:
+        return replace(self.fitted.mechanics, accuracy=ACCURACY)
+
+    @cached_property
     def _names(self) -> tuple[str, ...]:
         return tuple(self.fitted.values)
 
     @cached_property
     def _around(self) -> Array:
-        """Parameters (4, p) from which the process noise follows."""
+        """Parameters (7, p) from which the process noise follows."""
         return ProcessNoise.changed(self._names, np.array(list(self.fitted.values.values())))
 
     def _used(self, covariates: Mapping[str, Array]) -> dict[str, Array]:

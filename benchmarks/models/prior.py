@@ -1,0 +1,126 @@
+"""A prior model before the first push and after few, next to GP and VHGP trained on the same pushes.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.prior --bags bags --data FOLDER [--kinds prior gp vhgp] [--quick]
+
+--bags: the standard recordings of `simulate`; the square trains on square_abs_train, the other outlines on four of
+five folds of their few pushes. --data: the folder of the measured data with mit_square, split by push in five folds.
+Training pushes are drawn at random, the same for all models. The reference of the NMSE is the mean of all training
+pushes that could have been drawn, the same for all models and n. Prints the tables of docs/results/prior.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.measured.scores import WITHIN
+from benchmarks.measured.square import imported_square
+from push_predictor.evaluation.estimate import by_push, total_exact_nlpd, total_nmse
+from push_predictor.evaluation.push_scores import PushScores, pooled, push_scores
+from push_predictor.evaluation.splits import FOLDS, push_folds
+from push_predictor.evaluation.validation import compare
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.table import PushTable, empty_table
+
+PUSHES = (0, 5, 10, 20, 50)
+OWN_FOLDS = ("ellipse_plywood", "hexagon_delrin", "circle_pu")
+SQUARE_TRAINING, SQUARE_TESTS = "square_abs_train", ("square_abs_test", "square_abs_repeats")
+SEEDS = 3  # draws of training pushes for the square
+HEAD = "| pushes | windows | model | NMSE (95 %) | exact NLPD (95 %) | within 95 % (dx dy dtheta) | CPU, s |"
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Rows to draw training pushes from, and rows to test on."""
+
+    training: PushTable
+    test: PushTable
+    rig: Rig
+    seed: int
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bags", type=Path, help="the folder of the simulated recordings")
+    parser.add_argument("--data", type=Path, help="the folder of the measured data")
+    parser.add_argument("--kinds", nargs="+", choices=("prior", "gp", "vhgp"), default=("prior", "gp", "vhgp"))
+    parser.add_argument("--quick", action="store_true", help="0 and 5 pushes only")
+    options = parser.parse_args(arguments)
+    sizes = PUSHES[:2] if options.quick else PUSHES
+    for name, cases in (*_simulated(options.bags), *_measured(options.data)):
+        print(f"\n{name}\n\n{HEAD}\n{7 * '|---'}|")
+        for n in sizes:
+            if all(n <= len(case.training.pushes) for case in cases):
+                _rows(cases, n, options.kinds)
+
+
+def _rows(cases: Sequence[Case], n: int, kinds: Sequence[str]) -> None:
+    for kind in kinds:
+        if n == 0 and kind != "prior":
+            continue
+        parts = [_scored(case, n, kind) for case in cases]
+        windows = np.mean([windows for _, windows, _ in parts])
+        cpu = np.mean([cpu for *_, cpu in parts])
+        print(
+            f"| {n} | {windows:.0f} | {kind} | {_cells(pooled([scores for scores, *_ in parts]))} | {cpu:.1f} |",
+            flush=True,
+        )
+
+
+def _cells(scores: PushScores) -> str:
+    nmse, nlpd = by_push(scores, total_nmse), by_push(scores, total_exact_nlpd)
+    within = " ".join(f"{share:.2f}" for share in scores.totals().coverage[0, :, WITHIN])
+    return f"{nmse.text('.3f')} | {nlpd.text('.2f')} | {within}"
+
+
+def _scored(case: Case, n: int, kind: str) -> tuple[PushScores, int, float]:
+    """Scores of a model of n pushes, the number of its windows, and CPU s of training."""
+    names = np.random.default_rng(case.seed).permutation(np.array(sorted(case.training.pushes)))[:n]
+    rows = case.training.take(np.isin(case.training.push_id, names)) if n else empty_table()
+    start = time.process_time()
+    model = train_model(rows, case.rig, kind, name=kind, options=TrainingOptions(seed=case.seed, mean="zero"))
+    cpu = time.process_time() - start
+    comparison = replace(compare(model, case.test), training_mean=case.training.outcomes.mean(axis=0))
+    return push_scores(comparison), len(model.training), cpu
+
+
+def _simulated(bags: Path | None) -> Iterator[tuple[str, list[Case]]]:
+    if bags is None:
+        return
+    loaded = {name: _loaded(bags / name) for name in (SQUARE_TRAINING, *SQUARE_TESTS, *OWN_FOLDS)}
+    training, rig = loaded[SQUARE_TRAINING]
+    for name in SQUARE_TESTS:
+        yield name, [Case(training, loaded[name][0], rig, seed) for seed in range(SEEDS)]
+    for name in OWN_FOLDS:
+        yield name, _folds(*loaded[name])
+
+
+def _measured(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
+    if data is None:
+        return
+    with tempfile.TemporaryDirectory() as work:
+        square = imported_square(data, Path(work))
+    yield "mit_square", _folds(square.table, square.rig)
+
+
+def _folds(table: PushTable, rig: Rig) -> list[Case]:
+    fold = push_folds(table)
+    return [Case(table.take(fold != k), table.take(fold == k), rig, k) for k in range(FOLDS)]
+
+
+def _loaded(path: Path) -> tuple[PushTable, Rig]:
+    rig = load_rig_for([path])
+    return load_data([path], rig), rig
+
+
+if __name__ == "__main__":
+    main()

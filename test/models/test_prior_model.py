@@ -1,0 +1,304 @@
+"""Prior models: honest before the first push, sharper after a few, and usable without training rows everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import square_rig
+
+from push_predictor import api
+from push_predictor.cli import main
+from push_predictor.errors import ModelFileError, RequestError, RigError, TrainingError
+from push_predictor.evaluation.alarm.scores import calibrate
+from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.predictors import PriorPredictor
+from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Pushes
+from push_predictor.models.store.arrays_record import read_arrays
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.train import retrain_model, train_model
+from push_predictor.planning.push_windows import windows_of
+from push_predictor.recordings.table import PushTable, empty_table
+from push_predictor.residuals.evidence.loading import LoadedData
+from push_predictor.residuals.trace import trace
+from push_predictor.types import Array
+
+CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
+RIG = replace(square_rig(), support_points=CORNERS)
+TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
+
+
+@pytest.fixture(scope="module")
+def untrained() -> PushModel:
+    return train_model(empty_table(), RIG, "prior", name="before")
+
+
+def predictor_of(model: PushModel) -> PriorPredictor:
+    assert isinstance(model.predictor, PriorPredictor)
+    return model.predictor
+
+
+def some_inputs(count: int, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    return np.column_stack([rng.uniform(0.01, 0.05, count), rng.random(count), rng.uniform(-1.0, 1.0, count)])
+
+
+def pushed(count: int, seed: int, noise: float = 0.03, windows: int = 2) -> PushTable:
+    """Windows of a slider with the parameters TRUTH, with a noise that is a share of the travel."""
+    inputs, duration = some_inputs(count, seed), np.full(count, 0.2)
+    mechanics = PushMechanics(RIG.outline, RIG.pusher_radius, supported_at(CORNERS))
+    unit = (inputs[:, 0] * duration)[:, None] * [1.0, 1.0, 25.0]
+    outcomes = mechanics.displacement(TRUTH, inputs, duration)
+    outcomes = outcomes + noise * unit * np.random.default_rng(seed + 1).standard_normal((count, 3))
+    return PushTable(inputs, duration, outcomes, np.array([f"{seed}-{k // windows}" for k in range(count)]))
+
+
+def trained(rows: PushTable) -> PushModel:
+    return train_model(rows, RIG, "prior", name="after")
+
+
+@pytest.fixture(scope="module")
+def after_ten() -> PushModel:
+    return trained(pushed(20, 3))
+
+
+# --- width -------------------------------------------------------------------------------------------------
+
+
+def test_intervals_cover_outcomes_of_sliders_drawn_from_the_priors(untrained: PushModel) -> None:
+    predictor, rng = predictor_of(untrained), np.random.default_rng(5)
+    names = tuple(predictor.fitted.values)
+    table = [BY_NAME[name] for name in names]
+    sliders = rng.normal([p.textbook for p in table], [p.spread for p in table], (400, len(names)))
+    sliders = sliders[np.all((sliders > [p.low for p in table]) & (sliders < [p.high for p in table]), axis=1)]
+    inputs, duration = some_inputs(15, 0), np.full(15, 0.2)
+    found = displacements(predictor.fitted.mechanics, names, sliders, inputs, duration, {})
+    prediction = untrained.predict_rows(inputs, duration)
+    roots = np.linalg.cholesky(prediction.process_covariance)
+    outcomes = found + np.einsum("nab,nkb->nka", roots, rng.standard_normal(found.shape))
+    within = np.abs(outcomes - prediction.mean[:, None]) <= 1.96 * prediction.std[:, None]
+    assert np.all(np.abs(within.mean(axis=(0, 1)) - 0.95) < 0.02)
+    away = (outcomes - prediction.mean[:, None]) @ np.linalg.inv(np.linalg.cholesky(prediction.covariance))[
+        :, None
+    ].swapaxes(-1, -2)[:, 0]
+    correlation = np.corrcoef(away.reshape(-1, 3).T)
+    assert np.all(np.abs(correlation - np.eye(3)) < 0.15)
+
+
+def test_pushes_narrow_the_prediction_and_move_it_to_the_truth(untrained: PushModel, after_ten: PushModel) -> None:
+    test = pushed(40, 11, noise=0.0)
+    before, after = compare(untrained, test), compare(after_ten, test)
+    assert np.all(np.sqrt(after.variance / before.variance).mean(axis=0) < 0.75)
+    errors = [np.sum((c.mean - test.outcomes) ** 2, axis=0) for c in (before, after)]
+    assert np.all(errors[1] < 0.35 * errors[0])
+    assert np.all((np.abs(after.mean - test.outcomes) < 1.96 * np.sqrt(after.variance)).mean(axis=0) > 0.9)
+
+
+def test_a_single_push_leaves_the_prediction_wide(untrained: PushModel) -> None:
+    inputs, duration = some_inputs(20, 4), np.full(20, 0.2)
+    before, after = (m.predict_rows(inputs, duration).std for m in (untrained, trained(pushed(2, 3))))
+    assert np.all(np.median(after / before, axis=0) > 0.75)
+
+
+def test_windows_of_one_push_count_less_than_windows_of_many() -> None:
+    many = pushed(12, 6, windows=1)
+    one = replace(many, push_id=np.array(["p"] * 12))
+    spread = [np.sqrt(np.diag(predictor_of(trained(rows)).fitted.covariance)) for rows in (many, one)]
+    names = list(predictor_of(trained(many)).fitted.values)
+    friction = names.index("contact_friction")
+    assert spread[1][friction] > 1.3 * spread[0][friction]
+
+
+@pytest.mark.parametrize(
+    ("windows", "noise", "low", "high"), [(24, 0.005, 0.0, 0.5), (24, 0.3, 2.0, np.inf), (2, 0.005, 0.6, 1.5)]
+)
+def test_noise_is_estimated_where_there_are_pushes(windows: int, noise: float, low: float, high: float) -> None:
+    factor = predictor_of(trained(pushed(windows, 8, noise))).noise.factor
+    assert np.all(low < factor)
+    assert np.all(factor < high)
+
+
+def test_estimates_stay_within_the_plausible_ranges() -> None:
+    rows = pushed(20, 9)
+    far = replace(rows, outcomes=rows.outcomes * [0.2, -6.0, -6.0])
+    predictor = predictor_of(trained(far))
+    for k, (name, value) in enumerate(predictor.fitted.values.items()):
+        assert BY_NAME[name].low <= value <= BY_NAME[name].high
+        assert BY_NAME[name].low <= predictor.draws[:, k].min()
+        assert predictor.draws[:, k].max() <= BY_NAME[name].high
+
+
+# --- structure ---------------------------------------------------------------------------------------------
+
+
+def test_mirrored_pushes_get_mirrored_predictions(untrained: PushModel) -> None:
+    inputs = some_inputs(8, 1)
+    rig = untrained.rig
+    place = rig.outline.point(inputs[:, 1])
+    mirrored = np.column_stack([inputs[:, 0], rig.outline.project(place * [1.0, -1.0]).contact, -inputs[:, 2]])
+    one, other = (untrained.predict_rows(rows, np.full(8, 0.2)) for rows in (inputs, mirrored))
+    sign = np.array([1.0, -1.0, -1.0])
+    np.testing.assert_allclose(other.mean, one.mean * sign, atol=1e-7)
+    np.testing.assert_allclose(other.covariance, one.covariance * np.outer(sign, sign), rtol=1e-3, atol=1e-10)
+
+
+def test_sides_of_a_square_differ_by_much_less_than_the_width(untrained: PushModel) -> None:
+    inputs = np.array([[0.02, 0.1 + 0.25 * k, 0.3] for k in range(4)])
+    found = untrained.predict_rows(inputs, np.full(4, 0.2))
+    assert np.all(np.ptp(found.mean, axis=0) < 0.2 * found.std.min(axis=0))
+
+
+def test_twice_the_path_moves_the_slider_further_and_is_less_certain(untrained: PushModel) -> None:
+    near, far = (
+        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).mean,
+        untrained.predict(Pushes([0.02, 0.04], 0.1, 0.2)).std,
+    )
+    assert 1.7 < near[1, 0] / near[0, 0] < 2.3
+    assert np.all(far[1] > 1.5 * far[0])
+
+
+def test_the_same_seed_gives_the_same_model(untrained: PushModel) -> None:
+    again = train_model(empty_table(), RIG, "prior", name="again")
+    np.testing.assert_array_equal(predictor_of(again).draws, predictor_of(untrained).draws)
+    assert predictor_of(again).draws.shape == (DRAWS, len(predictor_of(again).fitted.values))
+
+
+def test_priors_use_what_the_rig_knows() -> None:
+    on_points = train_model(empty_table(), replace(RIG, contact_friction=0.6), "prior", name="p")
+    patch = train_model(empty_table(), square_rig(), "prior", name="p")
+    assert predictor_of(on_points).fitted.values["contact_friction"] == 0.6
+    assert abs(predictor_of(on_points).draws[:, 0].mean() - 0.6) < 0.02
+    assert "rim_exponent" in predictor_of(patch).fitted.values
+    assert "rim_exponent" not in predictor_of(on_points).fitted.values
+
+
+def test_needs_no_covariates(untrained: PushModel, after_ten: PushModel) -> None:
+    assert untrained.needs == after_ten.needs == ()
+
+
+def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel, after_ten: PushModel) -> None:
+    pushes = Pushes(
+        [0.001, FASTEST, 1.01 * FASTEST, 0.02], [0.0, 0.99, 0.5, 0.3], [0.0, -STEEPEST, 0.0, 1.01 * STEEPEST]
+    )
+    for model in (untrained, after_ten):
+        assert model.in_domain(pushes.inputs).tolist() == [True, True, False, False]
+
+
+# --- without training rows ---------------------------------------------------------------------------------
+
+
+def test_untrained_model_describes_itself(untrained: PushModel, tmp_path: Path) -> None:
+    assert "trained on no push" in repr(untrained)
+    untrained.save(tmp_path / "before.pushmodel")
+    registry = ModelRegistry()
+    registry.load(tmp_path / "before.pushmodel")
+    assert "kind=prior" in registry.describe("before")
+    assert "windows=0; covariates=-; duration=any" in registry.describe("before")
+
+
+def test_untrained_model_returns_from_its_file(untrained: PushModel, tmp_path: Path) -> None:
+    untrained.save(tmp_path / "m.pushmodel")
+    again, push = load_model(tmp_path / "m.pushmodel"), Pushes(0.02, [0.1, 0.6], 0.4, duration=0.5)
+    np.testing.assert_allclose(again.predict(push).mean, untrained.predict(push).mean, rtol=1e-12)
+    np.testing.assert_allclose(again.predict(push).covariance, untrained.predict(push).covariance, rtol=1e-12)
+    assert again.training.outcomes.shape == (0, 3)
+
+
+def test_trained_model_returns_from_its_file_with_its_noise(after_ten: PushModel, tmp_path: Path) -> None:
+    after_ten.save(tmp_path / "m.pushmodel")
+    again = load_model(tmp_path / "m.pushmodel")
+    np.testing.assert_array_equal(predictor_of(again).noise.factor, predictor_of(after_ten).noise.factor)
+    np.testing.assert_allclose(predictor_of(again).fitted.covariance, predictor_of(after_ten).fitted.covariance)
+    assert len(again.training) == 20
+
+
+@pytest.mark.parametrize(
+    "draws", [np.zeros((4, 3)), np.full((64, 16), 9.0), np.zeros((1, 16)), np.full((64, 16), np.nan)]
+)
+def test_rejects_damaged_draws(untrained: PushModel, tmp_path: Path, draws: Array) -> None:
+    untrained.save(tmp_path / "m.pushmodel")
+    arrays = read_arrays(tmp_path / "m.pushmodel")
+    assert arrays["draws"].shape == (64, 16)
+    np.savez_compressed(tmp_path / "bad.npz", **{**arrays, "draws": draws})
+    with pytest.raises(ModelFileError, match="draws"):
+        load_model(tmp_path / "bad.npz")
+
+
+def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel) -> None:
+    test = pushed(30, 12)
+    found = metrics_json(compare(untrained, test))
+    rest = np.sum((test.outcomes - compare(untrained, test).mean) ** 2, axis=0) / np.sum(test.outcomes**2, axis=0)
+    assert found["nmse"]["total"] == pytest.approx(rest.sum())  # type: ignore[index]
+    assert found["n_train"] == 0
+
+
+def test_planning_takes_usual_windows_without_training_rows(untrained: PushModel) -> None:
+    assert windows_of(untrained, 1.0).count == 5
+    assert untrained.usual_speed == 0.02
+
+
+def test_tabulated_model_predicts_the_same(untrained: PushModel) -> None:
+    tabulated, inputs = tabulate(untrained), some_inputs(3, 2)
+    np.testing.assert_array_equal(
+        tabulated.predict_rows(inputs, np.full(3, 0.2)).mean, untrained.predict_rows(inputs, np.full(3, 0.2)).mean
+    )
+
+
+def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:
+    with pytest.raises(RequestError, match="training pushes of the model: 0"):
+        calibrate(untrained)
+    with pytest.raises(RequestError, match="one that was trained on pushes"):
+        trace(untrained, LoadedData(pushed(20, 1), None, RIG))
+
+
+def test_retraining_starts_from_the_priors(after_ten: PushModel) -> None:
+    again = retrain_model(after_ten, pushed(20, 3))
+    np.testing.assert_allclose(predictor_of(again).draws, predictor_of(after_ten).draws)
+    assert again.kind == "prior"
+
+
+# --- interfaces --------------------------------------------------------------------------------------------
+
+
+def test_python_interface_trains_without_data() -> None:
+    model = api.train(kind="prior", rig=RIG, watch=lambda stage, done: None)
+    assert (model.name, model.provenance.pushes) == ("prior", 0)
+    with pytest.raises(RigError, match="neither data nor a rig"):
+        api.train(kind="prior", watch=lambda stage, done: None)
+    with pytest.raises(RequestError, match="at least one recording"):
+        api.train(kind="gp", rig=RIG, watch=lambda stage, done: None)
+
+
+def test_other_kinds_still_need_rows() -> None:
+    with pytest.raises(TrainingError, match="too few"):
+        train_model(empty_table(), RIG, "analytical", name="a")
+
+
+def test_command_line_trains_and_predicts_before_the_first_push(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, out = tmp_path / "rig.yaml", tmp_path / "before.pushmodel"
+    rig.write_text("\n".join(f"{key}: {value}" for key, value in RIG.to_record().items()))
+    assert main(["train", "--kind", "prior", "--rig", str(rig), "--out", str(out)]) == 0
+    assert "from outline and priors alone" in capsys.readouterr().out
+    assert main(["predict", str(out), "--velocity", "0.02", "--contact", "0.1", "--angle", "0.3"]) == 0
+    assert "for which the priors are meant" in capsys.readouterr().out
+    assert main(["info", str(out)]) == 0
+    assert "velocity_range    none\n" in capsys.readouterr().out
+
+
+def test_command_line_needs_data_for_other_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["train", "--kind", "gp", "--out", str(tmp_path / "m.pushmodel")])
+    assert ended.value.code == 2
+    assert "required: DATA" in capsys.readouterr().err
