@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.shapes import square
-from push_predictor.models.mechanics.contact_solution import Driven, Touch, driven
+from push_predictor.models.mechanics.contact_solution import Driven, Touch, TwistOf, driven
 from push_predictor.models.mechanics.limit_surface import Support, body_twist
 from push_predictor.models.mechanics.load_map import LoadMap, load_map
 from push_predictor.models.mechanics.pressure import patch
@@ -25,6 +25,11 @@ SURFACES: dict[str, LoadMap | PowerSurface] = {
 N = 200
 seeds = st.integers(0, 10**6)
 EVERY_SURFACE = pytest.mark.parametrize("name", SURFACES)
+
+
+def twist_of(name: str) -> TwistOf:
+    """One surface for all contacts."""
+    return lambda rows, x, y, moment: SURFACES[name].twist(x, y, moment)
 
 
 def touches(seed: int, n: int = N) -> Touch:
@@ -51,7 +56,7 @@ def contact_velocity(touch: Touch, motion: Driven) -> tuple[Array, Array]:
 @given(seed=seeds)
 def test_contact_velocity_obeys_coulomb_friction(name: str, seed: int) -> None:
     touch, (left, right) = touches(seed), cones(seed)
-    motion = driven(SURFACES[name].twist, touch, left, right)
+    motion = driven(twist_of(name), touch, left, right)
     toward, sideways = contact_velocity(touch, motion)
     moving = np.abs(motion.vx) + np.abs(motion.vy) + np.abs(motion.spin) > 0.0
     assert np.all(moving)
@@ -69,7 +74,7 @@ def test_contact_velocity_obeys_coulomb_friction(name: str, seed: int) -> None:
 @EVERY_SURFACE
 def test_pushing_dissipates_energy(name: str) -> None:
     touch, (left, right) = touches(1), cones(1)
-    motion = driven(SURFACES[name].twist, touch, left, right)
+    motion = driven(twist_of(name), touch, left, right)
     toward, sideways = contact_velocity(touch, motion)
     assert np.all(np.cos(motion.force_angle) * toward + np.sin(motion.force_angle) * sideways > 0.0)
     assert set(motion.slip.tolist()) == {-1, 0, 1}
@@ -84,7 +89,7 @@ def test_ellipsoid_gives_the_closed_form() -> None:
     (x, y), (nx, ny) = (point / 0.03).T, normal.T
     touch = Touch(nx, ny, x * ny - y * nx, x * nx + y * ny, np.cos(angle), np.sin(angle))
     edge = np.full(N, np.arctan(friction))
-    motion = driven(SURFACES["ellipsoid"].twist, touch, edge, edge)
+    motion = driven(twist_of("ellipsoid"), touch, edge, edge)
     twist, slip = body_twist(point, normal, velocity, support, friction)
     assert np.column_stack([motion.vx, motion.vy, motion.spin / 0.03]) == pytest.approx(twist, abs=1e-6, rel=1e-6)
     assert motion.slip.tolist() == slip.tolist()
@@ -93,7 +98,7 @@ def test_ellipsoid_gives_the_closed_form() -> None:
 @EVERY_SURFACE
 def test_receding_pusher_leaves_slider_at_rest(name: str) -> None:
     touch, (left, right) = touches(4), cones(4)
-    motion = driven(SURFACES[name].twist, touch._replace(along=-touch.along), left, right)
+    motion = driven(twist_of(name), touch._replace(along=-touch.along), left, right)
     assert not np.any([motion.vx, motion.vy, motion.spin, motion.slip])
 
 
@@ -102,8 +107,8 @@ def test_slip_begins_where_the_force_reaches_the_edge_of_the_cone(name: str) -> 
     """The pusher's angle at which a sticking force lies on the edge divides sticking from sliding."""
     touch = touches(5)
     wide, edge = np.full(N, np.arctan(1.5)), np.full(N, np.arctan(0.3))
-    free = driven(SURFACES[name].twist, touch, wide, wide)
-    narrow = driven(SURFACES[name].twist, touch, edge, edge)
+    free = driven(twist_of(name), touch, wide, wide)
+    narrow = driven(twist_of(name), touch, edge, edge)
     outside = np.abs(free.force_angle) > edge + 1e-3
     inside = np.abs(free.force_angle) < edge - 1e-3
     assert np.all(narrow.slip[outside & (free.slip == 0)] == np.sign(free.force_angle[outside & (free.slip == 0)]))
@@ -114,7 +119,7 @@ def test_slip_begins_where_the_force_reaches_the_edge_of_the_cone(name: str) -> 
 @EVERY_SURFACE
 def test_without_friction_the_force_is_along_the_normal(name: str) -> None:
     touch, zero = touches(6), np.zeros(N)
-    motion = driven(SURFACES[name].twist, touch, zero, zero)
+    motion = driven(twist_of(name), touch, zero, zero)
     assert motion.force_angle == pytest.approx(0.0, abs=1e-12)
     twist = SURFACES[name].twist(touch.normal_x, touch.normal_y, touch.normal_arm)
     cross = np.cross(np.stack(twist, axis=1), np.stack([motion.vx, motion.vy, motion.spin], axis=1))
@@ -125,8 +130,8 @@ def test_without_friction_the_force_is_along_the_normal(name: str) -> None:
 def test_mirrored_touch_gives_the_mirrored_motion_of_a_symmetric_surface(name: str) -> None:
     touch, (left, right) = touches(7), cones(7)
     mirrored = Touch(touch.normal_x, -touch.normal_y, -touch.normal_arm, touch.left_arm, touch.along, -touch.across)
-    here = driven(SURFACES[name].twist, touch, left, right)
-    there = driven(SURFACES[name].twist, mirrored, right, left)
+    here = driven(twist_of(name), touch, left, right)
+    there = driven(twist_of(name), mirrored, right, left)
     assert there.vx == pytest.approx(here.vx, abs=1e-2)
     assert there.vy == pytest.approx(-here.vy, abs=1e-2)
     assert there.spin == pytest.approx(-here.spin, abs=1e-2)

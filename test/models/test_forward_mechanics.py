@@ -396,7 +396,7 @@ def test_stretched_surface_is_near_the_sum_of_direction_dependent_point_friction
     moment = np.sum(points[:, 0] * f[:, :, 1] - points[:, 1] * f[:, :, 0], axis=1) / surface.length
     rows, zero = np.arange(300), np.zeros(300, dtype=np.int64)
     loaded = LoadedSurface(row_surfaces([surface], zero, zero, np.zeros(300)), rows, stretch=np.tile(stretch, (300, 1)))
-    found = np.stack(loaded.twist(*f.sum(axis=1).T, moment), axis=1)
+    found = np.stack(loaded.twist(slice(None), *f.sum(axis=1).T, moment), axis=1)
     wanted = draw * [1.0, 1.0, surface.length]
     plain = np.stack(surface.twist(*f.sum(axis=1).T, moment), axis=1)
     share = {"patch": 0.3, "three": 0.5}[kind]  # three points keep their place on the table, not their flats
@@ -409,7 +409,7 @@ def test_pull_lies_with_the_pushers_load_on_the_limit_surface() -> None:
     rows, zero = np.arange(n), np.zeros(n, dtype=np.int64)
     loaded = LoadedSurface(row_surfaces([surface], zero, zero, np.zeros(n)), rows, pull=pull)
     pusher = draw.standard_normal((n, 3))
-    factor, load = loaded._on_surface(tuple(pusher.T))
+    factor, load = loaded.on_surface(slice(None), tuple(pusher.T))
     on_surface = np.stack(load, axis=1) / np.linalg.norm(pusher, axis=1)[:, None]
     assert surface.gauge(*on_surface.T) == pytest.approx(1.0, abs=0.02)
     assert np.mean(np.abs(surface.gauge(*on_surface.T) - 1.0)) < 1e-3
@@ -425,7 +425,7 @@ def test_load_of_twist_agrees_with_stretch_of_zero() -> None:
     surface, zero = load_map(THREE_POINTS), np.zeros(5, dtype=np.int64)
     loaded = LoadedSurface(row_surfaces([surface], zero, zero, np.zeros(5)), np.arange(5), stretch=np.zeros((5, 2)))
     load = load_of_twist(THREE_POINTS, np.random.default_rng(0).standard_normal((5, 3)))
-    assert np.stack(loaded.twist(*load.T)) == pytest.approx(np.stack(surface.twist(*load.T)))
+    assert np.stack(loaded.twist(slice(None), *load.T)) == pytest.approx(np.stack(surface.twist(*load.T)))
 
 
 # --- the measurement undoes itself ---------------------------------------------------------------------------------

@@ -11,10 +11,13 @@ from push_predictor.types import Array, IntArray
 
 ROOT_STEPS = 40
 ROOT_TOLERANCE = 1e-5  # rad
+EVERY = slice(None)
 BISECT_EVERY = 6  # steps: next to a flat or an edge of the limit surface, secants converge slowly
 
-# From a load's force (x, y) and its moment over length, (n,) each, to a twist (vx, vy, w times length) up to a factor.
-TwistOf: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
+Rows: TypeAlias = "IntArray | slice"
+# From some of the contacts (k,) and their load's force (x, y) and moment over length, (k,) each, to a twist (vx, vy, w
+# times length) up to a factor.
+TwistOf: TypeAlias = Callable[[Rows, Array, Array, Array], tuple[Array, Array, Array]]
 
 
 class Touch(NamedTuple):
@@ -55,14 +58,15 @@ def driven(twist_of: TwistOf, touch: Touch, left_edge: Array, right_edge: Array)
     """
     right = _Edge(np.cos(right_edge), -np.sin(right_edge))
     left = _Edge(np.cos(left_edge), np.sin(left_edge))
-    at_right, at_left = _under(twist_of, touch, right), _under(twist_of, touch, left)
-    lags = np.maximum(at_right.lag(touch), 0.0), np.minimum(at_left.lag(touch), 0.0)
-    slip = (at_left.lag(touch) > 0.0).astype(np.int64) - (at_right.lag(touch) < 0.0).astype(np.int64)
-    sticks = (slip == 0) & (touch.along > 0.0)
-    share, motion = np.where(slip > 0, 1.0, 0.0), _chosen(slip > 0, at_left, at_right)
-    if sticks.any():
-        root, inside = _root(twist_of, touch, (right, left), lags, sticks)
-        share, motion = np.where(sticks, root, share), _chosen(sticks, inside, motion)
+    at_right, at_left = _under(twist_of, EVERY, touch, right), _under(twist_of, EVERY, touch, left)
+    lag_right, lag_left = at_right.lag(touch), at_left.lag(touch)
+    slip = (lag_left > 0.0).astype(np.int64) - (lag_right < 0.0).astype(np.int64)
+    share = np.where(slip > 0, 1.0, 0.0)
+    motion = _Motion(*(np.where(slip > 0, a, b) for a, b in zip(at_left, at_right, strict=True)))
+    sticks = np.flatnonzero((slip == 0) & (touch.along > 0.0))
+    if sticks.size:
+        bracket = _Bracket.of(np.maximum(lag_right, 0.0)[sticks], np.minimum(lag_left, 0.0)[sticks])
+        _stick(twist_of, sticks, touch, (right, left), bracket, share, motion)
     moves = (touch.along > 0.0) & (motion.toward > 0.0)
     size = np.where(moves, touch.along / np.where(moves, motion.toward, 1.0), 0.0)
     push, rub = (a + share * (b - a) for a, b in zip(right, left, strict=True))
@@ -94,9 +98,10 @@ class _Motion(NamedTuple):
         return np.maximum(self.toward, 0.0) * touch.across - self.sideways * touch.along
 
 
-def _under(twist_of: TwistOf, touch: Touch, force: _Edge) -> _Motion:
+def _under(twist_of: TwistOf, rows: Rows, touch: Touch, force: _Edge) -> _Motion:
     push, rub = force
     vx, vy, spin = twist_of(
+        rows,
         push * touch.normal_x - rub * touch.normal_y,
         push * touch.normal_y + rub * touch.normal_x,
         push * touch.normal_arm + rub * touch.left_arm,
@@ -105,35 +110,65 @@ def _under(twist_of: TwistOf, touch: Touch, force: _Edge) -> _Motion:
     return _Motion(vx, vy, spin, toward, vy * touch.normal_x - vx * touch.normal_y + spin * touch.left_arm)
 
 
-def _chosen(first: np.ndarray, one: _Motion, other: _Motion) -> _Motion:
-    return _Motion(*(np.where(first, a, b) for a, b in zip(one, other, strict=True)))
+class _Bracket(NamedTuple):
+    """Shares between the cone's edges about that of sticking, their lags, and the side that moved last, (k,) each."""
+
+    low: Array
+    high: Array
+    lag_low: Array
+    lag_high: Array
+    side: Array
+
+    @staticmethod
+    def of(lag_low: Array, lag_high: Array) -> _Bracket:
+        """The whole cone."""
+        k = len(lag_low)
+        return _Bracket(np.zeros(k), np.ones(k), lag_low, lag_high, np.zeros(k))
+
+    def inside(self, halve: bool) -> Array:
+        """The next shares to try: those of a straight line between the ends, or the middle."""
+        gap = self.lag_low - self.lag_high
+        line = np.where(self.lag_low * self.lag_high < 0.0, self.lag_low / np.where(gap > 0.0, gap, 1.0), 0.5)
+        return np.asarray(self.low + (self.high - self.low) * (0.5 if halve else line))
+
+    def narrowed(self, share: Array, lag: Array) -> _Bracket:
+        """With one end moved to `share`; the other end's lag is halved if it stays a second time (Illinois)."""
+        up = lag > 0.0  # the force must turn further to the left
+        return _Bracket(
+            np.where(up, share, self.low),
+            np.where(up, self.high, share),
+            np.where(up, lag, np.where(self.side < 0.0, 0.5 * self.lag_low, self.lag_low)),
+            np.where(up, np.where(self.side > 0.0, 0.5 * self.lag_high, self.lag_high), lag),
+            np.where(up, 1.0, -1.0),
+        )
 
 
-def _root(
-    twist_of: TwistOf, touch: Touch, edges: tuple[_Edge, _Edge], lags: tuple[Array, Array], wanted: np.ndarray
-) -> tuple[Array, _Motion]:
-    """Shares (n,) between the cone's edges at which the contact moves with the pusher, and the motion there.
+def _stick(
+    twist_of: TwistOf,
+    rows: IntArray,
+    touch: Touch,
+    edges: tuple[_Edge, _Edge],
+    bracket: _Bracket,
+    share: Array,
+    motion: _Motion,
+) -> None:
+    """Write into `share` and `motion`, for the rows (k,), the force at which the contact moves with the pusher.
 
-    The Illinois method. On an ellipsoid the velocity is linear in the force, and the first step is exact. A solved
-    contact stays as it is, so that its motion does not depend on the others.
+    On an ellipsoid the velocity is linear in the force, and the first step is exact. A solved contact stays as it is,
+    so that its motion does not depend on the others.
     """
-    (low, high), (f_low, f_high) = (np.zeros(len(wanted)), np.ones(len(wanted))), lags
     right, left = edges
-    middle, unsolved = np.full(len(wanted), 0.5), wanted
-    side, change = np.zeros(len(wanted)), (left.push - right.push, left.rub - right.rub)
+    change = _Edge(left.push - right.push, left.rub - right.rub)
     for step in range(1, ROOT_STEPS + 1):
-        gap = f_low - f_high
-        share = np.where(f_low * f_high < 0.0, f_low / np.where(gap > 0.0, gap, 1.0), 0.5)
-        between = low + (high - low) * (0.5 if step % BISECT_EVERY == 0 else share)
-        middle = np.where(unsolved, between, middle)
-        motion = _under(twist_of, touch, _Edge(right.push + middle * change[0], right.rub + middle * change[1]))
-        lag = motion.lag(touch)
-        unsolved = unsolved & (np.abs(lag) > ROOT_TOLERANCE * motion.toward) & (high - low > ROOT_TOLERANCE)
-        if not unsolved.any():
+        tried, at = bracket.inside(halve=step % BISECT_EVERY == 0), Touch(*(part[rows] for part in touch))
+        force = _Edge(*(a[rows] + tried * b[rows] for a, b in zip(right, change, strict=True)))
+        found = _under(twist_of, rows, at, force)
+        share[rows] = tried
+        for part, new in zip(motion, found, strict=True):
+            part[rows] = new
+        lag = found.lag(at)
+        open_ = (np.abs(lag) > ROOT_TOLERANCE * found.toward) & (bracket.high - bracket.low > ROOT_TOLERANCE)
+        if not open_.any():
             break
-        up, down = unsolved & (lag > 0.0), unsolved & (lag <= 0.0)  # up: the force must turn further to the left
-        f_high = np.where(up & (side > 0.0), 0.5 * f_high, np.where(down, lag, f_high))
-        f_low = np.where(down & (side < 0.0), 0.5 * f_low, np.where(up, lag, f_low))
-        low, high = np.where(up, middle, low), np.where(down, middle, high)
-        side = np.where(up, 1.0, np.where(down, -1.0, side))
-    return middle, motion
+        bracket = bracket.narrowed(tried, lag)
+        rows, bracket = rows[open_], _Bracket(*(part[open_] for part in bracket))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from push_predictor.models.mechanics.contact_solution import Rows
 from push_predictor.models.mechanics.support_surfaces import PushSurfaces
 from push_predictor.models.mechanics.surfaces import DIRECTIONS
 from push_predictor.types import Array, IntArray
@@ -16,6 +18,8 @@ PULL_ROUNDS = 4  # the first is exact on an ellipsoid
 SMALLEST_MARGIN = 1e-6  # of a pull to the friction that it cannot overcome alone
 _TURN = 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
 COS, SIN = np.cos(_TURN), np.sin(_TURN)  # of twice the direction of an arm
+
+Parts: TypeAlias = tuple[Array, Array, Array]  # of a load or a twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,23 +37,28 @@ class LoadedSurface:
     pull: Array | None = None
     height: Array | None = None
 
-    def twist(self, force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, Array]:
-        """Twist (vx, vy, w times length) of the centre up to a positive factor, from the pusher's load."""
+    def twist(self, chosen: Rows, force_x: Array, force_y: Array, moment: Array) -> Parts:
+        """Twist (vx, vy, w times length) of the centre up to a positive factor, from the pusher's load.
+
+        chosen: those of the rows that the loads are of.
+        """
+        rows = self.rows[chosen]
         if self.stretch is None and self.pull is None and self.height is None:
-            return self.surfaces.twist(self.rows, force_x, force_y, moment)
-        load = (force_x, force_y, moment) if self._root is None else self._root.times(force_x, force_y, moment)
-        size, load = self._on_surface(load)
-        vx, vy, spin = self.surfaces.twist(self.rows, *load)
-        if self._root is not None:
-            vx, vy, spin = self._root.times(vx, vy, spin)
+            return self.surfaces.twist(rows, force_x, force_y, moment)
+        root = None if self._root is None else _Root(*(part[chosen] for part in self._root))
+        load = (force_x, force_y, moment) if root is None else root.times(force_x, force_y, moment)
+        factor, load = self.on_surface(chosen, load)
+        vx, vy, spin = self.surfaces.twist(rows, *load)
+        if root is not None:
+            vx, vy, spin = root.times(vx, vy, spin)
         if self.height is not None:
-            shift = self.height * size * spin / self.surfaces.of_rows.length[self.rows]  # of the centre, over the force
+            shift = self.height[chosen] * factor * spin / self.surfaces.of_rows.length[rows]  # over the force
             vx, vy = vx + shift * force_y, vy - shift * force_x
         return vx, vy, spin
 
     @cached_property
     def _root(self) -> _Root | None:
-        return None if self.stretch is None else _Root.of(self.stretch, self.surfaces.of_rows.reach[self.rows])
+        return None if self.stretch is None else _root_of(self.stretch, self.surfaces.of_rows.reach[self.rows])
 
     @cached_property
     def _stretched_pull(self) -> Array | None:
@@ -57,29 +66,27 @@ class LoadedSurface:
             return None if self.pull is None else self.pull.T
         return np.stack(self._root.times(*self.pull.T))
 
-    def _on_surface(self, pusher: tuple[Array, Array, Array]) -> tuple[Array, tuple[Array, Array, Array]]:
+    def on_surface(self, chosen: Rows, pusher: Parts) -> tuple[Array, Parts]:
         """Factor that brings the pusher's load onto the surface, with the pull, and the load there, as large as given.
 
         Without a pull the factor is worked out only where the height needs it.
         """
-        pull = self._stretched_pull
-        if pull is None:
-            size = np.ones(0) if self.height is None else 1.0 / self.surfaces.gauge(self.rows, *pusher)
-            return size, pusher
-        given = np.sqrt(sum(part * part for part in pusher))
+        rows = self.rows[chosen]
+        if self._stretched_pull is None:
+            return (np.ones(0) if self.height is None else 1.0 / self.surfaces.gauge(rows, *pusher)), pusher
+        pull, given = self._stretched_pull[:, chosen], np.sqrt(sum(part * part for part in pusher))
         x, y, m = (part / given for part in pusher)
         dot, square = x * pull[0] + y * pull[1] + m * pull[2], np.sum(pull * pull, axis=0)
         radius = np.ones(len(x))
         for _ in range(PULL_ROUNDS):
             share = -dot + np.sqrt(np.maximum(dot * dot + radius * radius - square, SMALLEST_MARGIN))
             load = share * x + pull[0], share * y + pull[1], share * m + pull[2]
-            radius = np.sqrt(sum(part * part for part in load)) / self.surfaces.gauge(self.rows, *load)
+            radius = np.sqrt(sum(part * part for part in load)) / self.surfaces.gauge(rows, *load)
         return share / given, (given * load[0], given * load[1], given * load[2])
 
 
-@dataclass(frozen=True, eq=False)
-class _Root:
-    """The root R of W (n,) each: xx, xy, yy; and the inverse of the factor by which W stretches the arms' length.
+class _Root(NamedTuple):
+    """The root R of W (k,) each: xx, xy, yy; and the inverse of the factor by which W stretches the arms' length.
 
     With isotropic friction at the velocities R^-1 u, a body with the arms R r / det R has the load R f and the same
     moment. The stretched arms change the length c, by the reach of the pressure; the change of their surface's shape
@@ -91,15 +98,15 @@ class _Root:
     yy: Array
     turn: Array
 
-    @staticmethod
-    def of(stretch: Array, reach: Array) -> _Root:
-        size = np.sqrt(np.sum(stretch * stretch, axis=1))
-        a, b = (stretch * np.minimum(1.0, MOST_STRETCH / np.maximum(size, MOST_STRETCH))[:, None]).T
-        determinant = np.sqrt(1.0 - a * a - b * b)
-        trace = np.sqrt(2.0 + 2.0 * determinant)
-        arms = np.sqrt(1.0 + a[:, None] * COS + b[:, None] * SIN)
-        turn = determinant / np.sum(reach * arms, axis=1)
-        return _Root((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)
-
-    def times(self, x: Array, y: Array, m: Array) -> tuple[Array, Array, Array]:
+    def times(self, x: Array, y: Array, m: Array) -> Parts:
         return self.xx * x + self.xy * y, self.xy * x + self.yy * y, self.turn * m
+
+
+def _root_of(stretch: Array, reach: Array) -> _Root:
+    size = np.sqrt(np.sum(stretch * stretch, axis=1))
+    a, b = (stretch * np.minimum(1.0, MOST_STRETCH / np.maximum(size, MOST_STRETCH))[:, None]).T
+    determinant = np.sqrt(1.0 - a * a - b * b)
+    trace = np.sqrt(2.0 + 2.0 * determinant)
+    arms = np.sqrt(1.0 + a[:, None] * COS + b[:, None] * SIN)
+    turn = determinant / np.sum(reach * arms, axis=1)
+    return _Root((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)

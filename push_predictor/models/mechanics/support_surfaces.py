@@ -65,8 +65,11 @@ class RowSurfaces:
     def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
         """See PushSurfaces."""
         one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, x, y, moment)
+        share = self.share[rows]
+        if not share.any():
+            return one
         other = interpolated_gauge(self.sizes, self.high[rows] * self.per_table, x, y, moment)
-        return np.asarray(one + self.share[rows] * (other - one))
+        return np.asarray(one + share * (other - one))
 
 
 @dataclass(frozen=True, eq=False)
