@@ -22,6 +22,7 @@ from push_predictor.evaluation.offline import validate_recording, window_options
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.models.watch import Watch
 from push_predictor.planning import choose
 from push_predictor.planning.goal import Goal
@@ -50,6 +51,7 @@ def train(
     n_train: int | None = None,
     seed: int = 0,
     fit: bool = False,
+    mean: MeanChoice = "auto",
     watch: Watch | None = None,
 ) -> PushModel:
     """Train a model on recordings or push tables; a prior model needs none, but then a rig.
@@ -57,8 +59,9 @@ def train(
     kind: vhgp, gp, analytical or prior. rig: a Rig or a rig file, needed only where the data name none. name: of the
     model in the services; the first file's stem unless given. n_train: that many windows at random by the seed; by
     default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
-    an analytical model. watch: called with each stage and the share of the work done; by default stages are printed to
-    stderr.
+    an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
+    auto, which takes the one that predicts held-out training pushes better. watch: called with each stage and the
+    share of the work done; by default stages are printed to stderr.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
     watch = watch or _print_stage
@@ -73,7 +76,7 @@ def train(
         kind,
         name=name or (paths[0].name.split(".")[0] if paths else kind),
         sources=[path.name for path in paths],
-        options=TrainingOptions(n_train=n_train, seed=seed, fit=fit, supports=supports),
+        options=TrainingOptions(n_train=n_train, seed=seed, fit=fit, supports=supports, mean=mean),
         watch=watch,
     )
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from push_predictor.recordings.table import PushTable
     from push_predictor.types import Array
 
+MEANS = ("auto", "mechanics", "zero")
+LEARNT = ("vhgp", "gp")
 KINDS = ("vhgp", "gp", "analytical", "prior")
 
 
@@ -56,6 +58,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         type=int,
         metavar="M",
         help="vhgp: train a sparse model with M inducing inputs (default: dense up to 2000 windows, else M = 100)",
+    )
+    parser.add_argument(
+        "--mean",
+        choices=MEANS,
+        help="vhgp, gp: learn what fitted mechanics miss (mechanics), or the outcome itself (zero). auto takes the one "
+        "that predicts held-out training pushes better (default)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of --n-train (default 0)")
     parser.add_argument(
@@ -99,10 +107,20 @@ def run(options: argparse.Namespace) -> None:
         "n_train": len(model.training),
         "n_pushes": model.provenance.pushes,
         "n_rows": len(table),
+        **({"mean": _mean(model)} if kind in LEARNT else {}),
     }
     if not write_json(options, result):
-        used = f"{len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
-        print(f"{options.out}: {model.kind}, {f'trained on {used}' if len(table) else 'from outline and priors alone'}")
+        used = f"trained on {len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
+        about = " about fitted mechanics" if result.get("mean") == "mechanics" else ""
+        print(f"{options.out}: {model.kind}{about}, {used if len(table) else 'from outline and priors alone'}")
+
+
+def _mean(model: PushModel) -> str:
+    """The mean function of a learnt model, as in --mean."""
+    from push_predictor.models.predictors import GaussianProcessPredictor
+
+    predictor = model.predictor
+    return "mechanics" if isinstance(predictor, GaussianProcessPredictor) and predictor.mean is not None else "zero"
 
 
 def _check(options: argparse.Namespace, kind: str) -> None:
@@ -112,6 +130,8 @@ def _check(options: argparse.Namespace, kind: str) -> None:
     check_output("--out", options.out)
     if options.fit and kind != "analytical":
         raise RequestError("--kind", kind, "analytical with --fit: a learnt model has no friction to estimate")
+    if options.mean is not None and kind not in LEARNT:
+        raise RequestError("--kind", kind, "vhgp or gp with --mean")
     if options.inducing is not None and kind != "vhgp":
         raise RequestError("--kind", kind, "vhgp with --inducing")
     if options.inducing is not None and options.inducing < 1:
@@ -129,7 +149,12 @@ def _trained(
     if m := inducing_inputs(kind, count, options.inducing):
         print(f"train vhgp: sparse, {count} windows, up to {m} inducing inputs", file=sys.stderr)
     choices = TrainingOptions(
-        options.n_train, options.seed, fit=options.fit, inducing=options.inducing, supports=supports
+        options.n_train,
+        options.seed,
+        fit=options.fit,
+        inducing=options.inducing,
+        supports=supports,
+        mean=options.mean or "auto",
     )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
     with progress(f"train {kind}"):

@@ -67,10 +67,10 @@ def train_learnt(
 
 @dataclass(frozen=True, eq=False)
 class FittedMean:
-    """Mechanics as mean, and the number of parameters that the rows determine."""
+    """Mechanics as mean. residuals (m, 3): of the rows that it was fitted to, each push under a fit without it."""
 
     mean: MechanicsMean
-    count: float
+    residuals: Array
 
 
 def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
@@ -82,45 +82,47 @@ def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
     mechanics, known = PushMechanics(rig.outline, rig.pusher_radius, support), fit_rows(rows)
     names = [name for name in candidates(mechanics, known) if not BY_NAME[name].needs]
     fit = fit_jointly(mechanics, known, names)
-    travel = float(np.mean(rows.inputs[:, 0] * rows.duration))
-    return FittedMean(
-        MechanicsMean(FittedMechanics(mechanics, fit.values, fit.covariance), travel), fit.effective_parameters
-    )
+    mean = MechanicsMean(FittedMechanics(mechanics, fit.values, fit.covariance), _mean_travel(rows))
+    push = Push(rows.inputs, rows.duration, rows.covariates)
+    return FittedMean(mean, fit.held_out_residuals / mean.size(push)[:, None])
+
+
+def _mean_travel(rows: PushTable) -> float:
+    return float(np.mean(rows.inputs[:, 0] * rows.duration))
 
 
 @dataclass(frozen=True, eq=False)
 class _Trained:
-    """A predictor with the log density (nats, SI units) of its held-out training pushes, less what was fitted."""
+    """A predictor and its score: log density of held-out training pushes (SI) less the number of hyperparameters."""
 
     predictor: GaussianProcessPredictor
     score: float
 
 
 def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch) -> _Trained:
-    push = Push(rows.inputs, rows.duration, rows.covariates)
-    targets = rows.outcomes if about is None else about.mean.residuals(push, rows.outcomes)
-    scaling = _scaling(rows, rig, targets, centred=about is None)
-    features, scaled = scaling.features(rig.outline, rows.inputs), scaling.outcomes(targets)
-    block = np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
+    push, mean = Push(rows.inputs, rows.duration, rows.covariates), None if about is None else about.mean
+    targets = rows.outcomes if mean is None else mean.residuals(push, rows.outcomes)
+    # With more rows than the mechanics are fitted to, these are as good as held out.
+    observed = about.residuals if about is not None and len(about.residuals) == len(rows) else targets
+    scaling = _scaling(rows, rig, targets, centred=mean is None)
+    features, block = scaling.features(rig.outline, rows.inputs), _blocks(rows)
     regressions: list[Regression] = []
-    for output, column in zip(OUTPUTS, scaled.T, strict=True):
-        watch(f"train {options.kind}: {output}", 0.3 * len(regressions))
-        regressions.append(_regression(features, column, options, None if about is None else block))
-    predictor = GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=None if about is None else about.mean)
-    if options.mean != "auto":
-        return _Trained(predictor, 0.0)
-    score = sum(held_out_score(r, block) for r in regressions) - len(rows) * float(np.log(scaling.outcome_sd).sum())
-    if about is not None:
-        score -= about.count + len(OUTPUTS) * float(np.log(about.mean.size(push)).sum())
-    return _Trained(predictor, score)
+    score = 0.0 if mean is None else -len(OUTPUTS) * float(np.log(mean.size(push)).sum())
+    for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
+        watch(f"train {options.kind}: {OUTPUTS[k]}", 0.3 * k)
+        regression: Regression = _learnt(features, column, options)
+        if mean is not None:
+            constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
+            regression = best_held_out([constant, regression], block, seen)
+        if options.mean == "auto":
+            score += held_out_score(regression, block, seen) - len(rows) * float(np.log(scaling.outcome_sd[k]))
+        regressions.append(regression)
+    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), score)
 
 
-def _regression(features: Array, column: Array, options: LearntOptions, block: IntArray | None) -> Regression:
-    """The regression of an output; of residuals (with block, the push of each row) only if it is worth it."""
-    learnt = _learnt(features, column, options)
-    if block is None:
-        return learnt
-    return best_held_out([fit_constant(features, column, heavy_tails=options.kind != "gp"), learnt], block)
+def _blocks(rows: PushTable) -> IntArray:
+    """The block (n,) in which each row is held out: its push, or a group of pushes."""
+    return np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
 
 
 def _learnt(features: Array, column: Array, options: LearntOptions) -> Regression:

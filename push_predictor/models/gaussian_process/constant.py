@@ -62,22 +62,23 @@ class ConstantNoise:
         return self.predict(self.inputs)
 
 
-def fit_constant(inputs: Array, outputs: Array, *, heavy_tails: bool) -> ConstantNoise:
+def fit_constant(inputs: Array, outputs: Array, *, heavy_tails: bool, observed: Array | None = None) -> ConstantNoise:
     """Fit the noise by maximum likelihood: Gaussian, or with a spread (weak prior about 1) of its log variance.
 
-    inputs (n, D) and outputs (n,), of mean about zero. Raises TrainingError when the rows do not match or are not
-    finite.
+    inputs (n, D) and outputs (n,), of mean about zero. observed (n,): the outputs that the noise is fitted to, where
+    others than `outputs` show it better. Raises TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
-    gaussian = float(np.log(np.mean(outputs**2) + _SMALLEST_VARIANCE))
+    observed = outputs if observed is None else observed
+    gaussian = float(np.log(np.mean(observed**2) + _SMALLEST_VARIANCE))
     if not heavy_tails:
         return ConstantNoise(inputs, outputs, ConstantParameters(gaussian, 0.0))
 
     def cost(vector: Array) -> float:
         spread = min(float(np.exp(vector[1])), _WIDEST)
-        latent = _same_everywhere(ConstantParameters(float(vector[0]), spread), 0.0, len(outputs))
+        latent = _same_everywhere(ConstantParameters(float(vector[0]), spread), 0.0, len(observed))
         penalty = 0.5 * ((vector[1] - _USUAL_LOG_SPREAD) / _LOG_SPREAD_SD) ** 2
-        return float(penalty - exact_log_density(latent, outputs).sum())
+        return float(penalty - exact_log_density(latent, observed).sum())
 
     found = minimize(cost, [gaussian - 0.5, _USUAL_LOG_SPREAD], method="Nelder-Mead", options={"xatol": 1e-4}).x
     return ConstantNoise(inputs, outputs, ConstantParameters(float(found[0]), min(float(np.exp(found[1])), _WIDEST)))

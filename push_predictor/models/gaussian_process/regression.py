@@ -10,22 +10,23 @@ from push_predictor.models.gaussian_process.gp import GaussianProcess
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.sparse.vhgp import SparseVHGP
 from push_predictor.models.gaussian_process.vhgp import VHGP
-from push_predictor.types import IntArray
+from push_predictor.types import Array, IntArray
 
 KernelRegression: TypeAlias = GaussianProcess | VHGP | SparseVHGP
 Regression: TypeAlias = KernelRegression | ConstantNoise
 
 
-def held_out_score(regression: Regression, block: IntArray) -> float:
+def held_out_score(regression: Regression, block: IntArray, observed: Array | None = None) -> float:
     """Log density of the training rows when their blocks (n,) are held out, less the number of hyperparameters, nats.
 
-    The hyperparameters are those of all rows, which makes the held-out density too good by about their number (Akaike
-    1974, for fits by maximum likelihood).
+    observed (n,): the outputs as they are if also their mean function is fitted without the block; by default the
+    regression's. The hyperparameters are those of all rows, which makes the held-out density too good by about their
+    number (Akaike 1974, for fits by maximum likelihood).
     """
-    density = exact_log_density(regression.held_out(block), regression.outputs)
-    return float(density.sum()) - regression.parameters.count
+    observed = regression.outputs if observed is None else observed
+    return float(exact_log_density(regression.held_out(block), observed).sum()) - regression.parameters.count
 
 
-def best_held_out(regressions: Sequence[Regression], block: IntArray) -> Regression:
+def best_held_out(regressions: Sequence[Regression], block: IntArray, observed: Array | None = None) -> Regression:
     """The regression with the highest held-out score; of equal ones the first."""
-    return max(regressions, key=lambda regression: held_out_score(regression, block))
+    return max(regressions, key=lambda regression: held_out_score(regression, block, observed))

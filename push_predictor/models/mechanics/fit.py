@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -71,6 +72,17 @@ class JointFit:
         Few pushes decide on some parameters, such as friction, which only those show that slip. The sandwich estimate
         is then too small, because the residuals of these pushes have shrunk.
         """
+        change = self._without_pushes
+        return np.asarray(change.T @ change * (1.0 - 1.0 / self.rows.pushes))
+
+    @property
+    def held_out_residuals(self) -> Array:
+        """Residuals (n, 3) of each push under the parameters fitted without it."""
+        return np.asarray(self.residuals - np.einsum("nkp,np->nk", self.jacobian, self._without_pushes[self.rows.push]))
+
+    @cached_property
+    def _without_pushes(self) -> Array:
+        """Change (pushes, p) of the values when a push is left out of the fit, by a Gauss-Newton step."""
         scaled = self.residuals / self.scale
         weight, bend = student_weights(scaled) / self.scale**2, student_curvature(scaled) / self.scale**2
         curvature = _curvature(self.jacobian, bend, self.names)
@@ -80,16 +92,8 @@ class JointFit:
             jacobian = self.jacobian[of_push]
             slope = np.einsum("nkp,nk,nk->p", jacobian, weight[of_push], self.residuals[of_push])
             without = curvature - np.einsum("nkp,nk,nkq->pq", jacobian, bend[of_push], jacobian)
-            change[push] = np.linalg.solve(without, slope)
-        return np.asarray(change.T @ change * (1.0 - 1.0 / self.rows.pushes))
-
-    @property
-    def effective_parameters(self) -> float:
-        """How many of the parameters the rows determine, and not the priors."""
-        weight = student_curvature(self.residuals / self.scale) / self.scale**2
-        curvature = _curvature(self.jacobian, weight, self.names)
-        prior = np.array([BY_NAME[name].spread for name in self.names]) ** -2.0
-        return len(self.names) - float(np.sum(np.diagonal(np.linalg.inv(curvature)) * prior))
+            change[push] = -np.linalg.solve(without, slope)
+        return change
 
 
 def fit_jointly(

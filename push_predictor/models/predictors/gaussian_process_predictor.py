@@ -14,6 +14,7 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.scalar_mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean
@@ -142,7 +143,9 @@ class GaussianProcessPredictor(WithoutEffects):
 
     def with_scalar_mechanics(self) -> GaussianProcessPredictor:
         """See Predictor."""
-        return self
+        if self.mean is None:
+            return self
+        return replace(self, mean=replace(self.mean, fitted=scalar_mechanics(self.mean.fitted)))
 
     def _units(self, push: Push) -> Array:
         """Standard deviations of what was learnt, in units of the outcomes, (3,) or (n, 3)."""

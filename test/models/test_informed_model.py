@@ -1,0 +1,164 @@
+"""Learnt models about fitted mechanics: training, choice, predictions at other speeds, files, tables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import RADIUS, square_rig
+
+from push_predictor.models.gaussian_process.constant import ConstantNoise, fit_constant
+from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process.quadrature import exact_log_density
+from push_predictor.models.gaussian_process.regression import best_held_out, held_out_score
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.request import PushRequest
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.train import TrainingOptions, retrain_model, train_model
+from push_predictor.recordings.table import PushTable
+
+RIG = square_rig()
+TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
+NOISE = np.array([2e-4, 2e-4, 5e-3])  # m, m, rad on a path of 4 mm
+
+
+def pushes(n: int, seed: int, speeds: tuple[float, float] = (0.02, 0.02)) -> PushTable:
+    """Windows by mechanics unlike the textbook's, noise in proportion to the path, two windows per push."""
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.uniform(*speeds, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    duration = np.full(n, 0.2)
+    outcomes = PushMechanics(RIG.outline, RADIUS).displacement(TRUE, inputs, duration)
+    outcomes += rng.standard_normal((n, 3)) * NOISE * (inputs[:, :1] * 0.2 / 0.004)
+    return PushTable(inputs, duration, outcomes, np.array([f"{seed}-{k // 2}" for k in range(n)]))
+
+
+def trained(table: PushTable, kind: str = "vhgp", **options: object) -> PushModel:
+    return train_model(table, RIG, kind, name="m", options=TrainingOptions(**{"mean": "mechanics", **options}))
+
+
+def learnt(model: PushModel) -> GaussianProcessPredictor:
+    assert isinstance(model.predictor, GaussianProcessPredictor)
+    return model.predictor
+
+
+def exact_nlpd(model: PushModel, table: PushTable) -> float:
+    density = model.exact_log_density(table)
+    assert density is not None
+    return -float(density.sum(axis=1).mean())
+
+
+@pytest.fixture(scope="module")
+def informed() -> PushModel:
+    """A VHGP of 24 windows at 20 mm/s, about mechanics."""
+    return trained(pushes(24, 0))
+
+
+@pytest.fixture(scope="module")
+def with_function() -> PushModel:
+    """A GP of 60 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
+    table = pushes(60, 1)
+    return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.sin(9.0 * table.inputs[:, 2:])), "gp")
+
+
+def test_few_pushes_teach_more_with_mechanics_than_without(informed: PushModel) -> None:
+    later, plain = pushes(200, 2), trained(informed.training, mean="zero")
+    assert exact_nlpd(informed, later) < exact_nlpd(plain, later) - 1.0
+
+
+def test_without_a_function_to_learn_the_residual_is_constant_noise(informed: PushModel) -> None:
+    assert sum(isinstance(r, ConstantNoise) for r in learnt(informed).regressions) >= 2
+
+
+def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> None:
+    assert not isinstance(learnt(with_function).regressions[0], ConstantNoise)
+    assert learnt(with_function).gaussian
+
+
+def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
+    table = pushes(24, 3)
+    assert learnt(trained(table, mean="auto")).mean is not None
+    senseless = replace(table, outcomes=table.outcomes * [-1.0, 1.0, -1.0])
+    assert learnt(trained(senseless, mean="auto")).mean is None
+
+
+def test_predicts_pushes_of_other_speeds_as_well_as_a_model_trained_there(informed: PushModel) -> None:
+    for speed in (0.01, 0.15):
+        later, there = pushes(100, 4, (speed, speed)), pushes(48, 5, (speed, speed))
+        assert exact_nlpd(informed, later) < exact_nlpd(trained(there, mean="zero"), later)
+        assert not informed.predict_rows(later.inputs, later.duration).in_domain.any()
+
+
+def test_density_and_moments_are_those_of_the_same_gaussian(with_function: PushModel) -> None:
+    table = pushes(20, 6, (0.03, 0.03))
+    found = with_function.predict_rows(table.inputs, table.duration)
+    push = Push(table.inputs, table.duration, {})
+    density = learnt(with_function)._log_density(learnt(with_function).latent(table.inputs), push, table.outcomes)
+    expected = -0.5 * np.log(2.0 * np.pi * found.std**2) - 0.5 * ((table.outcomes - found.mean) / found.std) ** 2
+    np.testing.assert_allclose(density, expected, rtol=1e-9)
+
+
+def test_saved_and_loaded_it_predicts_the_same(informed: PushModel, with_function: PushModel, tmp_path: Path) -> None:
+    table = pushes(20, 7)
+    for model in (informed, with_function):
+        save_model(model, tmp_path / model.kind)
+        loaded = load_model(tmp_path / model.kind)
+        found, expected = (m.predict_rows(table.inputs, table.duration) for m in (loaded, model))
+        np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9, atol=1e-18)
+    assert exact_nlpd(load_model(tmp_path / "vhgp"), table) == pytest.approx(exact_nlpd(informed, table), rel=1e-9)
+
+
+def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_function: PushModel) -> None:
+    few, many = pushes(3, 8), pushes(40, 9)
+    for model in (informed, with_function):
+        table = tabulate(model)
+        assert table.tabulated, table.how
+        for rows in (few, many):
+            found, expected = (m.predict_rows(rows.inputs, rows.duration) for m in (table, model))
+            assert np.max(np.abs(found.mean - expected.mean) / expected.std) < 1e-3
+            np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
+        one = table.predict_one(PushRequest(*few.inputs[0], 0.2))
+        np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
+
+
+def test_retrained_it_keeps_its_kind_of_mean(informed: PushModel) -> None:
+    assert learnt(retrain_model(informed, pushes(30, 10))).mean is not None
+
+
+def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:
+    rows = with_function.training
+    held, seen = with_function.held_out_moments(), with_function.predict_rows(rows.inputs, rows.duration)
+    assert np.all(np.diagonal(held.covariance - seen.covariance, axis1=1, axis2=2)[:, 0] > 0.0)
+    assert np.abs(held.mean - seen.mean).max() < 3e-3
+
+
+def test_constant_noise_follows_the_tails_of_the_residuals() -> None:
+    rng = np.random.default_rng(0)
+    outputs = rng.standard_t(3, 400)
+    inputs = rng.standard_normal((400, 2))
+    heavy, light = (fit_constant(inputs, outputs, heavy_tails=tails) for tails in (True, False))
+    later = rng.standard_t(3, 4000)
+    score = [exact_log_density(r.predict(np.zeros((4000, 2))), later).mean() for r in (heavy, light)]
+    assert score[0] > score[1] + 0.05
+    assert light.gaussian
+    assert not heavy.gaussian
+    assert light.noise_variance == pytest.approx(np.mean(outputs**2))
+
+
+def test_a_regression_must_be_worth_its_hyperparameters() -> None:
+    rng = np.random.default_rng(1)
+    inputs, noise = rng.standard_normal((40, 2)), rng.standard_normal(40)
+    block = np.arange(40)
+    gp = fit_gp(inputs, noise)
+    alone = fit_constant(inputs, noise, heavy_tails=False)
+    assert best_held_out([alone, gp], block) is alone
+    density = exact_log_density(alone.predict(inputs), noise).sum()
+    assert held_out_score(alone, block) == pytest.approx(density - 1.0)
+    wave = np.sin(3.0 * inputs[:, 0]) + 0.1 * noise
+    assert best_held_out([fit_constant(inputs, wave, heavy_tails=False), found := fit_gp(inputs, wave)], block) is found
