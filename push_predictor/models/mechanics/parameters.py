@@ -126,3 +126,18 @@ class RowValues:
     def pair(self, first: str, second: str) -> Array:
         """(n, 2) of two parameters."""
         return np.column_stack([self.of(first), self.of(second)])
+
+
+def parameter_table() -> str:
+    """All parameters as a Markdown table, for docs and reports."""
+    head = ["| parameter | part | unit | textbook | range | prior spread | meaning |", "|" + " --- |" * 7]
+    rows = [
+        f"| `{p.name}` | {p.part} | {p.unit} | {p.textbook:g} | {_minus(p.low)} to {_minus(p.high)} | {p.spread:g} "
+        f"| {p.meaning}{' *' if p.needs else ''} |"
+        for p in PARAMETERS
+    ]
+    return "\n".join([*head, *rows])
+
+
+def _minus(value: float) -> str:
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
