@@ -17,9 +17,9 @@ import numpy as np
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
-from push_predictor.models.mechanics.scalar_mechanics import scalar_mechanics
-from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.types import Array
 
 RADIUS = 0.00475  # m

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.shapes import square
-from push_predictor.models.mechanics.contact_solution import Driven, Touch, TwistOf, driven
 from push_predictor.models.mechanics.limit_surface import Support, body_twist
-from push_predictor.models.mechanics.load_map import LoadMap, load_map
+from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, TwistOf, driven
 from push_predictor.models.mechanics.pressure import patch
-from push_predictor.models.mechanics.surfaces import PowerSurface
 from push_predictor.types import Array
 
 SURFACES: dict[str, LoadMap | PowerSurface] = {

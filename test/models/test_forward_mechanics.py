@@ -18,13 +18,13 @@ from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, squar
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.forward import EXPONENT_KNOTS, PushMechanics
 from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.load_map import load_map
-from push_predictor.models.mechanics.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.load_map import load_map
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
-from push_predictor.models.mechanics.point_friction import load_of_twist
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
-from push_predictor.models.mechanics.support_surfaces import row_surfaces
-from push_predictor.models.mechanics.surfaces import PowerSurface
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array
 

@@ -14,7 +14,7 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation
 from push_predictor.models.mechanics.ladder import candidates, climb
 from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 
 NOISE = np.array([3e-5, 3e-5, 1e-3])
 TRUE = {"contact_friction": 0.15, "centre_y": 0.006}

@@ -12,11 +12,11 @@ from push_predictor.errors import RigError
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
 from push_predictor.models.mechanics.limit_surface import uniform_support
-from push_predictor.models.mechanics.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.point_friction import load_of_twist, twist_of_load
+from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
+from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist, twist_of_load
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
+from push_predictor.models.mechanics.limit_surfaces.surfaces import DIRECTIONS, PowerSurface, spread_by_direction
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch, supported_at
-from push_predictor.models.mechanics.support_surfaces import row_surfaces
-from push_predictor.models.mechanics.surfaces import DIRECTIONS, PowerSurface, spread_by_direction
 from push_predictor.types import Array
 
 RADIUS = 0.05  # m, of a disc

@@ -10,9 +10,9 @@ from push_predictor.geometry.nearest import contact_on
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
-from push_predictor.models.mechanics.scalar_mechanics import FEW, scalar_mechanics
-from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.models.mechanics.scalar.mechanics import FEW, scalar_mechanics
 from push_predictor.types import Array
 
 SQUARE = shape_outline("rect1")

@@ -15,16 +15,16 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline, Projection
-from push_predictor.models.mechanics.contact_solution import Driven, Touch, driven
-from push_predictor.models.mechanics.friction_cone import friction_cone
-from push_predictor.models.mechanics.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, SameSurface, row_surfaces
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, driven
+from push_predictor.models.mechanics.motion.friction_cone import friction_cone
+from push_predictor.models.mechanics.motion.recorded_push import TruePush, true_push
+from push_predictor.models.mechanics.motion.sweep import swept
 from push_predictor.models.mechanics.parameters import ParameterValues, RowValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
-from push_predictor.models.mechanics.recorded_push import TruePush, true_push
-from push_predictor.models.mechanics.support_surfaces import PushSurfaces, SameSurface, row_surfaces
-from push_predictor.models.mechanics.surfaces import PowerSurface
-from push_predictor.models.mechanics.sweep import swept
 from push_predictor.types import Array, IntArray
 
 EXPONENT_KNOTS = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0)

@@ -14,7 +14,7 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.scalar_mechanics import scalar_mechanics
+from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean

@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.scalar_mechanics import scalar_mechanics
+from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.without_effects import WithoutEffects

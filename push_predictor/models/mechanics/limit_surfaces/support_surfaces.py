@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from push_predictor.models.mechanics.load_map import LoadMap, interpolated, interpolated_gauge
-from push_predictor.models.mechanics.surfaces import PowerSurface
+from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, interpolated, interpolated_gauge
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.types import Array, IntArray
 
 

@@ -9,9 +9,15 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from push_predictor.models.mechanics.load_map import AZIMUTHS, ELEVATIONS
-from push_predictor.models.mechanics.loaded_surface import COS, MOST_STRETCH, PULL_ROUNDS, SIN, SMALLEST_MARGIN
-from push_predictor.models.mechanics.support_surfaces import PushSurfaces, RowSurfaces, SameSurface
+from push_predictor.models.mechanics.limit_surfaces.load_map import AZIMUTHS, ELEVATIONS
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import (
+    COS,
+    MOST_STRETCH,
+    PULL_ROUNDS,
+    SIN,
+    SMALLEST_MARGIN,
+)
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, RowSurfaces, SameSurface
 from push_predictor.types import Array
 
 Three: TypeAlias = tuple[float, float, float]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from push_predictor.models.mechanics.contact_solution import BISECT_EVERY, ROOT_STEPS, ROOT_TOLERANCE
-from push_predictor.models.mechanics.scalar_surface import Three, Twist
+from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, ROOT_STEPS, ROOT_TOLERANCE
+from push_predictor.models.mechanics.scalar.surface import Three, Twist
 
 
 class ScalarTouch(NamedTuple):

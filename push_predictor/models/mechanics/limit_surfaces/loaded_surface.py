@@ -8,9 +8,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from push_predictor.models.mechanics.contact_solution import Rows
-from push_predictor.models.mechanics.support_surfaces import PushSurfaces
-from push_predictor.models.mechanics.surfaces import DIRECTIONS
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces
+from push_predictor.models.mechanics.limit_surfaces.surfaces import DIRECTIONS
+from push_predictor.models.mechanics.motion.contact_solution import Rows
 from push_predictor.types import Array, IntArray
 
 MOST_STRETCH = 0.95  # at 1 the friction along one direction is infinite

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.models.mechanics.contact_solution import Touch
+from push_predictor.models.mechanics.motion.contact_solution import Touch
 from push_predictor.models.mechanics.parameters import RowValues
 from push_predictor.types import Array, IntArray
 

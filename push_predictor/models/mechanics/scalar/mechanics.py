@@ -15,11 +15,11 @@ import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import RECORDING, FittedMechanics
-from push_predictor.models.mechanics.friction_cone import REFERENCE_SPEED, SLOWEST
+from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
+from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
-from push_predictor.models.mechanics.scalar_contact import LastContact, ScalarTouch, driven_scalar
-from push_predictor.models.mechanics.scalar_surface import ScalarSurface, Three, loaded, root_of_stretch, scalar_surface
-from push_predictor.models.mechanics.sweep import LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
+from push_predictor.models.mechanics.scalar.contact import LastContact, ScalarTouch, driven_scalar
+from push_predictor.models.mechanics.scalar.surface import ScalarSurface, Three, loaded, root_of_stretch, scalar_surface
 from push_predictor.types import Array
 
 FEW = 16  # pushes: as fast as an array of them

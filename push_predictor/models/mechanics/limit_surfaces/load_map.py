@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from push_predictor.models.mechanics.point_friction import power_of_twist, twist_of_load
+from push_predictor.models.mechanics.limit_surfaces.point_friction import power_of_twist, twist_of_load
+from push_predictor.models.mechanics.limit_surfaces.surfaces import spread_by_direction
 from push_predictor.models.mechanics.pressure import PressureDistribution
-from push_predictor.models.mechanics.surfaces import spread_by_direction
 from push_predictor.types import Array, IntArray
 
 AZIMUTHS, ELEVATIONS = 144, 49  # of the force's direction, and of the moment from none to a pure one

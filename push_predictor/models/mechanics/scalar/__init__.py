@@ -1,0 +1,1 @@
+"""The forward model in plain numbers, for single pushes."""
