@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,10 +18,12 @@ from push_predictor.commands.output import (
     progress,
     warn,
     write_json,
+    write_text,
 )
-from push_predictor.errors import RequestError
+from push_predictor.errors import PushPredictorError, RequestError
 
 if TYPE_CHECKING:
+    from push_predictor.models.mechanics.ladder import Rung
     from push_predictor.models.push_model import PushModel
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.table import PushTable
@@ -98,8 +101,9 @@ def run(options: argparse.Namespace) -> None:
     windows = WindowOptions(stride=options.stride)
     with progress("read"):
         table = load_data(options.data, rig, windows, numbered=bool(supports)) if options.data else empty_table()
-    model = _trained(options, kind, table, rig, supports)
+    model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
+    lines = _saved_ladder(model, ladder, options.out)
     result = {
         "model": str(options.out),
         "name": model.name,
@@ -113,6 +117,7 @@ def run(options: argparse.Namespace) -> None:
         used = f"trained on {len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
         about = " about fitted mechanics" if result.get("mean") == "mechanics" else ""
         print(f"{options.out}: {model.kind}{about}, {used if len(table) else 'from outline and priors alone'}")
+        print("\n".join(lines), end="\n" if lines else "")
 
 
 def _mean(model: PushModel) -> str:
@@ -142,8 +147,8 @@ def _check(options: argparse.Namespace, kind: str) -> None:
 
 def _trained(
     options: argparse.Namespace, kind: str, table: PushTable, rig: Rig, supports: Mapping[int, Array]
-) -> PushModel:
-    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_model, training_rows
+) -> tuple[PushModel, list[Rung]]:
+    from push_predictor.models.train import TrainingOptions, inducing_inputs, train_with_ladder, training_rows
 
     count = len(training_rows(table, options.n_train, options.seed))
     if m := inducing_inputs(kind, count, options.inducing):
@@ -158,4 +163,22 @@ def _trained(
     )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
     with progress(f"train {kind}"):
-        return train_model(table, rig, kind, name=name, sources=sources, options=choices)
+        return train_with_ladder(table, rig, kind, name=name, sources=sources, options=choices)
+
+
+def _saved_ladder(model: PushModel, ladder: list[Rung], out: Path) -> list[str]:
+    """Save the ladder of fitted mechanics next to the model as JSON and as a page; return it as lines of text."""
+    if not ladder:
+        return []
+    from push_predictor.evaluation.ladder.ladder_page import write_ladder_page
+    from push_predictor.evaluation.ladder.ladder_text import ladder_json, ladder_lines
+    from push_predictor.evaluation.ladder.scored_ladder import score_ladder
+
+    scored = score_ladder(model, ladder)
+    numbers, page = (out.parent / f"{out.stem}.ladder.{suffix}" for suffix in ("json", "html"))
+    write_text(numbers, json.dumps(ladder_json(scored), indent=1, allow_nan=False) + "\n")
+    try:
+        write_ladder_page(page, scored)
+    except PushPredictorError as error:
+        warn(f"{page}: not written. {error}")
+    return [*ladder_lines(scored), f"Ladder: {numbers}, {page}"]

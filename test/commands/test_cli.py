@@ -22,6 +22,7 @@ from push_predictor import __version__
 from push_predictor.cli import COMMANDS, main
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.store.model_file import load_model
 from push_predictor.recordings.load import load_data
 from push_predictor.recordings.rig import load_rig
@@ -189,6 +190,15 @@ def test_train_reports_model_windows_and_pushes(place: Place):
     assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
     assert json.loads(Path(place.path("train.json")).read_text())["kind"] == "analytical"
     assert load_model(Path(place.path("gp.pushmodel"))).name == "gp"
+
+
+def test_train_fit_prints_the_ladder_and_saves_it_next_to_the_model(place: Place):
+    printed, model = place.printed["analytical"], load_model(place.path("analytical.pushmodel"))
+    assert "0     textbook" in printed and "Parameters fitted to all" in printed
+    saved = json.loads(Path(place.path("analytical.ladder.json")).read_text())
+    assert isinstance(model.predictor, MechanicsPredictor)
+    assert [parameter["name"] for parameter in saved["parameters"]] == list(model.predictor.fitted.values)
+    assert "<img" in Path(place.path("analytical.ladder.html")).read_text()
 
 
 def test_train_accepts_the_old_name_of_kind_with_a_warning(place: Place, run):
