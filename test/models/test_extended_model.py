@@ -29,6 +29,7 @@ from push_predictor.models.push_model import KINDS, PushModel
 from push_predictor.models.request import PushRequest, check_request, check_table
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
@@ -66,6 +67,12 @@ def assert_same(one: Prediction, other: Prediction, **precision: float) -> None:
 
 
 # --- predictions -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(autouse=True)
+def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables of prior models are refused after some knots, and not built for seconds."""
+    monkeypatch.setattr(tabulated_prior, "MOST_KNOTS", 10)
 
 
 @pytest.mark.parametrize("kind", KINDS)

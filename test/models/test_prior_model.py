@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from push_predictor.cli import main
 from push_predictor.errors import ModelFileError, RequestError, RigError, TrainingError
 from push_predictor.evaluation.alarm.scores import calibrate
 from push_predictor.evaluation.validation import compare, metrics_json
+from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements
 from push_predictor.models.mechanics.parameters import BY_NAME
@@ -25,9 +27,11 @@ from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.arrays_record import read_arrays
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import retrain_model, train_model
 from push_predictor.planning.push_windows import windows_of
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
@@ -70,6 +74,13 @@ def trained(rows: PushTable) -> PushModel:
 @pytest.fixture(scope="module")
 def after_ten() -> PushModel:
     return trained(pushed(20, 3))
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table of few knots, however far off."""
+    for name, value in (("CELL", 0.03), ("ANGLE_CELLS", 4), ("MEAN_TOLERANCE", np.inf), ("SPREAD_TOLERANCE", np.inf)):
+        monkeypatch.setattr(tabulated_prior, name, value)
 
 
 # --- width -------------------------------------------------------------------------------------------------
@@ -197,6 +208,7 @@ def test_domain_is_the_whole_outline_at_quasi_static_speeds(untrained: PushModel
 # --- without training rows ---------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("coarse")
 def test_untrained_model_describes_itself(untrained: PushModel, tmp_path: Path) -> None:
     assert "trained on no push" in repr(untrained)
     untrained.save(tmp_path / "before.pushmodel")
@@ -247,11 +259,45 @@ def test_planning_takes_usual_windows_without_training_rows(untrained: PushModel
     assert untrained.usual_speed == 0.02
 
 
-def test_tabulated_model_predicts_the_same(untrained: PushModel) -> None:
-    tabulated, inputs = tabulate(untrained), some_inputs(3, 2)
-    np.testing.assert_array_equal(
-        tabulated.predict_rows(inputs, np.full(3, 0.2)).mean, untrained.predict_rows(inputs, np.full(3, 0.2)).mean
+@pytest.mark.usefixtures("coarse")
+def test_table_agrees_with_the_model_at_its_knots_and_beyond_its_range(untrained: PushModel) -> None:
+    tabulated = tabulate(untrained)
+    assert "table of 600 knots" in tabulated.how
+    edges = untrained.rig.outline.contact_on_edge(
+        np.array([0, 1, 3, 2]), 0.5 - 0.5 * np.cos(np.pi * np.array([0.2, 0.4, 0.6, 0.8]))
     )
+    travel = np.array([5e-4, 0.03, 0.03, 0.04])  # m; the last is beyond the table
+    inputs = np.column_stack([np.full(4, 0.02), edges, [0.0, -0.7, 1.4, 0.0]])
+    found, exact = (model.predict_rows(inputs, travel / 0.02) for model in (tabulated, untrained))
+    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, exact.covariance, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(found.process_covariance, exact.process_covariance, rtol=1e-4, atol=1e-12)
+    alone = [tabulated.predict_rows(inputs[k : k + 1], travel[k : k + 1] / 0.02).covariance[0] for k in range(4)]
+    np.testing.assert_allclose(alone, found.covariance, rtol=1e-9)
+
+
+def test_table_that_is_too_far_off_is_not_used(untrained: PushModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("CELL", 0.1), ("ANGLE_CELLS", 4), ("FEWEST_CELLS", 4)):
+        monkeypatch.setattr(tabulated_prior, name, value)
+    tabulated, inputs = tabulate(untrained), some_inputs(3, 2)
+    assert "too far off" in tabulated.how
+    found = tabulated.predict_rows(inputs, np.full(3, 0.2))
+    np.testing.assert_array_equal(found.mean, untrained.predict_rows(inputs, np.full(3, 0.2)).mean)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
+def test_table_is_accurate_and_fast(rig: Rig) -> None:
+    model = train_model(empty_table(), rig, "prior", name="p")
+    tabulated, inputs, duration = tabulate(model), some_inputs(150, 3), np.full(150, 0.3)
+    assert tabulated.how.startswith("table of")
+    found, exact = (m.predict_rows(inputs, duration) for m in (tabulated, model))
+    assert np.quantile(np.abs(found.mean - exact.mean) / exact.std, 0.9) < 0.06
+    assert np.quantile(np.abs(found.std / exact.std - 1.0), 0.9) < 0.12
+    start = time.process_time()
+    for k in range(100):
+        tabulated.predict_rows(inputs[k : k + 1], duration[:1])
+    assert time.process_time() - start < 100 * 1e-3
 
 
 def test_alarm_and_trace_ask_for_training_pushes(untrained: PushModel) -> None:

@@ -6,7 +6,7 @@ and every other model is predicted by the model itself.
 
 The mechanics have no table, neither alone nor as the mean of a learnt model nor in effects: they have kinks where
 contacts begin to slip, and a table would have to be very fine there. A single push is computed in plain numbers
-instead.
+instead. A prior model averages over many parameters, and has a coarse table of its own (tabulated_prior).
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ import numpy as np
 
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import GaussianProcessPredictor, Moments
+from push_predictor.models.predictors import GaussianProcessPredictor, Moments, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
+from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
 MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
@@ -128,6 +129,9 @@ class TabulatedModel:
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
     learnt = _without_mean(model.base)
+    if isinstance(learnt.predictor, PriorPredictor):
+        table, how = tabulated_prior(learnt.predictor)
+        return TabulatedModel(model if table is None else _with_base(model, table), how)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, "exact: only learnt models have a table")
     how = ""
@@ -141,6 +145,11 @@ def tabulate(model: PushModel) -> TabulatedModel:
             return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
         how = f"a table gives {error}; "
     return TabulatedModel(model, f"exact: {how}too far off")
+
+
+def _with_base(model: PushModel, base: PriorPredictor) -> PushModel:
+    predictor = model.predictor.with_base(base) if model.predictor.effects else base
+    return replace(model, predictor=predictor)
 
 
 def _without_mean(model: PushModel) -> PushModel:
