@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper_studies import made_up_corpus, made_up_study
+from paper_studies import PLAN, made_up_corpus, made_up_study
 from push_predictor_paper.claims.comparison import mean_gain
 from push_predictor_paper.claims.comparison.findings import (
     better_density,
@@ -16,11 +17,11 @@ from push_predictor_paper.claims.comparison.findings import (
     similar_mean,
 )
 from push_predictor_paper.claims.comparison.mean_gain import improves, where_it_counts
-from push_predictor_paper.claims.comparison.section import section
+from push_predictor_paper.claims.comparison.section import informed_table, section
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.fits.crossing import Crossing, below_zero_from, crossing
-from push_predictor_paper.fits.curves import Curves
-from push_predictor_paper.fits.fit import SPLITS, Fit, Score
+from push_predictor_paper.fits.curves import Curves, curves
+from push_predictor_paper.fits.fit import KINDS, SPLITS, Fit, Score
 from push_predictor_paper.fits.held_out import HeldOut
 
 from push_predictor.evaluation.push_scores import PushScores
@@ -229,6 +230,20 @@ def test_section_compares_all_three_kinds_with_the_paper(compared):
     assert paper.rows[0][1:4] == ("0.72", "0.38", "0.37")
     assert len(compared.findings) == 4 and compared.pictures[0].path.exists()
     json.dumps(compared.data, allow_nan=False)
+
+
+@pytest.mark.slow
+def test_the_informed_models_stand_next_to_the_paper_s_three(tmp_path):
+    corpus = made_up_corpus(speeds=(0.02,))
+    study = replace(made_up_study(tmp_path, replace(PLAN, sizes=(20,))), simulated=corpus)
+    found = curves(study, corpus, [corpus.reference], KINDS)
+    informed = informed_table(study, corpus, found, 20)
+    assert [row[0] for row in informed.rows] == ["NMSE", "NLPD", "exact NLPD"]
+    nmse = [float(cell.split("\n")[0].replace("−", "-")) for cell in informed.rows[0][1:]]
+    assert nmse[2] == pytest.approx(
+        found.push_scores(corpus.reference, "vhgp", "push", 20).totals().nmse.sum(), abs=1e-3
+    )
+    assert nmse[6] == pytest.approx(nmse[4] - nmse[2], abs=2e-3) and abs(nmse[6]) > 0.01  # informed minus plain
 
 
 @pytest.mark.slow

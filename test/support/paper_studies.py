@@ -27,6 +27,7 @@ PLAN: Plan = replace(
     contacts=3,
     angle_step=0.75,
     repetitions=20,
+    informed=False,
 )
 PAIRS = (("rect1", "plywood"), ("rect1", "abs"), ("ellip1", "plywood"), ("ellip1", "abs"))
 

@@ -24,8 +24,8 @@ from push_predictor_paper.claims.comparison.findings import (
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.estimate import Estimate, Figure, by_push, difference_by_push, over_seeds
 from push_predictor_paper.figures.curves import KIND_LOOKS, Line, Panel, paint_panels
-from push_predictor_paper.fits.curves import Curves, curves, nlpd_of, nmse_of
-from push_predictor_paper.fits.fit import KINDS, SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.fits.curves import Curves, curves, gathered, nlpd_of, nmse_of, seeds_tried
+from push_predictor_paper.fits.fit import INFORMED, KINDS, SPLIT_WORDS, SPLITS, Fit, SplitName, scores
 from push_predictor_paper.section import Section, Table, joined
 from push_predictor_paper.study import Study
 
@@ -69,7 +69,10 @@ def _of_corpus(study: Study, corpus: Corpus, number: int) -> Section:
         (split, n) for split in SPLITS for n in sorted({last[split], PAPER_SIZE} & set(sizes[split]), reverse=True)
     ]
     tables = [_table(corpus, found, split, n) for split, n in shown]
-    tables += [_paper_table(corpus, found, last["push"]), _crossing_table(corpus, where), _cost(corpus, found, sizes)]
+    tables += [_paper_table(corpus, found, last["push"])]
+    if study.plan.informed:
+        tables += [informed_table(study, corpus, found, last["push"])]
+    tables += [_crossing_table(corpus, where), _cost(corpus, found, sizes)]
     data = {"crossing": _crossing_data(where), "scores": _data(corpus, found, sizes)}
     pictures = (_picture(study, corpus, found, sizes, where, number),)
     return Section("", "", findings, tuple(tables), pictures, _notes(study, corpus, sizes), data)
@@ -118,6 +121,30 @@ def _paper_table(corpus: Corpus, found: Curves, n: int) -> Table:
     )
     head = ("", *(f"{NAMES[kind]}, paper" for kind in KINDS), *(f"{NAMES[kind]}, here" for kind in KINDS))
     return Table(caption, head, tuple(rows))
+
+
+def informed_table(study: Study, corpus: Corpus, found: Curves, n: int) -> Table:
+    """GP and VHGP with fitted mechanics as mean next to the paper's three models; whole pushes held out."""
+    pair = corpus.reference
+    seeds = range(seeds_tried(study.plan, "push", True))
+    fits = [(pair, Fit(kind, n, "push", seed)) for kind in INFORMED.values() for seed in seeds]
+    informed = gathered(fits, scores(study.work, corpus, fits))
+    plain = {kind: found.push_scores(pair, kind, "push", n) for kind in KINDS}
+    other = {kind: informed.push_scores(pair, name, "push", n) for kind, name in INFORMED.items()}
+    rows = []
+    for label, measure, form in MEASURES:
+        figure = output_figure(measure, None)
+        cells = [by_push(each, figure).cell(form) for each in (*plain.values(), *other.values())]
+        gaps = [difference_by_push(plain[kind], other[kind], figure).cell(form) for kind in INFORMED]
+        rows.append((label, *cells, *gaps))
+    caption = (
+        f"The paper's three models, and the two learned ones with our fitted mechanics as mean, at n = {n}, "
+        f"{SPLIT_WORDS['push']}. {_pair(corpus)}, pushes: {corpus.name}. The mechanics are fitted to these n windows. "
+        "Intervals resample whole pushes; differences are paired, informed minus plain. NLPD in SI units."
+    )
+    named = [f"informed {NAMES[kind]}" for kind in INFORMED]
+    gained = [f"informed minus plain {NAMES[kind]}" for kind in INFORMED]
+    return Table(caption, ("", *(NAMES[kind] for kind in KINDS), *named, *gained), tuple(rows))
 
 
 def _shifted(estimate: Estimate, shift: float) -> Estimate:
