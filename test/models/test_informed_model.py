@@ -80,6 +80,7 @@ def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> No
     assert learnt(with_function).gaussian
 
 
+@pytest.mark.slow
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
     table = pushes(24, 3)
     assert learnt(trained(table, mean="auto")).mean is not None
@@ -127,6 +128,7 @@ def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_f
         np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_retrained_it_keeps_its_kind_of_mean(informed: PushModel) -> None:
     assert learnt(retrain_model(informed, pushes(30, 10))).mean is not None
 

@@ -217,17 +217,18 @@ class _Problem:
         return np.moveaxis(rows.outcomes - found, 0, 2)
 
     def solved(self, values: Array, residuals: Array, jacobian: Array | None, enough: float = CONVERGED) -> JointFit:
-        """The fit from a start. Derivatives are taken again after a long step, and at the end."""
-        scale = student_scale(residuals)
+        """The fit from a start. Derivatives are taken again after a long step and, if none are given, before the last."""
+        scale, renewed = student_scale(residuals), jacobian is None
         for _ in range(MOST_STEPS if self.names else 0):
+            fresh = jacobian is None
             if jacobian is None:
                 jacobian = self.jacobian(values, residuals)
             stepped, residuals, fall = self._stepped(values, residuals, scale, jacobian)
             moved = float(np.max(np.abs(stepped - values) / self.spread))
             values, scale = stepped, student_scale(residuals)
-            if fall < enough:
+            if fall < enough and (fresh or not renewed):
                 break
-            if moved > LONG_STEP:
+            if moved > LONG_STEP or fall < enough:
                 jacobian = None
         jacobian = self.jacobian(values, residuals)
         named = dict(zip(self.names, values.tolist(), strict=True))

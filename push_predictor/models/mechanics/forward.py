@@ -32,10 +32,24 @@ BEND_STEP = 5e-4  # m of the tip's path, over which the acceleration of the slid
 MOST_INERTIA = 0.8  # of the largest load: more would not be a correction
 
 
+@dataclass(frozen=True)
+class _Patch:
+    """An outline and its pressure; equal for equal outlines, so that all models of a slider share a table."""
+
+    vertices: bytes
+    semi_axes: tuple[float, float] | None
+    exponent: float
+    outline: Outline = field(compare=False)
+
+
 @lru_cache(maxsize=64)
+def _tabulated(key: _Patch) -> LoadMap:
+    return load_map(patch(key.outline, key.exponent))
+
+
 def _patch_map(outline: Outline, exponent: float) -> LoadMap:
-    """The inverse of an outline's patch, 0.2 s to tabulate; kept for all models of the outline."""
-    return load_map(patch(outline, exponent))
+    """The inverse of an outline's patch; it takes 0.2 s to tabulate."""
+    return _tabulated(_Patch(outline.vertices.tobytes(), outline.semi_axes, exponent, outline))
 
 
 @dataclass(frozen=True, eq=False)
