@@ -23,10 +23,11 @@ from push_predictor.models.mechanics.limit_surfaces.loaded_surface import Loaded
 from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.sweep import swept
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.models.mechanisms import LIBRARY, Push
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 RADIUS = 0.00475
 IN_METRES = np.array([1.0, 1.0, 0.034])
@@ -322,6 +323,42 @@ def test_friction_that_grows_to_the_left_is_a_centre_to_the_left() -> None:
     expected = change("centre_y", 2.0 * square_of_pressure, one())
     assert change("gradient_y", 2.0, one()) == pytest.approx(expected, rel=0.01)
     assert change("gradient_x", 2.0, one(), -np.pi / 2.0) == pytest.approx(expected, rel=0.01)
+
+
+def test_friction_gradient_moves_the_centre_by_the_mean_squares_of_the_pressure() -> None:
+    model, (inputs, duration) = mechanics("rect1", "three"), one(0.1, 0.1, 1e-4)
+    x, y = (THREE_POINTS.points - THREE_POINTS.centre).T
+    square_of_pressure, mixed = THREE_POINTS.shares @ (x * x), THREE_POINTS.shares @ (x * y)
+    expected = moved(model, {"centre_x": 2.0 * square_of_pressure, "centre_y": 2.0 * mixed}, inputs, duration)
+    # The push runs at 0.1 rad to the body's x: along that heading the slider stands at zero.
+    found = moved(model, {"gradient_x": 2.0}, inputs, duration, 0.1)
+    assert found == pytest.approx(expected, rel=1e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("values", [{}, {"inertia": 1.0}], ids=["slow", "with inertia"])
+def test_the_place_of_the_body_frames_origin_changes_nothing(values: dict[str, float]) -> None:
+    """Outline and support shifted in their frame are the same slider; its origin is another point of it."""
+    (inputs, duration), shift = pushes(20, speed=0.2), np.array([0.01, -0.006])
+    shifted = PushMechanics(
+        Outline(SQUARE.vertices + shift),
+        RADIUS,
+        PressureDistribution(THREE_POINTS.points + shift, THREE_POINTS.shares),
+    )
+    models = (replace(model, accuracy=1e-4) for model in (mechanics("rect1", "three"), shifted))
+    here, there = (model.displacement(values, inputs, duration) for model in models)
+    normal = SQUARE.inward_normal(inputs[:, 1])
+    origin = rotate(shift, -np.arctan2(normal[:, 1], normal[:, 0]) - inputs[:, 2])
+    here[:, :2] += origin - rotate(origin, here[:, 2])  # of the point that is the origin of the other frame
+    assert there * IN_METRES == pytest.approx(here * IN_METRES, abs=1e-6)
+
+
+def test_a_disc_that_is_apart_moves_the_slider_from_its_touch_on() -> None:
+    def rate(rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
+        push = np.tile([1.0, 0.0, 0.0], (len(rows), 1))
+        return push, np.array([0.0033, 0.0])[rows] - done + pose[:, 0], np.ones(len(rows))
+
+    pose = swept(rate, np.array([0.0075, 0.0075]), np.full(2, 0.03), 1e-3)
+    assert pose[:, 0] == pytest.approx([0.0075 - 0.0033, 0.0075], abs=2.1e-5)
 
 
 def test_mass_resists_a_turn_that_grows() -> None:

@@ -229,6 +229,9 @@ def test_mean_squares_and_reach_are_those_of_the_points() -> None:
     assert MAPS["square"].reach.sum() == pytest.approx(1.0)
     line = spread_by_direction(np.array([[0.0, -0.02], [0.0, 0.01]]), np.array([0.5, 0.5]))
     assert np.flatnonzero(line).tolist() == [DIRECTIONS // 2]
+    turn = 0.25 * np.pi / DIRECTIONS  # a quarter of the way from the first direction to the second
+    between = spread_by_direction(np.array([[np.cos(turn), np.sin(turn)]]), np.ones(1))
+    assert between[:3] == pytest.approx([0.75, 0.25, 0.0])
 
 
 def test_blend_of_two_tables_lies_between_them() -> None:
