@@ -3,9 +3,10 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.prior --bags bags --data FOLDER [--kinds prior gp vhgp] [--quick]
 
 --bags: the standard recordings of `simulate`; the square trains on square_abs_train, the other outlines on four of
-five folds of their few pushes. --data: the folder of the measured data with mit_square, split by push in five folds.
-Training pushes are drawn at random, the same for all models. The reference of the NMSE is the mean of all training
-pushes that could have been drawn, the same for all models and n. Prints the tables of docs/results/prior.md.
+five folds of their few pushes. --data: the folder of the measured data: mit_square is split by push in five folds, the
+logs of mlab test the model before the first push, each on its own support. Training pushes are drawn at random, the
+same for all models. The reference of the NMSE is the mean of all training pushes that could have been drawn, the same
+for all models and n, or that of the test pushes where none can be drawn. Prints the tables of docs/results/prior.md.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from push_predictor.evaluation.push_scores import PushScores, pooled, push_score
 from push_predictor.evaluation.splits import FOLDS, push_folds
 from push_predictor.evaluation.validation import compare
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
@@ -89,7 +91,8 @@ def _scored(case: Case, n: int, kind: str) -> tuple[PushScores, int, float]:
     start = time.process_time()
     model = train_model(rows, case.rig, kind, name=kind, options=TrainingOptions(seed=case.seed, mean="zero"))
     cpu = time.process_time() - start
-    comparison = replace(compare(model, case.test), training_mean=case.training.outcomes.mean(axis=0))
+    reference = (case.training if len(case.training) else case.test).outcomes.mean(axis=0)
+    comparison = replace(compare(model, case.test), training_mean=reference)
     return push_scores(comparison), len(model.training), cpu
 
 
@@ -110,6 +113,11 @@ def _measured(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
     with tempfile.TemporaryDirectory() as work:
         square = imported_square(data, Path(work))
     yield "mit_square", _folds(square.table, square.rig)
+    with tempfile.TemporaryDirectory() as work:
+        import_source("mlab", [data / "mlab" / "sensor_log"], Path(work))
+        logs = {path.stem: _loaded(path) for path in sorted(Path(work).glob("*.csv"))}
+    for name, (table, rig) in logs.items():
+        yield f"mlab {name}", [Case(empty_table(), table, rig, 0)]
 
 
 def _folds(table: PushTable, rig: Rig) -> list[Case]:
