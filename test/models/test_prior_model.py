@@ -20,6 +20,7 @@ from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_draws import DRAWS, displacements
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.mechanics.process_noise import ProcessNoise
 from push_predictor.models.predictors import PriorPredictor
 from push_predictor.models.predictors.prior_predictor import FASTEST, STEEPEST
 from push_predictor.models.push_model import PushModel
@@ -128,6 +129,24 @@ def test_windows_of_one_push_count_less_than_windows_of_many() -> None:
     names = list(predictor_of(trained(many)).fitted.values)
     friction = names.index("contact_friction")
     assert spread[1][friction] > 1.3 * spread[0][friction]
+
+
+def test_process_noise_is_what_variations_of_friction_and_pressure_do() -> None:
+    shifts = np.array([[1e-3, 0.0, 0.0], [0.0, 2e-3, 0.02], [0.0, 0.0, 0.03]])
+    around = np.concatenate([np.zeros((1, 3)), shifts, -shifts])[None]
+    covariance = ProcessNoise(np.array([1.0, 4.0, 1.0])).covariance(around, np.array([0.004]), np.array([0.03]))
+    along = 1e-6 + (0.05 * 0.004) ** 2 + 1e-8
+    across = 4.0 * (4e-6 + (0.05 * 0.004) ** 2 + 1e-8)
+    turn = 4e-4 + 9e-4 + (0.05 * 0.004 / 0.03) ** 2 + 1e-6
+    expected = [[along, 0.0, 0.0], [0.0, across, 8e-5], [0.0, 8e-5, turn]]
+    np.testing.assert_allclose(covariance[0], expected, rtol=1e-9, atol=1e-18)
+
+
+def test_process_noise_varies_parameters_to_both_sides_within_their_ranges() -> None:
+    names = ("contact_friction", "centre_x", "centre_y")
+    rows = ProcessNoise.changed(names, np.array([0.05, 0.0, 0.01]))
+    np.testing.assert_allclose(rows[:, 0], [0.05, 0.15, 0.05, 0.05, 0.0, 0.05, 0.05])
+    np.testing.assert_allclose(rows[:, 2], [0.01, 0.01, 0.01, 0.014, 0.01, 0.01, 0.006])
 
 
 @pytest.mark.parametrize(
