@@ -17,7 +17,8 @@ from push_predictor.types import Array
 
 MOST_STEPS = 20
 MOST_PARAMETERS = 12
-LEAST_GAIN = 0.1  # nats per push and parameter: less is not worth it
+LEAST_EVIDENCE = 5.0  # nats for each added parameter: among hundreds of changes, some gain less by chance
+LEAST_GAIN = 0.03  # nats per push and parameter: less is not worth it
 FEWEST_PUSHES = 3  # of a cross-validation
 CLEARLY = 1.0  # standard errors from push to push: the one standard error rule
 REFITTED = 3  # changes with the largest expected gains that are refitted before one is chosen
@@ -119,7 +120,8 @@ def _after(fit: JointFit, change: Change) -> tuple[str, ...]:
 
 def _least(fit: JointFit, change: Change) -> float:
     """The smallest gain that is worth a change, nats."""
-    return LEAST_GAIN * fit.rows.pushes * max(len(change.added) - len(change.dropped), 0.5)
+    least = max(LEAST_EVIDENCE, LEAST_GAIN * fit.rows.pushes)
+    return least * max(len(change.added) - len(change.dropped), 0.5)
 
 
 def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
