@@ -116,6 +116,22 @@ def test_pushes_narrow_the_prediction_and_move_it_to_the_truth(untrained: PushMo
     assert np.all((np.abs(after.mean - test.outcomes) < 1.96 * np.sqrt(after.variance)).mean(axis=0) > 0.9)
 
 
+def test_estimates_are_the_most_probable_given_priors_and_pushes(untrained: PushModel, after_ten: PushModel) -> None:
+    predictor, rows = predictor_of(after_ten), pushed(20, 3)
+    means = predictor_of(untrained).fitted.values
+    precision = np.linalg.inv(after_ten.predict_rows(rows.inputs, rows.duration).process_covariance) / 1.5
+
+    def misfit(values: dict[str, float]) -> float:
+        away = rows.outcomes - predictor.fitted.mechanics.displacement(values, rows.inputs, rows.duration)
+        prior = sum(((values[name] - means[name]) / BY_NAME[name].spread) ** 2 for name in values)
+        return float(np.einsum("nk,nkl,nl->", away, precision, away) + prior)
+
+    found = predictor.fitted.values
+    for name, value in found.items():
+        for step in (-0.4, 0.4):
+            assert misfit({**found, name: value + step * BY_NAME[name].spread}) > misfit(found), name
+
+
 def test_a_single_push_leaves_the_prediction_wide(untrained: PushModel) -> None:
     inputs, duration = some_inputs(20, 4), np.full(20, 0.2)
     before, after = (m.predict_rows(inputs, duration).std for m in (untrained, trained(pushed(2, 3))))
@@ -159,11 +175,13 @@ def test_noise_is_estimated_where_there_are_pushes(windows: int, noise: float, l
 
 
 def test_estimates_stay_within_the_plausible_ranges() -> None:
-    rows = pushed(20, 9)
-    far = replace(rows, outcomes=rows.outcomes * [0.2, -6.0, -6.0])
-    predictor = predictor_of(trained(far))
-    for k, (name, value) in enumerate(predictor.fitted.values.items()):
-        assert BY_NAME[name].low <= value <= BY_NAME[name].high
+    mechanics = PushMechanics(RIG.outline, RIG.pusher_radius, supported_at(CORNERS))
+    inputs, duration = some_inputs(24, 9), np.full(24, 0.2)
+    none, some = (mechanics.displacement({"contact_friction": value}, inputs, duration) for value in (0.0, 0.2))
+    beyond = none + 0.5 * (none - some)  # as if friction were negative
+    predictor = predictor_of(trained(PushTable(inputs, duration, beyond, np.arange(24).astype(str))))
+    assert predictor.fitted.values["contact_friction"] == 0.0
+    for k, name in enumerate(predictor.fitted.values):
         assert BY_NAME[name].low <= predictor.draws[:, k].min()
         assert predictor.draws[:, k].max() <= BY_NAME[name].high
 
