@@ -10,7 +10,7 @@ import numpy as np
 from push_predictor.errors import TrainingError
 from push_predictor.models.features import push_features
 from push_predictor.models.gaussian_process.constant import fit_constant
-from push_predictor.models.gaussian_process.gp import fit_gp
+from push_predictor.models.gaussian_process.gp import SHORTEST, fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.regression import Regression, best_held_out, held_out_score
 from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
@@ -33,6 +33,9 @@ from push_predictor.types import Array, IntArray
 MeanChoice = Literal["mechanics", "zero", "auto"]
 MEANS: tuple[MeanChoice, ...] = ("mechanics", "zero", "auto")
 CONSTANT = 1e-9  # a feature whose range is below this fraction of its size counts as constant
+# Lengthscale of a residual's mean, in standard deviations of the inputs. Windows of one push are close to each other
+# and deviate together: with shorter ones a regression learns the push.
+SHORTEST_OF_RESIDUAL = 0.7
 EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by less
 
 
@@ -110,7 +113,7 @@ def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMea
     score = 0.0 if mean is None else -len(OUTPUTS) * float(np.log(mean.size(push)).sum())
     for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
         watch(f"train {options.kind}: {OUTPUTS[k]}", 0.3 * k)
-        regression: Regression = _learnt(features, column, options)
+        regression = _learnt(features, column, options, SHORTEST if mean is None else SHORTEST_OF_RESIDUAL)
         if mean is not None:
             constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
             regression = best_held_out([constant, regression], block, seen)
@@ -125,11 +128,11 @@ def _blocks(rows: PushTable) -> IntArray:
     return np.asarray(np.unique(rows.push_id, return_inverse=True)[1] % MOST_BLOCKS, dtype=np.int64)
 
 
-def _learnt(features: Array, column: Array, options: LearntOptions) -> Regression:
+def _learnt(features: Array, column: Array, options: LearntOptions, shortest: float) -> Regression:
     if options.kind == "gp":
-        return fit_gp(features, column, options.kernels)
+        return fit_gp(features, column, options.kernels, shortest=shortest)
     if options.inducing is None:
-        return fit_vhgp(features, column, options.kernels)
+        return fit_vhgp(features, column, options.kernels, shortest=shortest)
     if options.kernels != DEFAULT_CHOICE:
         raise TrainingError(f"{options.kernels}: a sparse VHGP has squared exponential kernels and no nugget")
     return fit_sparse_vhgp(features, column, options.inducing)

@@ -23,7 +23,8 @@ from push_predictor.models.gaussian_process.ridge import factorise
 from push_predictor.types import Array, IntArray
 
 # Logarithms, for inputs and outputs of unit spread.
-_LENGTHSCALE_BOUNDS = (np.log(1e-2), np.log(1e3))
+SHORTEST = 1e-2  # lengthscale, for inputs of unit spread
+_LONGEST = np.log(1e3)
 _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 # Open above: L-BFGS-B begins with a step of unit length only when some variable is unbounded, else far too long.
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
@@ -98,16 +99,21 @@ class GaussianProcess:
 
 
 def fit_gp(
-    inputs: Array, outputs: Array, choice: KernelChoice = DEFAULT_CHOICE, *, most_iterations: int = 100
+    inputs: Array,
+    outputs: Array,
+    choice: KernelChoice = DEFAULT_CHOICE,
+    *,
+    most_iterations: int = 100,
+    shortest: float = SHORTEST,
 ) -> GaussianProcess:
     """Maximise the marginal likelihood over the hyperparameters by L-BFGS.
 
-    inputs (n, D) and outputs (n,) standardised. choice: only its family is used. Raises TrainingError when the rows do
-    not match or are not finite.
+    inputs (n, D) and outputs (n,) standardised. choice: only its family is used. shortest: lengthscale. Raises
+    TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     d = inputs.shape[1]
-    box = np.array([_LENGTHSCALE_BOUNDS] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
+    box = np.array([(np.log(shortest), _LONGEST)] * d + [_SIGNAL_BOUNDS, _NOISE_BOUNDS])
     descent = Descent(box, most_iterations, _STOP)
     first = _first(inputs, outputs, choice.family, descent)
     # On all rows from the start: likelihoods have several maxima, and a subset of rows may lead to another one.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.models.gaussian_process.cross_validation import held_out_errors
-from push_predictor.models.gaussian_process.gp import GpParameters, check_rows, fit_gp
+from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
 from push_predictor.models.gaussian_process.posterior import KernelPosterior
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
@@ -77,12 +77,14 @@ def fit_vhgp(
     *,
     start: GpParameters | None = None,
     most_iterations: int = 40,
+    shortest: float = SHORTEST,
 ) -> VHGP:
     """Maximise the variational bound (plus weak priors, see vhgp_fit) over hyperparameters and site precisions.
 
     inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of the same rows and family; None
-    computes it first. Raises TrainingError when the rows do not match or are not finite.
+    computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
+    finite.
     """
     check_rows(inputs, outputs)
-    near = start or fit_gp(inputs, outputs, choice).parameters
-    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations))
+    near = start or fit_gp(inputs, outputs, choice, shortest=shortest).parameters
+    return VHGP(inputs, outputs, *maximise_bound(inputs, outputs, near, choice, most_iterations, shortest))

@@ -42,14 +42,14 @@ _SPREAD = 0.3
 
 
 def maximise_bound(
-    inputs: Array, outputs: Array, near: GpParameters, choice: KernelChoice, most_iterations: int
+    inputs: Array, outputs: Array, near: GpParameters, choice: KernelChoice, most_iterations: int, shortest: float
 ) -> tuple[VhgpParameters, Array]:
     """Hyperparameters where the bound plus the log prior is highest, and the site precisions (n,), tied to them.
 
-    near: the homoscedastic fit of the same rows, where the search starts. Raises TrainingError if the bound is
-    not finite at any point of the search.
+    near: the homoscedastic fit of the same rows, where the search starts. shortest: lengthscale of the signal. Raises
+    TrainingError if the bound is not finite at any point of the search.
     """
-    box = _box(inputs.shape[1], choice)
+    box = _box(inputs.shape[1], choice, shortest)
     descent = Descent(box, most_iterations, _STOP)
     prior = _Prior(np.clip(_prior_centre(near, choice).to_vector(), *box.T), _spread(inputs.shape[1], choice))
     search, rows = _Search(inputs, outputs, choice, prior), part_of_rows(len(outputs))
@@ -67,8 +67,8 @@ def maximise_bound(
     return parameters, bound.tied_precisions
 
 
-def _box(d: int, choice: KernelChoice) -> Array:
-    box = [_LENGTHSCALES] * d + [_SIGNAL_SD] + [_LENGTHSCALES] * d + [_NOISE_SD, _NOISE_MEAN]
+def _box(d: int, choice: KernelChoice, shortest: float) -> Array:
+    box = [(np.log(shortest), _LENGTHSCALES[1])] * d + [_SIGNAL_SD] + [_LENGTHSCALES] * d + [_NOISE_SD, _NOISE_MEAN]
     return np.array(box + [_NUGGET_SD] * choice.noise_nugget)
 
 

@@ -217,7 +217,7 @@ class _Problem:
         return np.moveaxis(rows.outcomes - found, 0, 2)
 
     def solved(self, values: Array, residuals: Array, jacobian: Array | None, enough: float = CONVERGED) -> JointFit:
-        """The fit from a start. Derivatives are taken again after a long step and, if none are given, before the last."""
+        """The fit from a start. Derivatives are taken again after a long step, and at the end."""
         scale, renewed = student_scale(residuals), jacobian is None
         for _ in range(MOST_STEPS if self.names else 0):
             fresh = jacobian is None
@@ -226,7 +226,7 @@ class _Problem:
             stepped, residuals, fall = self._stepped(values, residuals, scale, jacobian)
             moved = float(np.max(np.abs(stepped - values) / self.spread))
             values, scale = stepped, student_scale(residuals)
-            if fall < enough and (fresh or not renewed):
+            if fall < enough and (fresh or not renewed):  # old derivatives may not show the way
                 break
             if moved > LONG_STEP or fall < enough:
                 jacobian = None
