@@ -63,7 +63,7 @@ def informed() -> PushModel:
 def with_function() -> PushModel:
     """A GP of 60 windows, about mechanics that lack what the outcomes have: a shift that grows with the angle."""
     table = pushes(60, 1)
-    return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.sin(9.0 * table.inputs[:, 2:])), "gp")
+    return trained(replace(table, outcomes=table.outcomes + 6e-4 * np.cos(3.0 * table.inputs[:, 2:])), "gp")
 
 
 def test_few_pushes_teach_more_with_mechanics_than_without(informed: PushModel) -> None:
