@@ -13,6 +13,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.measured.ladder import LADDERS
@@ -45,22 +46,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
     parser.add_argument("--quick", action="store_true", help=f"{QUICK_ROWS} windows")
+    parser.add_argument("--seed", type=int, default=0, help="of the windows on which the search runs")
     options = parser.parse_args(arguments)
     for kind in [options.kind] if options.kind else sorted(LADDERS):
         with tempfile.TemporaryDirectory() as work:
             loaded = LADDERS[kind](options.data, Path(work))
             supports = different_supports(sorted(Path(work).glob("*.csv")))
         print(f"\n## {kind}\n")
-        report(loaded, supports, QUICK_ROWS if options.quick else None)
+        report(loaded, supports, TrainingOptions(QUICK_ROWS if options.quick else None, options.seed, fit=True))
 
 
-def report(loaded: LoadedData, supports: Mapping[int, Array], n_train: int | None = None) -> None:
+def report(loaded: LoadedData, supports: Mapping[int, Array], options: TrainingOptions) -> None:
     """Fit the ladder, score its steps on the held-out pushes, and print a row per step and the parameters."""
     aside = held_out_rows(loaded.table)
     search, held = loaded.table.take(~aside), loaded.table.take(aside)
     print(f"{len(search.pushes)} pushes for the fit, {len(held.pushes)} held out, sha256 {digest_of(held)[:12]}")
     begin = time.process_time()
-    options = TrainingOptions(n_train, fit=True, supports=supports)
+    options = replace(options, supports=supports)
     model, ladder = train_with_ladder(search, loaded.rig, "analytical", name="fitted", options=options)
     rows = ladder[0].fit.rows
     print(f"search on {len(rows.push)} windows of {rows.pushes} pushes: {time.process_time() - begin:.0f} CPU s\n")
