@@ -29,14 +29,17 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.validation import compare, metrics_json
     from push_predictor.models.request import check_table
     from push_predictor.models.store.model_file import load_model
-    from push_predictor.recordings.load import known_rig, load_data
+    from push_predictor.models.supports import on_supports
+    from push_predictor.recordings.load import different_supports, known_rig, load_data
     from push_predictor.recordings.rig import load_rig
 
     model = load_model(options.model)
     given = load_rig(options.rig) if options.rig else None
     check_data(options.data)
     with progress("evaluate"):
-        table = load_data(options.data, given)
+        supports = {} if given else different_supports(options.data)
+        table = load_data(options.data, given, numbered=bool(supports))
+        model = on_supports(model, given or known_rig(options.data[0]), supports)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))
     for path in options.data:

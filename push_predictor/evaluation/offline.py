@@ -11,6 +11,7 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
+from push_predictor.models.supports import on_supports
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
@@ -75,6 +76,7 @@ def validate_recording(
 ) -> tuple[list[PushWindow], Comparison]:
     """Predict every window of a recording, as predict_server does; report as for `recorded_windows`."""
     windows, table = recorded_windows(model, path, rig, report)
+    model = on_supports(model, rig or recording_rig(path), {})
     check_table(model, table)
     prediction = tabulate(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
@@ -83,6 +85,7 @@ def validate_recording(
 def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
     """Write the HTML report of models on a recording, the main model first; return page and metrics."""
     windows, table = recorded_windows(models[0], path)
+    models = [on_supports(model, recording_rig(path), {}) for model in models]
     for model in models:
         check_table(model, table)
     comparisons = [compare(model, table) for model in models]

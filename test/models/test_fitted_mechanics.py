@@ -19,6 +19,7 @@ from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredict
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.supports import on_supports
 from push_predictor.models.train import retrain_model
 from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.table import PushTable
@@ -71,6 +72,19 @@ def test_support_of_the_recording_is_used_and_saved(by_recording: PushModel, tmp
     wide, narrow = abs(by_recording.predict(push).mean[:, 2])
     assert narrow > 2.0 * wide
     np.testing.assert_allclose(again.predict(push).mean, by_recording.predict(push).mean, rtol=1e-9)
+
+
+def test_model_of_several_supports_takes_those_of_other_recordings(by_recording: PushModel) -> None:
+    push = Pushes(0.02, 0.05, 0.0, covariates={"recording": 1.0})
+    narrow = by_recording.predict(push).mean
+    points = np.column_stack([IN_MIDDLE.points, IN_MIDDLE.shares])
+    alone = on_supports(by_recording, replace(by_recording.rig, support_points=points), {})
+    assert alone.needs == ()
+    np.testing.assert_allclose(alone.predict(Pushes(0.02, 0.05, 0.0)).mean, narrow)
+    moved = on_supports(by_recording, by_recording.rig, {5: points})
+    fifth = Pushes(0.02, 0.05, 0.0, covariates={"recording": 5.0})
+    np.testing.assert_allclose(moved.predict(fifth).mean, narrow)
+    assert on_supports(mechanics_model({}), replace(by_recording.rig, support_points=points), {}).needs == ()
 
 
 def test_saved_parameters_and_their_covariance_return(tmp_path: Path) -> None:
