@@ -59,13 +59,19 @@ def train_learnt(
     """
     found = []
     if options.mean != "mechanics":
-        found.append(_trained(rows, rig, options, None, watch))
+        found.append(_trained(rows, rig, options, None, _part_of(watch, 0.0, 0.4 if options.mean == "auto" else 0.9)))
     if options.mean != "zero":
-        watch(f"train {options.kind}: mechanics as mean", 0.0)
-        found.append(_trained(rows, rig, options, fitted_mean(of_mean, rig), watch))
+        begin = 0.4 if options.mean == "auto" else 0.0
+        watch(f"train {options.kind}: mechanics as mean", begin)
+        found.append(_trained(rows, rig, options, fitted_mean(of_mean, rig), _part_of(watch, begin + 0.1, 0.9)))
     best = max(found, key=lambda trained: trained.score).predictor
     watch(f"train {options.kind}: correlation of the outputs", 0.9)
     return replace(best, correlation=fit_correlation(best, rows.push_id))
+
+
+def _part_of(watch: Watch, begin: float, end: float) -> Watch:
+    """A watch for a part of the work, between these shares of the whole."""
+    return lambda stage, done: watch(stage, begin + (end - begin) * done)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +118,7 @@ def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMea
     regressions: list[Regression] = []
     score = 0.0 if mean is None else -len(OUTPUTS) * float(np.log(mean.size(push)).sum())
     for k, (column, seen) in enumerate(zip(scaling.outcomes(targets).T, scaling.outcomes(observed).T, strict=True)):
-        watch(f"train {options.kind}: {OUTPUTS[k]}", 0.3 * k)
+        watch(f"train {options.kind}: {OUTPUTS[k]}", k / len(OUTPUTS))
         regression = _learnt(features, column, options, SHORTEST if mean is None else SHORTEST_OF_RESIDUAL)
         if mean is not None:
             constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
