@@ -84,11 +84,8 @@ class TabulatedModel:
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
     def predict_one(self, push: PushRequest) -> Prediction:
-        """The same for one push (n = 1); the table is read in plain numbers."""
-        prediction = None
-        if self.domain is not None and self.model.base is self.model:
-            prediction = self.domain.predict_one((push.velocity, push.contact, push.angle))
-        return prediction or self.predict_rows(*push.arrays)
+        """The same for one push (n = 1)."""
+        return self.predict_rows(*push.arrays)
 
     def exact_count(self, inputs: Array) -> int:
         """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
@@ -101,7 +98,7 @@ class TabulatedModel:
 
     def _of_base(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         base = self.model.base
-        if len(inputs) == 1:
+        if len(inputs) == 1:  # in plain numbers, five times as fast
             return domain.predict_one(inputs[0].tolist()) or base.predict_rows(inputs, duration)
         inside, prediction = domain.predict(inputs)
         if prediction is not None:
