@@ -13,8 +13,6 @@ from push_predictor.recordings.importers.heading import repair_heading
 from push_predictor.recordings.importers.mcube.pushes import headings
 from push_predictor.recordings.importers.report import Notes
 
-START = 1_460_088_637.25
-
 
 def _jumping(size: float, spread: int, at: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times, the true heading and one with a jump of `size` over `spread` intermediate samples."""

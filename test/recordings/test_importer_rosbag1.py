@@ -12,9 +12,6 @@ from push_predictor.errors import ImportSourceError
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.read import read_recording
 
-START = 1_460_088_637.25
-
-
 MOCAP = """Header header
 int64 number
 geometry_msgs/Pose[] body_poses
