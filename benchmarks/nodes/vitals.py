@@ -35,10 +35,12 @@ def vitals(process: int) -> Vitals:
 
 @dataclass(frozen=True)
 class Growth:
-    """Growth from the first fifth after the warm-up to the last.
+    """Growth after the warm-up.
 
-    memory: difference of the means, MB; highest: largest excess over the first mean. threads and descriptors: growth of
-    the minimum or of the maximum, whichever is smaller; a leak shows in both, a file that is briefly open in one.
+    memory: difference of the means of the first and of the last fifth, MB; highest: largest excess over the first mean.
+    threads and descriptors: from the first half to the last, growth of the minimum or of the maximum, whichever is
+    smaller. A leak shows in both; a file that is open for some seconds at a time, as a recording between two loops, in
+    one.
     """
 
     memory: float
@@ -56,9 +58,9 @@ class Growth:
 def growth(seen: Sequence[Vitals], warm_up: float) -> Growth:
     """Growth after `warm_up` seconds; seen: in order of time, one at least."""
     warm = [v for v in seen if v.time >= seen[0].time + warm_up] or list(seen[-1:])
-    part = max(1, len(warm) // 5)
-    first, last = warm[:part], warm[-part:]
-    before, after = (sum(v.memory for v in some) / part for some in (first, last))
+    part, half = max(1, len(warm) // 5), max(1, len(warm) // 2)
+    before, after = (sum(v.memory for v in some) / part for some in (warm[:part], warm[-part:]))
+    first, last = warm[:half], warm[-half:]
     return Growth(
         after - before,
         max(v.memory for v in warm) - before,

@@ -16,6 +16,7 @@ from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_jso
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, alarm_state, calibrate, held_out_moments
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
@@ -148,6 +149,13 @@ def made_up(pushes: int, seed: int, friction: float = 0.3, windows: int = 3) -> 
     physics = AnalyticalPush(rig.outline, rig.pusher_radius, contact_friction=friction)
     outcomes = physics.displacement(inputs, duration) + NOISE * noise
     return PushTable(inputs, duration, outcomes, push_id, {"slider_heading": rng.uniform(-3.0, 3.0, n)})
+
+
+@pytest.fixture(autouse=True)
+def a_library_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computing responses takes most of the time."""
+    few = [m for m in LIBRARY if m.name in ("contact_friction", "pressure_spread", "tilted_surface")]
+    monkeypatch.setattr("push_predictor.evaluation.alarm.scores.LIBRARY", few)
 
 
 @pytest.fixture(scope="module")

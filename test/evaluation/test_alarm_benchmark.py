@@ -1,4 +1,4 @@
-"""The table of the alarm's benchmark: what counts as false, as told, and as late."""
+"""The table of the alarm's benchmark: what counts as false, as detected, and as late."""
 
 from __future__ import annotations
 

@@ -32,8 +32,12 @@ from ros_harness import (
     ros_context,
     wait_until,
 )
+from validator_bench import HEXAGON
 
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
 from push_predictor.nodes.network_security import DISCOVERY, RANGE, limit_discovery
+from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.srv import Resume
 
 NODES = {"predict_server": "push_predictor", "push_replay": "push_replay", "push_validator": "push_validator"}
@@ -200,9 +204,11 @@ class Graph:
 
 
 @pytest.fixture(scope="module")
-def graph() -> Iterator[Graph]:
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    model, data = tmp_path_factory.mktemp("model") / "small.pushmodel", [HEXAGON]
+    save_model(train_model(load_data(data), load_rig_for(data), "gp", name="small"), model)
     params: dict[str, dict[str, Any]] = {
-        "predict_server": {"autostart": False, "introspection": "metadata"},
+        "predict_server": {"models": [str(model)], "autostart": False, "introspection": "metadata"},
         "push_replay": {"recording": BAG, "play.start_paused": True, "play.clock_publish_frequency": 0.0, **SHORT},
         "push_validator": {},
     }
@@ -301,8 +307,8 @@ def tf_is_there() -> bool:
 
 
 def test_nodes_report_their_health_in_other_states_too(graph: Graph):
-    assert_every_second(graph, "push_predictor", "inactive")
     assert call(graph.node.create_client(Resume, "/push_replay/resume"), Resume.Request()) is not None
+    assert_every_second(graph, "push_predictor", "inactive")
     assert_every_second(graph, "push_replay", "finished")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from repository import REPOSITORY
 from synthetic import START, Push, rows, translating_push, wrench_rows
@@ -18,6 +18,7 @@ from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow
+from push_predictor.recordings.windows.stamp_order import LOOKAHEAD
 from push_predictor.recordings.windows.stream_faults import (
     CLOCK_TOLERANCE,
     FAULTS,
@@ -189,6 +190,16 @@ def test_isolated_first_or_last_stamp_is_discarded(name: str, stamp: int) -> Non
         assert list(map(numbers, windows)) == [pytest.approx(numbers(w), abs=1e-9) for w in MADE_UP.windows]
 
 
+def repositioned(stream: PoseStream, place: int, count: int) -> bool:
+    """Whether the slider is carried faster than 0.85 m/s near some samples.
+
+    No push is that fast. A jump of 3 cm may then look like a motion, and the motion itself like a jump.
+    """
+    near = slice(max(0, place - LOOKAHEAD), place + count + LOOKAHEAD)
+    elapsed = 1e-9 * np.diff(stream.stamp[near])
+    return bool(np.any(np.hypot(np.diff(stream.x[near]), np.diff(stream.y[near])) > 0.85 * elapsed))
+
+
 @OFTEN
 @given(
     which=any_clean,
@@ -198,6 +209,7 @@ def test_isolated_first_or_last_stamp_is_discarded(name: str, stamp: int) -> Non
     jump=st.floats(0.03, 2.0),
     direction=st.floats(-3.2, 3.2),
 )
+@example(which="measured", name="pusher", share=0.49, count=3, jump=1.8, direction=2.3)  # a tip at 0.7 m/s
 def test_jump_away_and_back_discards_only_the_samples_away(
     which: str, name: str, share: float, count: int, jump: float, direction: float
 ) -> None:
@@ -207,7 +219,8 @@ def test_jump_away_and_back_discards_only_the_samples_away(
     x[place : place + count] += jump * np.cos(direction)
     y[place : place + count] += jump * np.sin(direction)
     windows, counts = found_in(changed(truth.recording, {name: replace(stream, x=x, y=y)}))
-    assert counts[f"{name} jumps"] in (count, count + 1)  # one more where the slider itself was repositioned
+    if not repositioned(stream, place, count):
+        assert counts[f"{name} jumps"] == count
     assert_is_as_without(windows, truth, name, range(place, place + count))
 
 

@@ -20,6 +20,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.nodes import push_validator, runtime
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.table import PushTable
@@ -151,10 +152,16 @@ def test_the_windows_are_saved_with_covariates_and_rig(changed: Outcome, bench: 
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0])
-def test_rejects_a_false_alarm_rate_outside_0_to_1_by_name(rate: float):
-    with node_process("push_validator", domain=free_domain(), params={"false_alarm_rate": rate}) as process:
-        assert process.wait(30.0) == 1
-        assert "false_alarm_rate" in process.text() and "above 0 and below 1" in process.text()
+def test_rejects_a_false_alarm_rate_outside_0_to_1_by_name(
+    rate: float, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    """In this process, whose signal handlers are kept."""
+    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    assert push_validator.main(["--ros-args", "-p", f"false_alarm_rate:={rate}"]) == 1
+    printed = capfd.readouterr().err
+    assert "false_alarm_rate" in printed and "above 0 and below 1" in printed
 
 
 # --- an alarm that cannot be -----------------------------------------------------------------------------------------

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack
 from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,10 +16,21 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from replay_bags import RIG
-from ros_harness import REPOSITORY, NodeProcess, acquaint, call, free_domain, node_process, ros_context, wait_until
+from ros_harness import (
+    REPOSITORY,
+    NodeProcess,
+    acquaint,
+    call,
+    free_domain,
+    node_process,
+    reserved_domain,
+    ros_context,
+    wait_until,
+)
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
@@ -28,10 +39,13 @@ from validator_bench import (
     CIRCLE,
     HEXAGON,
     NO_SERVER,
+    PLAYING_ALONE,
     WRITTEN,
     Status,
     assert_same_as_offline,
+    beginning,
     finish,
+    play_some,
     replaying,
     windows_of,
 )
@@ -42,6 +56,8 @@ from msg_adapters.stamps import ns_to_stamp
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.nodes import runtime
+from push_predictor.nodes.push_validator import PushValidator
 from push_predictor.nodes.validator import publishers
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.stream_sync import Samples
@@ -55,7 +71,14 @@ from push_predictor_interfaces.srv import LoadModel, Pause, PredictPush, Resume,
 
 pytestmark = pytest.mark.slow
 
+TWO_PUSHES = 900  # messages from the begin of a recording of the hexagon
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.fixture(scope="module")
+def hexagon(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four pushes of the recording of the hexagon: 8 s, 25 windows."""
+    return beginning(HEXAGON, 8.3, tmp_path_factory.mktemp("recordings") / "hexagon")
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +98,12 @@ def domain() -> int:
     return free_domain()
 
 
-@pytest.fixture
-def server(domain: int, models: dict[str, Path]) -> Iterator[NodeProcess]:
-    with node_process("predict_server", domain=domain, params={"models": list(map(str, models.values()))}) as process:
-        yield process
+@pytest.fixture(scope="module")
+def served(models: dict[str, Path]) -> Iterator[int]:
+    """A domain with a server of both models, for all tests that leave it as it is."""
+    params = {"models": list(map(str, models.values()))}
+    with reserved_domain() as domain, node_process("predict_server", domain=domain, params=params):
+        yield domain
 
 
 def validator(domain: int, *ros_args: str, namespace: str | None = None, **params: Any) -> Any:
@@ -86,8 +111,9 @@ def validator(domain: int, *ros_args: str, namespace: str | None = None, **param
     return node_process("push_validator", *ros_args, domain=domain, namespace=namespace, params=params)
 
 
-def count_of_windows(model: Path, recording: Path = HEXAGON) -> str:
-    return str(len(validate_recording(load_model(model), recording)[0]))
+def wait_for_result(process: NodeProcess, number: int, timeout: float = 60.0) -> None:
+    """Wait until a process has written this many results."""
+    assert wait_until(lambda: process.text().count(WRITTEN) >= number, timeout), process.text()
 
 
 # --- online is offline -----------------------------------------------------------------------------------------------
@@ -105,16 +131,15 @@ class Listener:
 
 
 @pytest.fixture(scope="module")
-def watched(models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Listener]:
+def watched(served: int, models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Listener]:
     """Output folder and messages of one recording, replayed at rate 10 and validated for two models."""
-    domain, out = free_domain(), tmp_path_factory.mktemp("watched")
+    out = tmp_path_factory.mktemp("watched")
     gp, analytical = models.values()
-    served = {"models": [str(gp), str(analytical)]}
-    with ros_context(domain) as node, node_process("predict_server", domain=domain, params=served):
+    with ros_context(served) as node:
         received = Listener(node)
-        with validator(domain, model=gp, compare=[str(analytical)], output=out) as process:
+        with validator(served, model=gp, compare=[str(analytical)], output=out) as process:
             received.status.wait_for_first()
-            with replaying(domain, rate=10.0):
+            with replaying(served, rate=10.0):
                 process.wait_for_text(WRITTEN, 60.0)
             judged = [len(windows_of(out, suffix)) for suffix in ("", "_analytical")]
             assert wait_until(lambda: len(received.residuals) >= sum(judged) and len(received.markers) >= judged[0])
@@ -206,15 +231,15 @@ def test_the_schema_in_the_bag_is_the_installed_message():
     assert list(written.items()) == list(installed.items())
 
 
-def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[str, Path]):
+def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[str, Path], tmp_path: Path):
     """At rate 100 a minute passes in 0.6 s, a delay that the middleware may have on a busy machine."""
-    recording = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    recording = read_recording(beginning(REPOSITORY / "bags" / "square_abs_test", 75.0, tmp_path / "bag"))
     assert recording.rig is not None and recording.wrench is not None
     asked: list[PredictPush.Request] = []
     client = SimpleNamespace(ask=lambda request, on_answer: asked.append(request))
     run = ValidationRun(recording.rig, {"analytical": load_model(models["analytical"])}, client, lambda *shown: None)
     stamps = [stream.stamp for stream in (recording.slider, recording.pusher, recording.wrench)]
-    early, late = stamps[0][0] + 100 * 10**9, stamps[0][0] + 40 * 10**9
+    early, late = stamps[0][0] + 70 * 10**9, stamps[0][0] + 10 * 10**9
 
     def portion(start: int, wrench_start: int, end: int, wrench_end: int) -> Samples:
         inside = [(s >= begin) & (s < stop) for s, begin, stop in zip(
@@ -237,70 +262,142 @@ def test_waits_for_a_stream_that_lags_by_a_minute_of_the_recording(models: dict[
     assert [r.velocity for r in asked] == pytest.approx([w.velocity for w in expected], rel=1e-9)
 
 
-@pytest.mark.parametrize("given", ["gp", ""])
-def test_a_model_is_given_by_the_servers_name_or_omitted(given: str, domain, server, models, tmp_path: Path):
-    """The first model is the server's default."""
-    with validator(domain, model=given, output=tmp_path) as process, replaying(domain, rate=20.0):
-        process.wait_for_text(WRITTEN, 60.0)
-    assert_same_as_offline(tmp_path, models["gp"])
-
-
 # --- a server that is not there, or will not answer ------------------------------------------------------------------
 
 
-def test_a_server_started_after_the_replay_costs_no_window(domain: int, models, tmp_path: Path):
-    params = {"model": models["gp"], "output": tmp_path, "last_answers": 120.0}
-    with ros_context(domain) as node, validator(domain, **params) as process:
-        status = Status(node)
-        with replaying(domain) as replay:
+class Bench:
+    """A validator that runs for several tests, what it publishes, and its output folder."""
+
+    def __init__(self, domain: int, node: Node, process: NodeProcess, output: Path) -> None:
+        self.domain, self.node, self.process, self.output = domain, node, process, output
+        self.received = Listener(node)
+        self.status = self.received.status
+
+    @property
+    def results(self) -> int:
+        """How often it has written its result."""
+        return self.process.text().count(WRITTEN)
+
+
+@pytest.fixture(scope="class")
+def alone(models: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """A validator without a server."""
+    output = tmp_path_factory.mktemp("alone")
+    params = {"model": models["gp"], "output": output, "request_timeout": 0.5, "last_answers": 120.0}
+    with reserved_domain() as domain, ros_context(domain) as node, validator(domain, **params) as process:
+        yield Bench(domain, node, process, output)
+
+
+class TestServerThatComesLate:
+    def test_a_server_started_after_the_replay_costs_no_window(self, alone: Bench, models, hexagon: Path):
+        before = alone.results
+        alone.status.wait_for_message(NO_SERVER)
+        with replaying(alone.domain, recording=hexagon) as replay:
             replay.wait_for_text("finished: published", 60.0)
-        status.wait_for_message(NO_SERVER)
-        status.wait_for("state", "waiting for the last answers")
-        with node_process("predict_server", domain=domain, params={"models": [str(models["gp"])]}):
-            process.wait_for_text(WRITTEN, 120.0)
-    assert_same_as_offline(tmp_path, models["gp"])
+        alone.status.wait_for("state", "waiting for the last answers")
+        assert NO_SERVER in alone.status.message and alone.results == before
+        with node_process("predict_server", domain=alone.domain, params={"models": [str(models["gp"])]}):
+            wait_for_result(alone.process, before + 1, 120.0)
+        assert_same_as_offline(alone.output, models["gp"], hexagon)
+
+    def test_a_server_killed_and_started_again_costs_no_window(self, alone: Bench, models, hexagon: Path, monkeypatch):
+        monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
+        before, served = alone.results, {"models": [str(models["gp"])]}
+        alone.status.wait_for_message(NO_SERVER)
+        alone.received.residuals.clear()
+        with node_process("predict_server", domain=alone.domain, params=served) as first:
+            alone.status.wait_for_server()
+            with replaying(alone.domain, recording=hexagon, **{"play.start_paused": True}):
+                play_some(alone.node, TWO_PUSHES)
+                assert wait_until(lambda: len(alone.received.residuals) >= 8, 60.0)
+                first.send_signal(signal.SIGKILL)
+                first.wait()
+                answered = len(alone.received.residuals)
+                call(alone.node.create_client(Resume, "push_replay/resume"), Resume.Request())
+                with node_process("predict_server", domain=alone.domain, params=served):
+                    wait_for_result(alone.process, before + 1, 120.0)
+        assert_same_as_offline(alone.output, models["gp"], hexagon)
+        assert answered < len(windows_of(alone.output))
 
 
-def test_a_server_killed_and_started_again_costs_no_window(domain: int, models, tmp_path: Path, monkeypatch):
-    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # a killed node would leave its shared memory behind
-    served = {"models": [str(models["gp"])]}
-    params = {"model": models["gp"], "output": tmp_path, "request_timeout": 0.5, "last_answers": 120.0}
-    with (
-        ros_context(domain) as node,
-        validator(domain, **params) as process,
-        node_process("predict_server", domain=domain, params=served) as first,
-    ):
-        received = Listener(node)
-        received.status.wait_for_server()
-        with replaying(domain, rate=2.0):
-            assert wait_until(lambda: len(received.residuals) >= 10, 60.0)
-            first.send_signal(signal.SIGKILL)
-            first.wait()
-            answered = len(received.residuals)
-            with node_process("predict_server", domain=domain, params=served):
-                process.wait_for_text(WRITTEN, 120.0)
-    assert_same_as_offline(tmp_path, models["gp"])
-    assert answered < len(windows_of(tmp_path))
-
-
-def test_waits_for_a_model_that_the_server_has_not_loaded(domain: int, models, tmp_path: Path):
-    with (
-        ros_context(domain) as node,
-        node_process("predict_server", domain=domain, params={"models": [str(models["analytical"])]}),
-        validator(domain, model="hexagon", output=tmp_path) as process,
-    ):
-        status = Status(node)
-        with replaying(domain) as replay:
+@pytest.fixture(scope="class")
+def named(
+    served: int, models: dict[str, Path], hexagon: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Bench, dict[str, Any]]]:
+    """A validator of a model that the server loads only after a replay, and what happened until then."""
+    output, before = tmp_path_factory.mktemp("named"), {}
+    with ros_context(served) as node, validator(served, model="hexagon", output=output) as process:
+        bench = Bench(served, node, process, output)
+        bench.status.wait_for_first()
+        with replaying(served, recording=hexagon) as replay:
             replay.wait_for_text("finished: published", 60.0)
-        message = status.wait_for_message("hexagon")
-        assert "predict_server has no model 'hexagon'. Its models: analytical." in message
-        answer = finish(node)
-        assert not answer.success and "hexagon" in answer.message
-        assert not (tmp_path / "validation.json").exists()
+        before["status"] = bench.status.wait_for_message("hexagon")
+        before["answer"] = finish(node)
+        before["written"] = (output / "validation.json").exists()
         request = LoadModel.Request(path=str(models["gp"]), name="hexagon")
         assert call(node.create_client(LoadModel, "load_model"), request).success
         process.wait_for_text(WRITTEN, 60.0)
-    assert_same_as_offline(tmp_path, models["gp"])
+        before["output"] = Path(shutil.copytree(output, output.with_name("named_first")))
+        yield bench, before
+
+
+class TestOneValidator:
+    """Three runs of one validator."""
+
+    def test_waits_for_a_model_that_the_server_has_not_loaded(self, named, models, hexagon: Path):
+        _, before = named
+        assert "predict_server has no model 'hexagon'. Its models: gp, analytical." in before["status"]
+        assert not before["answer"].success and "hexagon" in before["answer"].message
+        assert not before["written"]
+        assert_same_as_offline(before["output"], models["gp"], hexagon)
+
+    def test_paused_sought_and_looped_replays_are_one_run_that_counts_time_jumps(self, named, models):
+        windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
+        begin, middle = (Seek.Request(time=ns_to_stamp(windows[k].start)) for k in (0, len(windows) // 2))
+        bench, _ = named
+        node, status = bench.node, bench.status
+
+        def figure(key: str) -> int:
+            return int(status.values.get(key, "0"))
+
+        pause, resume, set_rate, seek = (
+            node.create_client(kind, f"push_replay/{name}")
+            for kind, name in ((Pause, "pause"), (Resume, "resume"), (SetRate, "set_rate"), (Seek, "seek"))
+        )
+        with replaying(bench.domain, rate=20.0, **{"play.loop": True}):
+            acquaint(node, "push_replay")
+            assert wait_until(lambda: figure("streams clock_set_back") >= 1), "looped"
+            call(pause, Pause.Request())
+            status.wait_for_news()
+            samples = figure("slider samples")
+            # From the middle, at this rate, the replay loops only after 20 s: an earlier jump is the seek.
+            assert call(set_rate, SetRate.Request(rate=0.5)).success and call(seek, middle).success
+            call(resume, Resume.Request())
+            assert wait_until(lambda: figure("slider samples") >= samples + 100)
+            before = figure("streams clock_set_back")
+            assert call(seek, begin).success
+            assert wait_until(lambda: figure("streams clock_set_back") > before)
+        assert finish(node).success
+        offline = {window.push_id for window in windows}
+        assert len(offline & {entry["push_id"] for entry in windows_of(bench.output)}) >= len(offline) - 1
+
+    def test_another_rig_ends_the_run_and_a_model_of_another_slider_gives_a_warning(
+        self, named, models, hexagon: Path, tmp_path: Path
+    ):
+        bench, _ = named
+        circle = beginning(CIRCLE, 5.8, tmp_path / "circle")
+        before = bench.results
+        bench.status.wait_for_server()  # a change of the rig waits 5 s for answers
+        with replaying(bench.domain, *PLAYING_ALONE, recording=hexagon) as replay:
+            replay.wait_for_text("finished: published", 60.0)
+        with replaying(bench.domain, *PLAYING_ALONE, recording=circle) as replay:
+            wait_for_result(bench.process, before + 1)
+            assert_same_as_offline(bench.output, models["gp"], hexagon)
+            replay.wait_for_text("finished: published", 60.0)
+        message = bench.status.wait_for_message("was trained with the outline")
+        assert "'hex'" in message and "'ellip1'" in message and bench.status.all[-1][0] == DiagnosticStatus.WARN
+        assert finish(bench.node).success
+        assert_same_as_offline(bench.output, models["gp"], circle)
 
 
 class StubServer:
@@ -327,56 +424,55 @@ class StubServer:
         return response
 
 
-def test_refused_windows_and_invalid_gaussians_are_listed_and_not_scored(domain: int, models, tmp_path: Path):
+def test_refused_windows_and_invalid_gaussians_are_listed_and_not_scored(
+    domain: int, models, hexagon: Path, tmp_path: Path
+):
     """The stub offers no list_models: a validator with a model file does not depend on that."""
     with ros_context(domain) as node:
         status, _ = Status(node), StubServer(node)
-        with validator(domain, model=models["gp"], output=tmp_path) as process, replaying(domain):
+        with validator(domain, model=models["gp"], output=tmp_path) as process, replaying(domain, recording=hexagon):
             process.wait_for_text(WRITTEN, 60.0)
             log, result = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("windows", "validation"))
             reasons = [entry["reason"] for entry in log["refused"]]
             status.wait_for("refused", str(len(reasons)))
             assert f"predict_push refused {len(reasons)} requests" in status.message
             assert process.stop() == 0, process.text()
-    total = int(count_of_windows(models["gp"]))
+    total = len(validate_recording(load_model(models["gp"]), hexagon)[0])
     assert result["n_test"] == len(log["windows"]) == total - len(reasons) and log["unanswered"] == 0
     assert {reason.split(":")[0] for reason in reasons} == {"response mean", "covariance", "angle"}
     known = {(w["push_id"], w["window"]) for w in log["windows"]}
     assert not known & {(entry["push_id"], entry["window"]) for entry in log["refused"]}
 
 
-def test_unanswered_windows_are_counted_and_not_scored(domain: int, models, tmp_path: Path):
+def test_unanswered_windows_are_counted_and_not_scored(domain: int, models, hexagon: Path, tmp_path: Path):
+    total = len(validate_recording(load_model(models["gp"]), hexagon)[0])
     params = {"model": models["gp"], "output": tmp_path, "last_answers": 0.2}
-    with ros_context(domain) as node, validator(domain, **params) as process, replaying(domain):
+    with ros_context(domain) as node, validator(domain, **params) as process, replaying(domain, recording=hexagon):
         status = Status(node)
         process.wait_for_text(WRITTEN, 60.0)
         status.wait_for_news()
         assert (status.values["gp windows"], status.values["open requests"]) == ("0", "0")
-        total = count_of_windows(models["gp"])
         assert f"never answered for {total} windows" in process.text()
-    assert json.loads((tmp_path / "windows.json").read_text())["unanswered"] == int(total)
+    assert json.loads((tmp_path / "windows.json").read_text())["unanswered"] == total
     assert json.loads((tmp_path / "validation.json").read_text())["n_test"] == 0
 
 
 # --- the end of a run ------------------------------------------------------------------------------------------------
 
 
-def test_finish_writes_everything_and_later_samples_begin_a_new_run(domain: int, server, models, tmp_path: Path):
+def test_finish_writes_everything_and_later_samples_begin_a_new_run(served: int, models, hexagon: Path, tmp_path: Path):
     """replay_status is remapped away, as if another program played."""
-    unheard = ("-r", "replay_status:=nowhere")
-    with (
-        ros_context(domain) as node,
-        validator(domain, *unheard, model=models["gp"], output=tmp_path, report=True) as process,
-    ):
+    params = {"model": models["gp"], "output": tmp_path, "report": True}
+    with ros_context(served) as node, validator(served, *PLAYING_ALONE, **params) as process:
         status, stray = Status(node), node.create_publisher(PoseStamped, "slider/pose", 100)
         answer = finish(node)
         assert not answer.success and "rig" in answer.message
         status.wait_for_server()  # a caller of ~/finish waits 5 s for answers
-        with replaying(domain) as replay:
+        with replaying(served, recording=hexagon) as replay:
             replay.wait_for_text("finished: published", 60.0)
         answer = finish(node, timeout=60.0)
         assert answer.success and answer.message == str(tmp_path)
-        assert_same_as_offline(tmp_path, models["gp"])
+        assert_same_as_offline(tmp_path, models["gp"], hexagon)
         assert (tmp_path / "report.html").stat().st_size > 10_000
         first = (tmp_path / "validation.json").read_text()
         assert finish(node).success, "a second call changes nothing"
@@ -386,26 +482,27 @@ def test_finish_writes_everything_and_later_samples_begin_a_new_run(domain: int,
         assert finish(node).success
         assert (tmp_path / "validation.json").read_text() == first, "a run without a push replaces no result"
 
-        with replaying(domain, rate=10.0) as replay:
+        with replaying(served, recording=hexagon) as replay:
             replay.wait_for_text("finished: published", 60.0)
             status.wait_for_news()
             status.wait_for("open requests", "0")  # the end of the process waits 2 s for those that come
             (tmp_path / "validation.json").unlink()
             assert process.stop(signal.SIGTERM) == 0
-        assert_same_as_offline(tmp_path, models["gp"])
+        assert_same_as_offline(tmp_path, models["gp"], hexagon)
 
 
-def test_an_interrupted_validator_writes_its_measurements(domain: int, server, models, tmp_path: Path):
-    with ros_context(domain) as node, validator(domain, model=models["gp"], output=tmp_path, report=True) as process:
+def test_an_interrupted_validator_writes_its_measurements(served: int, models, hexagon: Path, tmp_path: Path):
+    with ros_context(served) as node, validator(served, model=models["gp"], output=tmp_path, report=True) as process:
         received = Listener(node)
         received.status.wait_for_server()
-        with replaying(domain, rate=2.0):
+        with replaying(served, recording=hexagon, **{"play.start_paused": True}):
+            play_some(node, TWO_PUSHES)
             assert wait_until(lambda: len(received.residuals) >= 8, 60.0)
             assert wait_until(lambda: int(received.status.values.get("gp windows", "0")) >= 8), (
                 "scores are published during the run"
             )
             assert process.stop(signal.SIGINT, timeout=20.0) == 0  # not the 30 s of last_answers
-    windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
+    windows, _ = validate_recording(load_model(models["gp"]), hexagon)
     found = [(w["push_id"], w["window"]) for w in windows_of(tmp_path)]
     assert 8 <= len(found) < len(windows)
     assert found == [(w.push_id, w.index) for w in windows[: len(found)]]
@@ -413,78 +510,35 @@ def test_an_interrupted_validator_writes_its_measurements(domain: int, server, m
     assert not (tmp_path / "report.html").exists()
 
 
-def test_paused_sought_and_looped_replays_are_one_run_that_counts_time_jumps(
-    domain: int, server, models, tmp_path: Path
-):
-    windows, _ = validate_recording(load_model(models["gp"]), HEXAGON)
-    begin, middle = (Seek.Request(time=ns_to_stamp(windows[k].start)) for k in (0, len(windows) // 2))
-    with ros_context(domain) as node, validator(domain, model=models["gp"], output=tmp_path):
-        status = Status(node)
-
-        def figure(key: str) -> int:
-            return int(status.values.get(key, "0"))
-
-        pause, resume, set_rate, seek = (
-            node.create_client(kind, f"push_replay/{name}")
-            for kind, name in ((Pause, "pause"), (Resume, "resume"), (SetRate, "set_rate"), (Seek, "seek"))
-        )
-        with replaying(domain, rate=20.0, **{"play.loop": True}):
-            acquaint(node, "push_replay")
-            assert wait_until(lambda: figure("streams clock_set_back") >= 1), "looped"
-            call(pause, Pause.Request())
-            status.wait_for_news()
-            samples = figure("slider samples")
-            # From the middle, at this rate, the replay loops only after 20 s: an earlier jump is the seek.
-            assert call(set_rate, SetRate.Request(rate=0.5)).success and call(seek, middle).success
-            call(resume, Resume.Request())
-            assert wait_until(lambda: figure("slider samples") >= samples + 100)
-            before = figure("streams clock_set_back")
-            assert call(seek, begin).success
-            assert wait_until(lambda: figure("streams clock_set_back") > before)
-        assert finish(node).success
-    offline = {window.push_id for window in windows}
-    assert len(offline & {entry["push_id"] for entry in windows_of(tmp_path)}) >= len(offline) - 1
-
-
 # --- rigs ------------------------------------------------------------------------------------------------------------
 
 
-def test_works_in_a_namespace_with_remapped_topics_and_a_rig_file(domain: int, models, tmp_path: Path):
-    rig = tmp_path / "hexagon.rig.yaml"
-    save_rig(load_rig_for([HEXAGON]), rig)
+@pytest.fixture(scope="module")
+def cell(models: dict[str, Path], hexagon: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Output of a validator in a namespace, of the server's default model and one that is given by name."""
+    domain, out = free_domain(), tmp_path_factory.mktemp("cell")
+    rig = out / "hexagon.rig.yaml"
+    save_rig(load_rig_for([hexagon]), rig)
     remaps = ("-r", "slider/pose:=/vicon/butter/butter", "-r", "pusher/wrench:=ft/wrench")
-    served = {"models": [str(models["gp"])]}
+    params = {"compare": ["analytical"], "output": out, "rig": rig}
     with (
-        node_process("predict_server", domain=domain, namespace="/cell", params=served),
-        validator(
-            domain, *remaps, "-r", "rig:=nowhere", namespace="/cell", model=models["gp"], output=tmp_path, rig=rig
-        ) as process,
-        replaying(domain, *remaps, "-r", "__ns:=/cell"),
+        node_process(
+            "predict_server", domain=domain, namespace="/cell", params={"models": [*map(str, models.values())]}
+        ),
+        validator(domain, *remaps, "-r", "rig:=nowhere", namespace="/cell", **params) as process,
+        replaying(domain, *remaps, "-r", "__ns:=/cell", recording=hexagon),
     ):
         process.wait_for_text(WRITTEN, 60.0)
-    assert_same_as_offline(tmp_path, models["gp"])
+    return out
 
 
-def test_another_rig_ends_the_run_and_a_model_of_another_slider_gives_a_warning(
-    domain: int, server, models, tmp_path: Path
-):
-    unheard = ("-r", "replay_status:=nowhere")
-    with (
-        ros_context(domain) as node,
-        validator(domain, *unheard, model=models["analytical"], output=tmp_path) as process,
-    ):
-        status = Status(node)
-        status.wait_for_server()  # a change of the rig waits 5 s for answers
-        with replaying(domain) as replay:
-            replay.wait_for_text("finished: published", 60.0)
-        with replaying(domain, recording=CIRCLE) as replay:
-            process.wait_for_text(WRITTEN, 60.0)
-            assert_same_as_offline(tmp_path, models["analytical"])
-            replay.wait_for_text("finished: published", 60.0)
-        message = status.wait_for_message("was trained with the outline")
-        assert "'hex'" in message and "'ellip1'" in message and status.all[-1][0] == DiagnosticStatus.WARN
-        assert finish(node).success
-    assert_same_as_offline(tmp_path, models["analytical"], CIRCLE)
+def test_works_in_a_namespace_with_remapped_topics_and_a_rig_file(cell: Path, models, hexagon: Path):
+    """No model is given: the server's default is its first."""
+    assert_same_as_offline(cell, models["gp"], hexagon)
+
+
+def test_a_model_is_given_by_the_servers_name(cell: Path, models, hexagon: Path):
+    assert_same_as_offline(cell, models["analytical"], hexagon, suffix="_analytical")
 
 
 # --- messages that no sensor should send -----------------------------------------------------------------------------
@@ -545,19 +599,30 @@ def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyP
 # --- starting --------------------------------------------------------------------------------------------------------
 
 
-def test_a_bad_parameter_ends_the_start_with_one_line(domain: int, models, tmp_path: Path):
+def test_a_bad_parameter_ends_the_start_with_one_line(domain: int, models, tmp_path: Path, monkeypatch, capfd):
+    """In this process, whose signal handlers are kept; one more in a process of its own."""
     blocked, twin = tmp_path / "file", tmp_path / "twin.pushmodel"
     blocked.write_text("no folder")
     twin.write_bytes(models["gp"].read_bytes())
+    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     cases: list[tuple[dict[str, Any], tuple[str, ...]]] = [
-        ({"output": blocked / "in"}, ("output", str(blocked), "folder")),
-        ({"model": blocked}, (str(blocked), "not a model file")),
-        ({"rig": tmp_path / "absent.yaml"}, ("absent.yaml", "cannot be read")),
-        ({"model": models["gp"], "compare": [str(twin)]}, ("compare", "gp", "different")),
+        ({"output": str(blocked / "in")}, ("output", str(blocked), "folder")),
+        ({"model": str(blocked)}, (str(blocked), "not a model file")),
+        ({"rig": str(tmp_path / "absent.yaml")}, ("absent.yaml", "cannot be read")),
+        ({"model": str(models["gp"]), "compare": [str(twin)]}, ("compare", "gp", "different")),
     ]
-    with ExitStack() as running:
-        processes = [running.enter_context(validator(domain, **params)) for params, _ in cases]
-        for process, (_, words) in zip(processes, cases, strict=True):
-            assert process.wait(60.0) == 1
-            (line,) = process.text().strip().splitlines()
-            assert line.startswith("push_validator: ") and all(word in line for word in words), line
+    for k, (params, words) in enumerate(cases):
+        given = [word for name, value in params.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
+        assert runtime.run("push_validator", PushValidator, ["--ros-args", "-r", f"__node:=validator_{k}", *given]) == 1
+        assert_one_line(capfd.readouterr().err, words)
+    params, words = cases[0]
+    with validator(domain, **params) as process:
+        assert process.wait(60.0) == 1
+        assert_one_line(process.text(), words)
+
+
+def assert_one_line(text: str, words: tuple[str, ...]) -> None:
+    (line,) = text.strip().splitlines()
+    assert line.startswith("push_validator: ") and all(word in line for word in words), line

@@ -9,6 +9,7 @@ import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,7 +24,17 @@ from validator_bench import Status
 
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
-from push_predictor.online.trace_process import EXTENDED, REPORT, VERDICT, evidence_in
+from push_predictor.nodes import predict_server, runtime
+from push_predictor.online import trace_process
+from push_predictor.online.trace_process import (
+    COPIES,
+    EXTENDED,
+    REPORT,
+    VERDICT,
+    Failed,
+    TraceTask,
+    evidence_in,
+)
 from push_predictor.recordings.table_file import write_table
 from push_predictor_interfaces.srv import LoadModel
 
@@ -83,26 +94,22 @@ def test_trace_writes_a_model_for_load_model_while_predictions_go_on(
     assert server.push().success  # the deployed model still predicts
 
 
-def test_cancelled_trace_leaves_no_files(server: Server, drifting: Path) -> None:
+def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
+    server: Server, drifting: Path, tmp_path: Path
+) -> None:
     before = names(drifting)
-    goal = server.trace(drifting, covariates=[])
-    worker = server.held(goal)
-    goal.handle.cancel_goal_async()
-    status, result = goal.end()
-    assert status == GoalStatus.STATUS_CANCELED and not result.success and "cancelled" in result.message
-    assert names(drifting) == before and worker not in server.workers()
-    assert server.push().success
-
-
-def test_second_goal_is_refused_with_the_reason(server: Server, drifting: Path, tmp_path: Path) -> None:
     first = server.trace(drifting, covariates=[])
-    server.held(first)
+    worker = server.held(first)
     status, result = server.trace(tmp_path / "other").end()
     assert status == GoalStatus.STATUS_ABORTED and not result.success
     assert "one at a time" in result.message and "deployed" in result.message
     assert not (tmp_path / "other").exists() and not first.ended
+
     first.handle.cancel_goal_async()
-    assert first.end()[0] == GoalStatus.STATUS_CANCELED
+    status, result = first.end()
+    assert status == GoalStatus.STATUS_CANCELED and not result.success and "cancelled" in result.message
+    assert names(drifting) == before and worker not in server.workers()
+    assert server.push().success
 
 
 def test_killed_process_aborts_the_goal_and_the_server_continues(server: Server, drifting: Path) -> None:
@@ -123,9 +130,11 @@ BAD = {
     "no output": ({"output": ""}, ["output: ''"]),
     "no folder": ({"output": "absent"}, ["absent", "no data to trace", "no push_validator", "pushes.csv"]),
     "unknown model": ({"model": "other"}, ["model: 'other'", "deployed"]),
-    "unknown covariate": ({"covariates": ["topic:/warmth"]}, ["topic:/warmth", "elapsed_time"]),
-    "no rig": ({"change": lambda folder: (folder / RIG).unlink()}, [RIG]),
     "not a table": ({"change": cut}, ["pushes.csv line 1", "velocity"]),
+}
+BAD_DATA = {
+    "unknown covariate": ({"covariates": ("topic:/warmth",)}, ["topic:/warmth", "elapsed_time"]),
+    "no rig": ({"change": lambda folder: (folder / RIG).unlink()}, [RIG]),
     "few pushes": ({"change": lambda folder: write_table(folder / "pushes.csv", pushes(5, 3))}, ["pushes: 5", "12"]),
 }
 
@@ -143,6 +152,26 @@ def test_bad_goal_is_aborted_with_the_reason(case: str, server: Server, drifting
     assert status == GoalStatus.STATUS_ABORTED and not result.success and result.verdict == ""
     assert all(word in result.message for word in words), result.message
     assert ".trace-" not in result.message and names(drifting) == before
+
+
+@pytest.mark.parametrize("case", BAD_DATA)
+def test_process_of_a_trace_reports_the_reason(
+    case: str, place: Path, drifting: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In this process, whose priority and signal handlers are kept."""
+    given, words = BAD_DATA[case]
+    monkeypatch.setattr(trace_process.os, "nice", lambda more: None)
+    monkeypatch.setattr(trace_process.signal, "signal", lambda number, handler: None)
+    given.get("change", lambda folder: None)(drifting)
+    (folder := drifting / ".trace-work").mkdir()
+    task = TraceTask(
+        (drifting / "pushes.csv",), place / "deployed.pushmodel", given.get("covariates", ()), 0.01, folder
+    )
+    sent: list[Any] = []
+    trace_process._run(SimpleNamespace(send=sent.append), task)
+    assert isinstance(sent[-1], Failed) and ".trace-" not in sent[-1].reason
+    assert all(word in sent[-1].reason for word in words), sent[-1].reason
+    assert {path.name for path in folder.iterdir()} <= {COPIES}
 
 
 @pytest.mark.slow
@@ -179,10 +208,15 @@ def test_ending_node_aborts_the_goal_and_ends_the_process(place: Path, drifting:
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
-def test_rejects_alpha_out_of_range_at_start(alpha: float) -> None:
-    with harness.node_process("predict_server", domain=harness.free_domain(), params={"trace_alpha": alpha}) as node:
-        assert node.wait(harness.START_TIMEOUT) == 1
-        assert f"trace_alpha: {alpha} is not accepted" in node.text()
+def test_rejects_alpha_out_of_range_at_start(
+    alpha: float, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """In this process, whose signal handlers are kept."""
+    monkeypatch.setattr(runtime, "_handle_signals", lambda stop: None)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(harness.free_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    assert predict_server.main(["--ros-args", "-p", f"trace_alpha:={alpha}"]) == 1
+    assert f"trace_alpha: {alpha} is not accepted" in capfd.readouterr().err
 
 
 def test_evidence_in_a_folder(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def uniform(pushes: int, windows: int = 4, seed: int = 0) -> np.ndarray:
 
 
 def outcomes(pushes: int, scatter: float = 1.0, gained: float = 0.1) -> Pits:
-    """Outcomes that scatter by so much of what a standard normal forecast says; gained: nats by the exact density."""
+    """Outcomes that scatter by so much of what a standard normal forecast states; gained: nats by the exact density."""
     rng = np.random.default_rng(1)
     observed = scatter * rng.standard_normal((4 * pushes, 3))
     variance, mean = np.broadcast_to(np.eye(3), (len(observed), 3, 3)), np.zeros_like(observed)
@@ -86,8 +86,8 @@ def corpus(origin: str = "simulated", pushes: int = 40) -> Corpus:
 
 
 def test_coverage_counts_outcomes_in_the_central_interval() -> None:
-    told = coverage(ids(2, 2), np.array([[0.5, 0.02, 0.3], [0.4, 0.98, 0.3], [0.26, 0.5, 0.9], [0.1, 0.5, 0.9]]), 0.5)
-    assert [e.value for e in told] == [0.75, 0.5, 0.5]
+    shares = coverage(ids(2, 2), np.array([[0.5, 0.02, 0.3], [0.4, 0.98, 0.3], [0.26, 0.5, 0.9], [0.1, 0.5, 0.9]]), 0.5)
+    assert [e.value for e in shares] == [0.75, 0.5, 0.5]
 
 
 def test_intervals_of_coverage_resample_pushes_not_windows() -> None:
@@ -99,8 +99,8 @@ def test_intervals_of_coverage_resample_pushes_not_windows() -> None:
 
 
 def test_one_push_gives_a_share_without_an_interval() -> None:
-    told = coverage(ids(1), np.full((4, 3), 0.5), 0.9)[0]
-    assert told.value == 1.0 and np.isnan(told.low) and np.isnan(told.high)
+    share = coverage(ids(1), np.full((4, 3), 0.5), 0.9)[0]
+    assert share.value == 1.0 and np.isnan(share.low) and np.isnan(share.high)
     assert np.isnan(histogram(ids(1), np.full((4, 3), 0.5)).p).all()
 
 
@@ -186,8 +186,8 @@ def test_a_perfect_gaussian_model_is_seldom_rejected(monkeypatch: pytest.MonkeyP
     for run in range(60):
         rng = np.random.default_rng(run)
         shared, own = rng.standard_normal((900, 1, 3)), rng.standard_normal((900, 4, 3))
-        told = ndtr(np.sqrt(0.5) * (shared + own)).reshape(-1, 3)
-        by_level = [coverage(ids(900), told, level) for level in COVERAGE_LEVELS]
+        transformed = ndtr(np.sqrt(0.5) * (shared + own)).reshape(-1, 3)
+        by_level = [coverage(ids(900), transformed, level) for level in COVERAGE_LEVELS]
         broken += any(promise([level[k] for level in by_level]) != "kept" for k in range(3))
     assert broken <= 6
 
@@ -258,8 +258,8 @@ def test_the_exact_density_must_gain_on_both_splits(gains: tuple[Estimate, Estim
 
 
 def test_four_findings_a_corpus() -> None:
-    told = calibration_findings(found(["kept"] * 3, [0.5] * 3, (SAME, SAME)))
-    assert len(told) == 4 and {finding.origin for finding in told} == {"beyond the paper"}
+    findings = calibration_findings(found(["kept"] * 3, [0.5] * 3, (SAME, SAME)))
+    assert len(findings) == 4 and {finding.origin for finding in findings} == {"beyond the paper"}
 
 
 def test_the_gain_of_a_density_is_its_mean_over_windows_summed_over_outputs() -> None:

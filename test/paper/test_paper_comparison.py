@@ -71,11 +71,11 @@ def test_a_gap_must_stay_below_zero_from_there_on():
 
 
 def test_the_crossing_of_two_known_curves():
-    learnt, flat = (
+    learned, flat = (
         [[push_scores(v, fold=k) for k in range(5)] for v in (1.1, 0.7, 0.3)],
         [[push_scores(0.9, fold=k) for k in range(5)]] * 3,
     )
-    found = crossing(SIZES, learnt, flat)
+    found = crossing(SIZES, learned, flat)
     assert found.value == pytest.approx(10**1.5, rel=0.01)
     assert found.low <= found.value <= found.high and found.high < 1.1 * found.low
 

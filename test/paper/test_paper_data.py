@@ -85,8 +85,8 @@ def test_the_maps_of_a_grid_lie_angle_by_contact() -> None:
 def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
     missing = made_up_corpus()
     slow = {pair: replace(s, table=s.table.take(s.table.inputs[:, 0] < 0.06)) for pair, s in missing.sets.items()}
-    told = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).findings[0]
-    assert told.verdict == "does not hold" and "500" in told.sentence
+    finding = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).findings[0]
+    assert finding.verdict == "does not hold" and "500" in finding.sentence
     counts = speed_counts(PLAN, replace(missing, sets=slow))
     assert [c.with_window for c in counts] == [16] * 3 + [0] * 7
     assert [c.pushes for c in counts] == [16] * 10
@@ -129,8 +129,8 @@ def test_sets_of_several_corpora_do_not_hide_each_other(tmp_path: Path) -> None:
     others = PushSet(table.take(np.arange(60)), study.simulated.sets[pair].rig)
     measured = Corpus("measured", "measured: mit_square/pushes_a, one side", {pair: others}, pair)
     sets = section(replace(study, measured=(measured,))).data["sets"]
-    told = [sets[corpus.title]["/".join(pair)]["windows"] for corpus in (study.simulated, measured)]
-    assert told == [len(table), 60]
+    windows = [sets[corpus.title]["/".join(pair)]["windows"] for corpus in (study.simulated, measured)]
+    assert windows == [len(table), 60]
 
 
 def test_a_corpus_has_a_short_name() -> None:

@@ -176,7 +176,7 @@ def test_verdict_on_drawing_together_and_fanning_out(convergent: Estimate, diver
     [(0.01, 0.1, "holds"), (0.4, 0.95, "does not hold"), (0.4, 0.3, "not decided")],
 )
 def test_verdict_on_modes(p: float, power: float, verdict: str) -> None:
-    """No modes found says something only where they would have been found."""
+    """Finding no modes is evidence only where they would have been found."""
     assert has_modes(p, power) == verdict
 
 
@@ -193,7 +193,7 @@ def test_section_finds_all_three_kinds_in_a_grid_that_has_them(tmp_path: Path) -
 
 @pytest.mark.slow
 def test_equal_pushes_are_not_distinguished(tmp_path: Path) -> None:
-    """Ten pushes of one spread, straight: the half that did not choose the extremes says that they are chance."""
+    """Ten pushes of one spread, straight: the half that did not choose the extremes shows that they are chance."""
     made = section(study_of(tmp_path, grid_of(*(rays(3e-4, 60, seed) for seed in range(10)))))
     assert not {finding.verdict for finding in made.findings} & {"holds", "holds in part"}
 

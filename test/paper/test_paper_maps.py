@@ -81,7 +81,7 @@ def test_outputs_that_are_largest_where_the_paper_states() -> None:
     mean = bumps(as_the_paper_says())
     peaks = peaks_of(grid_of(mean), [model_of(mean)] * 2)
     assert peaks.repeated[0].place == (0.5, 0.0)
-    np.testing.assert_allclose(peaks.learnt[0].place, (0.5, 0.0), atol=1e-9)
+    np.testing.assert_allclose(peaks.learned[0].place, (0.5, 0.0), atol=1e-9)
     assert [finding.verdict for finding in peak_findings(peaks, 100)] == ["holds"] * 4
 
 

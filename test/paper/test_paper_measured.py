@@ -147,7 +147,7 @@ def test_its_windows_are_those_of_the_pushes_that_were_written_to_it(corpus: Cor
 
 @pytest.mark.slow
 def test_a_push_cut_into_files_gives_the_windows_of_the_whole_recording_within_one(corpus: Corpus) -> None:
-    """A file has little free motion to tell the force's noise from: touch is seen up to a sample earlier or later."""
+    """A file has little free motion to measure the force's noise: touch is seen up to a sample earlier or later."""
     recording = simulated(*PAIRS[0])
     whole = [window.push_id for window in find_windows(recording, require_rig(recording))]
     ours = corpus.sets[PAIRS[0]].table.push_id.tolist()
@@ -211,8 +211,8 @@ def test_skips_and_names_sets_too_small_for_a_learning_curve(copy: Path, tmp_pat
     (folder / "broken.zip").write_text("no archive")
     (found,) = measured_corpora(folder, Work(tmp_path / "work", cores=1), tmp_path / "scratch")
     assert list(found.sets) == [PAIRS[0]]
-    for told in ("broken.zip", "butter (its outline is not known)", "ellip1 on abs (too few; pushes: 1"):
-        assert told in found.notes[0]
+    for reason in ("broken.zip", "butter (its outline is not known)", "ellip1 on abs (too few; pushes: 1"):
+        assert reason in found.notes[0]
     assert "ellip2" not in found.notes[0], "an accelerated push belongs to no table"
 
 

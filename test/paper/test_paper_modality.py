@@ -25,7 +25,7 @@ from push_predictor_paper.figures.histograms import moments
 from push_predictor_paper.fits.fit import Fit, trained
 from push_predictor_paper.section import Section
 from push_predictor_paper.statistics.densities import LogDensities, found_at, held_out, log_densities, shape
-from push_predictor_paper.statistics.grid_maps import told
+from push_predictor_paper.statistics.grid_maps import place_text
 
 from push_predictor.models.mechanisms import Push
 from push_predictor.reporting.canvas import Picture
@@ -60,7 +60,7 @@ def test_a_push_of_two_modes_is_found_and_named(with_modes: Section) -> None:
     assert with_modes.findings[0].verdict == "holds"
     assert f"first 0.2 s, 1 of {len(grid_with_modes().seen)}" in with_modes.findings[0].sentence
     cell = grid_with_modes().cells[SPLIT]
-    assert with_modes.tables[2].rows[0][0] == f"{told((cell.fraction, cell.angle))}: rotation"
+    assert with_modes.tables[2].rows[0][0] == f"{place_text((cell.fraction, cell.angle))}: rotation"
 
 
 def test_no_modes_are_found_where_there_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,7 +142,7 @@ def test_mean_over_pushes_skips_nan() -> None:
     found = mean_over_pushes(np.array([[1.0, np.nan], [3.0, 5.0]]), weights)
     assert found.value == 3.0 and 1.0 <= found.low < found.high <= 4.0
     known = mean_over_pushes(np.array([[np.nan, np.nan], [3.0, 5.0]]), weights)
-    assert (known.value, known.low, known.high) == (4.0, 4.0, 4.0)  # the draw without it tells nothing
+    assert (known.value, known.low, known.high) == (4.0, 4.0, 4.0)  # the draw without it is skipped
 
 
 def test_a_models_density_is_shown_two_sd_wide_however_narrow_the_outcomes() -> None:

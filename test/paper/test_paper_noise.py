@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_corpus, made_up_grid, made_up_study
-from push_predictor_paper.claims.noise.learned import learnt_figures
+from push_predictor_paper.claims.noise.learned import learned_figures
 from push_predictor_paper.claims.noise.section import section
 from push_predictor_paper.claims.noise.shape import shape_finding
 from push_predictor_paper.claims.noise.size import size_finding, sized, span_finding
@@ -164,7 +164,7 @@ def test_learned_noise_has_the_size_of_the_truth() -> None:
     sd[1] = 1.0
     sd[1, 0] = np.nan
     mean[1, 0] = np.nan
-    rms, median, within, span = learnt_figures([ModelMap(mean, 9.0 * sd, sd, None)] * 2, 1)
+    rms, median, within, span = learned_figures([ModelMap(mean, 9.0 * sd, sd, None)] * 2, 1)
     assert rms.value == pytest.approx(np.sqrt((7 * 0.25 + 3.0) / 10.0) / 2.0)
     assert (median.value, span.value) == (0.25, 2.0)
     assert within.value == pytest.approx(0.7) and within.low == within.high == within.value
@@ -176,8 +176,8 @@ def test_the_section_keeps_simulated_and_measured_noise_apart(tmp_path: Path) ->
     slow = replace(made_up_corpus(speeds=(0.02,)), origin="measured", title="a measured square")
     fast = replace(made_up_corpus(speeds=(0.3,)), origin="measured", title="a fast square")
     made = section(replace(study, measured=(slow, fast)))
-    learnt = [table for table in made.tables if table.caption.startswith("The process noise")]
-    assert [("made up" in table.caption, "measured" in table.caption) for table in learnt] == [
+    learned = [table for table in made.tables if table.caption.startswith("The process noise")]
+    assert [("made up" in table.caption, "measured" in table.caption) for table in learned] == [
         (True, False),
         (False, True),
     ]

@@ -1,4 +1,4 @@
-"""The quasi-static study: pushes of equal travel, models that are not told the speed, where they turn."""
+"""The quasi-static study: pushes of equal travel, models without the speed as an input, where they turn."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def windows_at(number: int, inertia: float) -> PushTable:
     return PushTable(inputs, np.full(pushes, TRAVEL / speed), outcomes, names)
 
 
-def tally_of(error: dict[int, float], pushes: int = 40) -> PushScores:
+def scores_of(error: dict[int, float], pushes: int = 40) -> PushScores:
     """Pushes of several speeds (numbers) with squared errors about these, in units of their spread, summed over 3."""
     names = np.array([f"{number:02d}-{k:05d}" for number in error for k in range(pushes)])
     rng = np.random.default_rng(0)
@@ -67,9 +67,9 @@ def tally_of(error: dict[int, float], pushes: int = 40) -> PushScores:
     )
 
 
-def told(errors: list[dict[int, float]]) -> Judged:
+def judged_from(errors: list[dict[int, float]]) -> Judged:
     """Brackets of these errors by speed."""
-    return Judged(SPEEDS, tuple(range(5)), {"vhgp": [tally_of(error) for error in errors]})
+    return Judged(SPEEDS, tuple(range(5)), {"vhgp": [scores_of(error) for error in errors]})
 
 
 def flat(level: float) -> dict[int, float]:
@@ -132,10 +132,10 @@ def test_held_out_fold_is_not_in_the_training_rows() -> None:
     assert {number_of(name)[0] for name in judged.push_id.tolist()} == {0, 1}
 
 
-def nmse_at(inertia: float, told_speed: bool, speeds: int, at: int) -> float:
+def nmse_at(inertia: float, with_speed: bool, speeds: int, at: int) -> float:
     """NMSE at one speed of a GP of pushes of the slowest speeds."""
     windows = [windows_at(k, inertia) for k in range(5)]
-    found = score_bracket(windows, RIG, Bracket("gp", speeds, 32, told_speed, 0))
+    found = score_bracket(windows, RIG, Bracket("gp", speeds, 32, with_speed, 0))
     return float(Judged(SPEEDS, tuple(range(5)), {"gp": [found] * 5}).single("gp", 0, at)[0])
 
 
@@ -147,7 +147,7 @@ def test_a_model_of_slow_pushes_knows_fast_ones_only_where_the_world_is_quasi_st
 
 @pytest.mark.slow
 def test_speed_as_an_input_helps_where_inertia_matters() -> None:
-    """The turn reverses with speed: without the speed there is no telling."""
+    """The turn reverses with speed: without the speed it cannot be predicted."""
     assert nmse_at(2.0, True, 5, 4) < 0.5 * nmse_at(2.0, False, 5, 4)
 
 
@@ -155,8 +155,8 @@ def test_speed_as_an_input_helps_where_inertia_matters() -> None:
 
 
 def test_each_bracket_is_scored_on_its_own_speeds_the_slow_ones_or_one() -> None:
-    """Errors that differ by speed tell which pushes were counted."""
-    judged = told([{0: 0.1, 1: 0.3, 2: 0.5, 3: 0.7, 4: 0.9}] * 5)
+    """Errors that differ by speed show which pushes were counted."""
+    judged = judged_from([{0: 0.1, 1: 0.3, 2: 0.5, 3: 0.7, 4: 0.9}] * 5)
     assert judged.same("vhgp")[:, 0] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5], rel=0.05)
     assert judged.slow("vhgp")[:, 0] == pytest.approx([0.2] * 5, rel=0.05)
     assert judged.single("vhgp", 0, 4)[0] == pytest.approx(0.9, rel=0.05)
@@ -174,7 +174,7 @@ def test_each_bracket_is_scored_on_its_own_speeds_the_slow_ones_or_one() -> None
 )
 def test_the_verdict_follows_the_curve(levels: tuple[float, ...], course: str, place: str | None) -> None:
     """A valley at the paper's turn, a fall, a rise, a hill, nothing."""
-    curve = told([flat(level) for level in levels]).same("vhgp")
+    curve = judged_from([flat(level) for level in levels]).same("vhgp")
     turn = turning_bracket(SPEEDS)
     assert turn == 3
     assert helps_then_harms(estimated(curve[0] - curve[turn]), estimated(curve[-1] - curve[turn])) == course

@@ -22,7 +22,7 @@ VERDICTS = {"holds", "holds in part", "does not hold", "not decided"}
 
 
 SMALL = replace(
-    QUICK, speeds=(0.02, 0.05, 0.2), pushes=60, reference_pushes=80, sizes=(20, 100), contacts=3, angle_step=0.75,
+    QUICK, speeds=(0.02, 0.05, 0.1), pushes=60, reference_pushes=80, sizes=(20, 100), contacts=3, angle_step=0.75,
     repetitions=12, other_repetitions=12, speed_pushes=10, informed=False,
 )  # fmt: skip
 
@@ -37,16 +37,18 @@ class Stages:
         self.titles.append(title)
 
 
-def report(out: Path) -> Stages:
+def report(out: Path, cache: Path) -> Stages:
     stages = Stages()
-    report_paper(SMALL, Work(out / "work", cores=2), out, None, None, stages)
+    report_paper(SMALL, Work(cache, cores=2), out, None, None, stages)
     return stages
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper")
-    assert report(out).titles[0] == "recordings"
+    with pytest.MonkeyPatch.context() as coarse:
+        coarse.setattr("push_predictor.reporting.canvas.DPI", 40)  # pictures of 160 dpi take seconds
+        assert report(out, out / "work").titles[0] == "recordings"
     return out
 
 
@@ -99,12 +101,18 @@ def test_simulated_and_measured_pushes_share_no_table(made: Path) -> None:
 
 
 @pytest.mark.slow
-def test_second_report_reads_the_cache_and_is_the_same(made: Path) -> None:
-    before, kept = json.loads((made / "paper.json").read_text())["sections"], kept_results(made)
+def test_second_report_reads_the_cache_and_is_the_same(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures are not rendered again: the cache does not contain them."""
+    for rendering in ("draw_without_rendering", "savefig"):
+        monkeypatch.setattr(f"matplotlib.figure.Figure.{rendering}", lambda figure, *arguments, **options: None)
+    kept = kept_results(made)
     assert kept
-    report(made)
+    report(tmp_path, made / "work")
     assert kept_results(made) == kept
-    assert json.loads((made / "paper.json").read_text())["sections"] == before
+    first, second = (json.loads((out / "paper.json").read_text())["sections"] for out in (made, tmp_path))
+    assert second == first
 
 
 def kept_results(out: Path) -> dict[Path, int]:

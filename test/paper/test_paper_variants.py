@@ -57,7 +57,7 @@ def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02
 
 
 def made_up(gains: dict[tuple[int, str, str], float], noise: float = 0.02, nmse: float = 0.2) -> Variants:
-    """Gains in exact NLPD by output over the plain kernel, by size, split and kernel; 0 where not told."""
+    """Gains in exact NLPD by output over the plain kernel, by size, split and kernel; 0 where not given."""
     sizes = sorted({n for n, _, _ in gains} | {500})
     scores = {
         (n, split, name): scored(-4.0 - gains.get((n, split, name), 0.0), 0.2 if name == PLAIN else nmse, noise=noise)
@@ -127,15 +127,15 @@ def test_the_rule_names_what_it_accepts_and_what_the_random_split_would() -> Non
 
 
 @pytest.mark.parametrize(
-    ("gains", "told"),
+    ("gains", "stated"),
     [
         ({}, "would accept none."),
         (on_both(NUGGET, 0.05), "would accept no other."),
         ({(500, "random", MATERN): 0.05}, f"would accept {MATERN} instead."),
     ],
 )
-def test_states_which_variants_the_random_split_alone_accepts(gains, told: str) -> None:
-    assert told in rule_finding(made_up(gains)).sentence
+def test_states_which_variants_the_random_split_alone_accepts(gains, stated: str) -> None:
+    assert stated in rule_finding(made_up(gains)).sentence
 
 
 def test_gain_interval_is_widened_for_three_variants() -> None:
@@ -205,8 +205,8 @@ def test_the_default_choice_is_scored_like_every_other_fit() -> None:
 
 def test_the_choice_reaches_the_model() -> None:
     pushes, fit = corpus().sets[PAIR], Fit("vhgp", 40, "push", 0)
-    told = [float(score_variant(pushes, fit, choice).exact_nlpd.sum()) for choice in CHOICES.values()]
-    assert len(set(told)) == len(CHOICES)
+    scores = [float(score_variant(pushes, fit, choice).exact_nlpd.sum()) for choice in CHOICES.values()]
+    assert len(set(scores)) == len(CHOICES)
 
 
 def test_all_kernels_are_scored_on_the_same_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,6 @@ import gzip
 import json
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,100 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_predictor.errors import ImportSourceError
-from push_predictor.geometry.frames import rotate, to_body, wrap_angle
+from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.importers.cleaning import Samples, in_order, nanoseconds, without_repeats
-from push_predictor.recordings.importers.heading import repair_heading
-from push_predictor.recordings.importers.mcube.pushes import headings
 from push_predictor.recordings.importers.mlab.push_logs import first_touch
 from push_predictor.recordings.importers.mlab.rig import load_shares, triangle
-from push_predictor.recordings.importers.report import Notes
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.table_file import read_table
 
 START = 1_460_088_637.25
-
-
-# --- repairs ------------------------------------------------------------------------------------------------------
-
-
-def _jumping(size: float, spread: int, at: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, the true heading and one with a jump of `size` over `spread` intermediate samples."""
-    time = 0.004 * np.arange(120)
-    true = 0.3 + 0.8 * time
-    steps = np.clip((np.arange(120) - at + 1) / (spread + 1), 0.0, 1.0)
-    return time, true, true + size * steps
-
-
-@pytest.mark.parametrize("spread", [0, 2])
-@pytest.mark.parametrize("quarters", [-1, 1, 2])
-def test_heading_jump_by_quarter_turns_is_undone_on_a_square(quarters: int, spread: int) -> None:
-    time, true, jumping = _jumping(quarters * np.pi / 2, spread)
-    repair = repair_heading(time, jumping, symmetry=4)
-    difference = (repair.heading - true)[repair.keep]
-    assert repair.undone == 1 and repair.cut == 0
-    assert np.sum(~repair.keep) == spread
-    assert np.ptp(difference) < 0.05, "one heading, off by whole turns of the symmetry at most"
-
-
-def test_heading_jump_against_the_symmetry_keeps_the_longer_piece() -> None:
-    time, _, jumping = _jumping(np.pi / 2, spread=1, at=40)
-    repair = repair_heading(time, jumping, symmetry=6)
-    kept = np.flatnonzero(repair.keep)
-    assert repair.cut == 1 and repair.undone == 0
-    assert kept[0] >= 40 and kept[-1] == 119 and len(kept) == kept[-1] - kept[0] + 1
-
-
-def test_ellipse_is_symmetric_under_half_turns_and_circle_under_all() -> None:
-    for size, symmetry in ((np.pi, 2), (np.pi / 2, 0)):
-        time, _, jumping = _jumping(size, spread=0)
-        assert repair_heading(time, jumping, symmetry).undone == 1
-    assert repair_heading(*_jumping(np.pi / 2, spread=0)[::2], 2).cut == 1
-
-
-@given(st.floats(-12.0, 12.0), st.floats(-10.0, 10.0))
-def test_continuous_heading_is_kept_over_many_turns(start: float, speed: float) -> None:
-    time = 0.004 * np.arange(300)
-    true = start + speed * time
-    repair = repair_heading(time, wrap_angle(true), symmetry=4)
-    assert np.all(repair.keep) and repair.undone == repair.cut == 0
-    np.testing.assert_allclose(np.diff(repair.heading), np.diff(true), atol=1e-9)
-
-
-def test_rows_are_sorted_without_repeated_stamps_and_both_are_reported() -> None:
-    notes = Notes()
-    samples = Samples(np.array([10, 30, 20, 20, 40]), np.array([[1.0], [3.0], [2.0], [9.0], [np.nan]]))
-    clean = in_order(samples, "FILE", notes)
-    assert clean.stamp.tolist() == [10, 20, 30] and clean.values[:, 0].tolist() == [1.0, 2.0, 3.0]
-    assert any("1 rows out of order" in line for line in notes.repaired)
-    assert any("NaN or infinity" in line for line in notes.dropped) and any(
-        "repeat the stamp" in line for line in notes.dropped
-    )
-
-
-def test_only_the_first_of_repeated_positions_is_kept() -> None:
-    x = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0])
-    kept = without_repeats(Samples(np.arange(14), x[:, None]), "tip", Notes())
-    assert kept.stamp.tolist() == [0, 2, 4, 6, 8, 11, 12]
-
-
-def test_rest_is_kept_in_a_stream_without_repeated_positions() -> None:
-    x = np.concatenate([np.zeros(9), np.arange(1.0, 20.0), np.full(9, 19.0)])
-    assert len(without_repeats(Samples(np.arange(37), x[:, None]), "tip", Notes()).stamp) == 37
-
-
-@given(st.floats(1.0e9, 2.0e9))
-def test_unix_seconds_keep_their_precision(seconds: float) -> None:
-    assert abs(float(nanoseconds(np.array([seconds]))[0] / 10**9) - seconds) < 3e-7
-
-
-@given(st.floats(-2.5, 2.5), st.floats(0.5, 3.0))
-def test_heading_is_recovered_without_the_sign_of_qw(start: float, turned: float) -> None:
-    true = np.linspace(start, start + turned, 600)
-    quaternion = np.column_stack([np.zeros(600), np.zeros(600), np.sin(true / 2)])
-    np.testing.assert_allclose(headings(quaternion), true, atol=1e-6)
 
 
 # --- mit ----------------------------------------------------------------------------------------------------------
@@ -442,144 +357,6 @@ def test_invalid_mcube_file_is_rejected_with_its_line_and_a_truncated_one_is_rep
     ft.unlink()
     with pytest.raises(ImportSourceError, match=r"metal_1_ft\.txt"):
         import_source("mcube", [folder], tmp_path / "out2")
-
-
-# --- rosbag1 ------------------------------------------------------------------------------------------------------
-
-MOCAP = """Header header
-int64 number
-geometry_msgs/Pose[] body_poses
-Mocap/marker_set uid_markers
-================================================================================
-MSG: Mocap/marker_set
-geometry_msgs/Point[] markers
-"""
-ROBOT = "string date\nstring time\nfloat64 timeStamp\n" + "".join(
-    f"float64 {name}\n" for name in ("x", "y", "z", "q0", "qx", "qy", "qz")
-)
-
-
-def _write_bag(path: Path, topics: dict[str, tuple[str, str | None, list[dict[str, object]]]]) -> Path:
-    """A ROS 1 bag: topic -> (type, definition or None for a standard type, messages with 't', the bag's time in s).
-
-    A message's values are given by the dotted path of the field.
-    """
-    rosbag1 = pytest.importorskip("rosbags.rosbag1")
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with rosbag1.Writer(path) as writer:
-        for topic, (kind, definition, messages) in topics.items():
-            name = kind.replace("Mocap", "mocap")
-            if definition:
-                store.register(get_types_from_msg(definition.replace("Mocap/", "mocap/"), name))
-            recorded, digest = store.generate_msgdef(name, ros_version=1)
-            recorded = recorded.replace("mocap/", "Mocap/")
-            connection = writer.add_connection(topic, kind, typestore=store, msgdef=recorded, md5sum=digest)
-            for values in messages:
-                data = store.serialize_ros1(_filled(store, name, values), name)
-                writer.write(connection, round(1e9 * float(str(values["t"]))), data)
-    return path
-
-
-def _filled(store: Any, kind: str, values: dict[str, object]) -> Any:
-    """A message of zeros with some values set; 'body' (x, y, qx, qy, qz, qw) is a pose in a list."""
-    message = _zeros(store, kind)
-    for place, value in values.items():
-        *path, last = place.split(".")
-        target = message
-        for step in path:
-            target = getattr(target, step)
-        if place == "body":
-            pose = _zeros(store, "geometry_msgs/msg/Pose")
-            pose.position.x, pose.position.y, *rest = value
-            pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = rest
-            message.body_poses.append(pose)
-        elif place != "t":
-            setattr(target, last, value)
-    return message
-
-
-def _zeros(store: Any, kind: str) -> Any:
-    fields = {}
-    for name, (node, detail) in store.fielddefs[kind][1]:
-        if node.name == "NAME":
-            fields[name] = _zeros(store, detail)
-        elif node.name == "BASE":
-            fields[name] = "" if detail[0] == "string" else 0.0 if detail[0].startswith("float") else 0
-        else:
-            fields[name] = []
-    return store.types[kind](**fields)
-
-
-def _stamp(seconds: float, lead: float = 0.0) -> dict[str, object]:
-    whole = int(seconds + lead)
-    return {"t": seconds, "header.stamp.sec": whole, "header.stamp.nanosec": round((seconds + lead - whole) * 1e9)}
-
-
-def test_mcube_bag_has_the_frames_of_the_text_files(tmp_path: Path) -> None:
-    start, half = 1_439_494_853.0, np.sqrt(0.5)
-    body, force, tip = [], [], []
-    for k in range(300):
-        y, at = 0.05 * max(0.0, 0.01 * k - 1.0), start + 0.01 * k
-        place = {"transform.translation.x": -0.0358, "transform.translation.y": -0.2 + y}
-        body.append(_stamp(at) | place | {"transform.rotation.z": half, "transform.rotation.w": half})
-        force.append(_stamp(at) | {"wrench.force.x": -2.0 * (y > 0), "wrench.force.y": 0.3})
-        tip.append(_stamp(at + 0.015) | {"pose.position.x": 0.36, "pose.position.y": -0.251745 + y})
-    path = _write_bag(
-        tmp_path / "run.bag",
-        {
-            "/vicon/Block/Block": ("geometry_msgs/msg/TransformStamped", None, body),
-            "/netft_data": ("geometry_msgs/msg/WrenchStamped", None, force),
-            "/tip_pose": ("geometry_msgs/msg/PoseStamped", None, tip),
-        },
-    )
-    report = import_source("rosbag1", [path], tmp_path / "out")
-    recording = read_recording(report.written[0])
-    assert recording.rig is not None and recording.rig.shape == "steel_block" and recording.wrench is not None
-    gap = recording.slider.y[200] - np.interp(recording.slider.stamp[200], recording.pusher.stamp, recording.pusher.y)
-    assert gap == pytest.approx(0.0489 + 0.004745, abs=1e-5)
-    assert recording.wrench.fy[250] == pytest.approx(-2.0) and recording.wrench.fx[250] == pytest.approx(0.0)
-
-
-def test_mlab_bag_uses_bag_time_and_has_no_rig(tmp_path: Path) -> None:
-    mocap, force, robot = [], [], []
-    for k in range(240):
-        at, x = 1_435_287_970.0 + 0.01667 * k, 500.0 + max(0.0, 0.1 * (k - 80))
-        quaternion = (0.5, 0.5, 0.5, 0.5) if k != 7 else (0.0, 0.0, 0.0, 0.5)  # the body's y axis is up
-        mocap.append(_stamp(at) | {"body": (x + 50.0, 3.0, *quaternion)})
-        force.append(_stamp(at, 364.5) | {"wrench.force.x": -0.1 + 0.7 * (k > 80), "wrench.force.y": 0.02})
-        robot.append({"t": at, "x": x, "y": 3.0, "z": 15.0, "q0": 1.0})
-    path = _write_bag(
-        tmp_path / "robot.bag",
-        {
-            "/Mocap": ("Mocap/msg/mocap_frame", MOCAP, mocap),
-            "/netft_data": ("geometry_msgs/msg/WrenchStamped", None, force),
-            "/robot_CartesianLog": ("robot_comm/msg/robot_CartesianLog", ROBOT, robot),
-        },
-    )
-    report = import_source("rosbag1", [path], tmp_path / "out")
-    recording = read_recording(report.written[0])
-    assert recording.rig is None and recording.wrench is not None
-    assert len(recording.slider) == 239
-    np.testing.assert_allclose(recording.slider.heading, np.pi / 2, atol=1e-9)
-    assert recording.wrench.stamp[0] == recording.slider.stamp[0] == recording.pusher.stamp[0]
-    assert recording.wrench.fx[-1] == pytest.approx(-0.7) and recording.wrench.fy[-1] == pytest.approx(0.0)
-    text = "\n".join([*report.dropped, *report.repaired, *report.assumed])
-    for words in ("1 of 240 frames", "by 364.500 s", "without a push_rig record", "--rig"):
-        assert words in text, words
-
-
-def test_unknown_and_damaged_bags_are_rejected(tmp_path: Path) -> None:
-    force = ("geometry_msgs/msg/WrenchStamped", None, [_stamp(1.0 + 0.1 * k) for k in range(20)])
-    path = _write_bag(tmp_path / "other.bag", {"/netft_data": force})
-    with pytest.raises(ImportSourceError, match=r"topics found: /netft_data .*accepted: mcube .*mlab"):
-        import_source("rosbag1", [path], tmp_path / "out")
-    whole = path.read_bytes()
-    for data in (b"", whole[: len(whole) // 2], b"#ROSBAG V2.0\n" + whole[13:200], whole[::-1]):
-        path.write_bytes(data)
-        with pytest.raises(ImportSourceError, match=r"other\.bag"):
-            import_source("rosbag1", [path], tmp_path / "out")
 
 
 # --- all kinds ----------------------------------------------------------------------------------------------------

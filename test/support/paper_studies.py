@@ -1,4 +1,4 @@
-"""Made-up studies of the paper's claims: pushes whose truth is a formula, small enough to be learnt in a blink."""
+"""Made-up studies of the paper's claims: pushes whose truth is a formula, small enough to be learned at once."""
 
 from __future__ import annotations
 

@@ -30,17 +30,18 @@ from repository import REPOSITORY
 START_TIMEOUT = 60.0
 PATIENCE = 10.0  # s after which a call is repeated; ~/finish answers within 5 s
 _HELD: deque[tuple[int, IO[str]]] = deque()
+_RESERVED: set[int] = set()
 _NAMES = itertools.count()
 
 
 def free_domain() -> int:
     """A ROS domain (1..101) that no other test, worker or test run of this machine uses.
 
-    A lock file is held for each of the last 12 domains of this process. The environment variable
-    PUSH_PREDICTOR_TEST_DOMAINS, such as "41-45", narrows the range.
+    A lock file is held for each of the last 12 domains of this process. `reserved_domain` is for longer use.
+    The environment variable PUSH_PREDICTOR_TEST_DOMAINS, such as "41-45", narrows the range.
     """
     low, high = _domain_range()
-    if len(_HELD) >= min(12, high - low + 1):
+    if _HELD and len(_HELD) >= min(12, high - low + 1 - len(_RESERVED)):
         _HELD.popleft()[1].close()
     for offset in range(high - low + 1):
         domain = low + (os.getpid() * 7 + next(_NAMES) + offset) % (high - low + 1)
@@ -48,6 +49,19 @@ def free_domain() -> int:
             _HELD.append((domain, lock))
             return domain
     raise RuntimeError(f"every ROS domain from {low} to {high} is held by another test run")
+
+
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A free domain that is locked until the end of the block: for nodes that several tests share."""
+    free_domain()
+    domain, lock = _HELD.pop()
+    _RESERVED.add(domain)
+    try:
+        yield domain
+    finally:
+        _RESERVED.remove(domain)
+        lock.close()
 
 
 class NodeProcess(subprocess.Popen[bytes]):

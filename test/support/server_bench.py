@@ -96,10 +96,12 @@ class Server:
 
 @contextlib.contextmanager
 def server_of(models, **params):
-    domain = harness.free_domain()
     params = {"models": [str(path) for path in models], "diagnostics_period": 0.2, **params}
-    running = harness.node_process("predict_server", domain=domain, params=params)
-    with running as process, harness.ros_context(domain) as node:
+    with (
+        harness.reserved_domain() as domain,
+        harness.node_process("predict_server", domain=domain, params=params) as process,
+        harness.ros_context(domain) as node,
+    ):
         server = Server(process, node)
         server.state()  # the node answers
         yield server

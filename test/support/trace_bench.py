@@ -107,10 +107,12 @@ class Goal:
 
 @contextlib.contextmanager
 def server_of(model: Path, **params: Any) -> Iterator[Server]:
-    domain = harness.free_domain()
     params = {"models": [str(model)], **params}
-    running = harness.node_process("predict_server", domain=domain, params=params)
-    with running as process, harness.ros_context(domain) as node:
+    with (
+        harness.reserved_domain() as domain,
+        harness.node_process("predict_server", domain=domain, params=params) as process,
+        harness.ros_context(domain) as node,
+    ):
         server = Server(process, node, domain)
         assert server.push().success
         yield server

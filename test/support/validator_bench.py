@@ -5,21 +5,27 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from ros_harness import REPOSITORY, START_TIMEOUT, NodeProcess, call, node_process, wait_until
+from ros_harness import REPOSITORY, START_TIMEOUT, NodeProcess, acquaint, call, node_process, wait_until
 from std_srvs.srv import Trigger
+from synthetic import rows, wrench_rows
 
 from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.store.model_file import load_model
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.write import write_recording
+from push_predictor_interfaces.srv import Burst
 
 HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"  # 10 pushes, 21 s
 CIRCLE = REPOSITORY / "bags" / "circle_pu"
+PLAYING_ALONE = ("-r", "replay_status:=nowhere")  # of a replay or validator: as if another program played
 WRITTEN = "Validation written"
 NO_SERVER = "No node offers predict_push"
 
@@ -32,6 +38,26 @@ def replaying(
     params = {"recording": recording, "play.rate": rate, "wait_for_subscribers": 60.0, **more}
     with node_process("push_replay", *ros_args, domain=domain, params=params) as process:
         yield process
+
+
+def beginning(source: Path, seconds: float, path: Path) -> Path:
+    """Write the first seconds of a recording to a folder `path`; returns it."""
+    recording = read_recording(source)
+    assert recording.wrench is not None
+    slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
+    end = slider.stamp[0] + round(seconds * 1e9)
+    streams = {"slider": rows(slider, slider.stamp < end), "pusher": rows(pusher, pusher.stamp < end)}
+    write_recording(path, replace(recording, **streams, wrench=wrench_rows(wrench, wrench.stamp < end)))
+    return path
+
+
+def play_some(node: Node, messages: int) -> None:
+    """Let a paused replay publish its first messages, once its subscribers are there."""
+    client = node.create_client(Burst, "push_replay/burst")
+    acquaint(node, "push_replay")  # a repeated call would publish twice as many
+    request = Burst.Request(num_messages=messages)
+    assert wait_until(lambda: call(client, request).actually_burst == messages), "0 until it has subscribers"
+    node.destroy_client(client)
 
 
 class Status:

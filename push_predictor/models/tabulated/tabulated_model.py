@@ -85,11 +85,8 @@ class TabulatedModel:
         return Prediction(*moments, prediction.in_domain & self.model.covariates_seen(push))
 
     def predict_one(self, push: PushRequest) -> Prediction:
-        """The same for one push (n = 1); the table is read in plain numbers."""
-        learnt = None
-        if self.domain is not None and self.model.base is self.model:
-            learnt = self.domain.predict_one((push.velocity, push.contact, push.angle))
-        return self.predict_rows(*push.arrays) if learnt is None else self._of_base(learnt, push)
+        """The same for one push (n = 1)."""
+        return self.predict_rows(*push.arrays)
 
     def exact_count(self, inputs: Array) -> int:
         """Number of the pushes (n, 3) that are predicted by the model itself, not from a table."""
@@ -105,17 +102,16 @@ class TabulatedModel:
         """The model of what is tabulated: the base, without the mechanics about which it has learnt residuals."""
         return _without_mean(self.model.base)
 
-    def _of_base(self, learnt: Prediction, push: Push | PushRequest) -> Prediction:
+    def _of_base(self, learnt: Prediction, push: Push) -> Prediction:
         """Predictions of the base from those of what it has learnt."""
         predictor = self._exact.predictor.base
         if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
             return learnt
-        pushes = Push(*push.arrays) if isinstance(push, PushRequest) else push
-        return Prediction(*predictor.about_mean(_moments(learnt), pushes), learnt.in_domain)
+        return Prediction(*predictor.about_mean(_moments(learnt), push), learnt.in_domain)
 
     def _learnt(self, domain: TabulatedDomain, inputs: Array, duration: Array) -> Prediction:
         """Predictions of what the base has learnt, from the table where it can."""
-        if len(inputs) == 1:
+        if len(inputs) == 1:  # in plain numbers, five times as fast
             return domain.predict_one(inputs[0].tolist()) or self._residual.predict_rows(inputs, duration)
         inside, prediction = domain.predict(inputs)
         if prediction is not None:

@@ -11,6 +11,7 @@ from bisect import bisect_left
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -98,9 +99,12 @@ class StampOrder:
         return 0 < stamp - self._last <= ISOLATION and not self._jumps_to(values, stamp)
 
     def _jumps_to(self, values: Array, stamp: int) -> bool:
-        if self.is_jump is None or self._last_values is None:
+        return self._last_values is not None and self._jumps(self._last_values, values, stamp - self._last)
+
+    def _jumps(self, before: Array, after: Array, elapsed: int) -> bool:
+        if self.is_jump is None:
             return False
-        return bool(self.is_jump(self._last_values[None], values[None], np.array([(stamp - self._last) * 1e-9]))[0])
+        return bool(self.is_jump(before[None], after[None], np.array([elapsed * 1e-9]))[0])
 
     def _decide(self, block: list[int], values: Array) -> tuple[bool, int, bool]:
         """Decide on the first of some samples.
@@ -119,17 +123,29 @@ class StampOrder:
         if self._is_isolated(stamp, after):
             self._discard("late" if self._last == NO_STAMP and after is not None else "ahead")
             return False, sequence[0] + 1, False
-        if back := self._return_from_jump(values, sequence, stamp):
+        if back := self._return_from_jump(block, values, sequence):
             for _ in range(back - sequence[0]):
                 self._discard("jumps")
             return False, back, False
         return True, sequence[0], False
 
-    def _return_from_jump(self, values: Array, sequence: list[int], stamp: int) -> int:
-        """Index at which samples that begin with a jump are back where they were; 0 if they never are."""
-        if not self._jumps_to(values[sequence[0]], stamp):
+    def _return_from_jump(self, block: list[int], values: Array, sequence: list[int]) -> int:
+        """Index of the first sample that jumps back to where the stream was, if the first of `sequence` jumps; else 0.
+
+        Back is close to the last sample before, or away from there only by motion in the meantime: then the two jumps
+        are opposite.
+        """
+        first = sequence[0]
+        if self._last_values is None or not self._jumps_to(values[first], block[first]):
             return 0
-        return next((k for k in sequence[1:] if not self._jumps_to(values[k], stamp)), 0)
+        jump, elapsed = values[first] - self._last_values, block[first] - self._last
+        for before, k in pairwise(sequence):
+            step = block[k] - block[before]
+            if self._jumps(values[before], values[k], step):
+                opposite = not self._jumps(jump, values[before] - values[k], elapsed + step)
+                if opposite or not self._jumps_to(values[k], block[first]):
+                    return k
+        return 0
 
     def _decide_late(self, block: list[int]) -> tuple[bool, int, bool]:
         sequence = _longest_increasing(block, NO_STAMP)

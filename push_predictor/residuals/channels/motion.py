@@ -34,9 +34,9 @@ Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: strongest first. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism. deviation
-    (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance: effects
-    on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
+    terms: in the order of selection. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism.
+    deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
+    effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
     confounded: covariates that were not tried, because the inputs explain them. remaining: the strongest significant
     candidate after all terms.
     """

@@ -24,13 +24,13 @@ ANGLES = ("angle", "slider_heading", "push_heading")
 
 
 def effects_table(trace: Trace) -> str:
-    """The effects found, strongest first."""
+    """The effects found, in the order of selection."""
     rows = [_effect_row(effect, trace.verdict == "variance") for effect in trace.effects]
     head = ("mechanism", "depends on", "parameter", "value", "outputs", "share", "p")
     caption = (
-        "Effects found, strongest first. In brackets: 95 % intervals. Share: of the squared standardised residual of "
-        "the analysis pushes. p: family-wise, over all candidates. Along a covariate, the value is the change over its "
-        "range."
+        "Effects found, in the order of selection. In brackets: 95 % intervals. Share: of the squared standardised "
+        "residual of the analysis pushes. p: family-wise, over all candidates. Along a covariate, the value is the "
+        "change over its range."
     )
     used = [k for k in range(len(head)) if any(row[k] != html.NOTHING for row in rows)]
     return html.table(caption, [head[k] for k in used], [[row[k] for k in used] for row in rows])

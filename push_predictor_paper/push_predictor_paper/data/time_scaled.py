@@ -1,7 +1,7 @@
 """The quasi-static claim: pushes of equal travel at growing speed, and models without the speed as an input.
 
 The paper, "Dependence with velocity": under the quasi-static assumption a push made twice as fast has the same outcome
-in half the time, so pushes of all speeds, scaled in time to 10 mm/s, may be learnt together.
+in half the time, so pushes of all speeds, scaled in time to 10 mm/s, may be learned together.
 Windows here are the simulator's true motion, at every speed alike: 5 mm are 10 ms at 500 mm/s, one sample of its
 100 Hz tracker, so recordings cannot carry them.
 """
@@ -40,12 +40,12 @@ MARGIN = 0.0005  # m
 
 @dataclass(frozen=True)
 class Bracket:
-    """A model of pushes at the slowest `speeds` speeds, `rows` windows of each; told: with the speed as an input."""
+    """A model of pushes at the slowest `speeds` speeds, `rows` windows of each; with_speed: the speed is an input."""
 
     kind: str
     speeds: int
     rows: int
-    told: bool
+    with_speed: bool
     fold: int
 
 
@@ -88,10 +88,14 @@ def score_bracket(windows: Sequence[PushTable], rig: Rig, bracket: Bracket) -> P
     """
     table = concatenate([table.take(training_rows(table, bracket)) for table in windows[: bracket.speeds]])
     model = train_model(
-        _scaled(table, bracket.told), rig, bracket.kind, name=bracket.kind, options=TrainingOptions(n_train=len(table))
+        _scaled(table, bracket.with_speed),
+        rig,
+        bracket.kind,
+        name=bracket.kind,
+        options=TrainingOptions(n_train=len(table)),
     )
     held = concatenate([table.take(np.flatnonzero(fold_of(table) == bracket.fold)) for table in windows])
-    return push_scores(compare(model, _scaled(held, bracket.told)))
+    return push_scores(compare(model, _scaled(held, bracket.with_speed)))
 
 
 def training_rows(table: PushTable, bracket: Bracket) -> IntArray:
@@ -111,10 +115,10 @@ def number_of(push_id: str) -> tuple[int, int]:
     return int(speed), int(push)
 
 
-def _scaled(table: PushTable, told: bool) -> PushTable:
-    """Windows scaled in time to SCALED_SPEED; told: the speed remains an input."""
+def _scaled(table: PushTable, with_speed: bool) -> PushTable:
+    """Windows scaled in time to SCALED_SPEED; with_speed: the speed remains an input."""
     inputs = table.inputs.copy()
-    if not told:
+    if not with_speed:
         inputs[:, 0] = SCALED_SPEED
     return replace(table, inputs=inputs, duration=np.full(len(table), TRAVEL / SCALED_SPEED))
 

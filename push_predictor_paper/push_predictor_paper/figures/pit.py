@@ -27,7 +27,7 @@ def paint_pits(figure: Figure, rows: Mapping[str, tuple[Histogram, Histogram]]) 
         top = min(TALLEST, 1.08 * BARS * float(np.nanmax([by_push.shares, by_push.high, random.shares])))
         for k, ax in enumerate(row):
             _paint_bars(ax, by_push, random, k)
-            _tell_where_cut(ax, by_push.shares[:, k] * BARS, top)
+            _mark_cut_bars(ax, by_push.shares[:, k] * BARS, top)
             ax.set(xlim=(0.0, 1.0), ylim=(0.0, top), xticks=(0.0, 0.5, 1.0))
         row[0].set_ylabel(f"{model}\nwindows, flat = 1")
     for k, ax in enumerate(axes[0]):
@@ -67,7 +67,7 @@ def _paint_bars(ax: Axes, by_push: Histogram, random: Histogram, k: int) -> None
     ax.axhline(1.0, color="black", linewidth=0.9, linestyle="--", label="flat")
 
 
-def _tell_where_cut(ax: Axes, heights: Array, top: float) -> None:
+def _mark_cut_bars(ax: Axes, heights: Array, top: float) -> None:
     """Write the height on every bar that leaves the picture."""
     for b in np.flatnonzero(heights > top):
         side = {"ha": "left", "x": EDGES[b] + 0.11} if b < BARS / 2 else {"ha": "right", "x": EDGES[b] - 0.01}

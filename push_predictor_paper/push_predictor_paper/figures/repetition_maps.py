@@ -14,7 +14,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.reporting.canvas import EMPTY, OBSERVED, SYMBOLS, UNIT_NAMES, UNITS
 from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.statistics.grid_maps import told
+from push_predictor_paper.statistics.grid_maps import place_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,7 +113,7 @@ def _paint_repetitions(ax: Axes, rig: Rig, push: Repetitions, predicted: Array) 
         moved = to_world(outline, pose + enlarged * outcome).T * 1e3
         ax.plot(*moved, color=OBSERVED, linewidth=0.5, alpha=0.3)
     paint_slider(ax, rig, inputs, predicted, mean, enlarged)
-    caption = f"{told((push.fraction, push.angle))}, motion {enlarged:g}×"
+    caption = f"{place_text((push.fraction, push.angle))}, motion {enlarged:g}×"
     ax.set_title(caption, fontsize=8.0)
 
 

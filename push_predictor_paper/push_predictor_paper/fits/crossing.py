@@ -33,8 +33,8 @@ class Crossing:
     def json(self) -> dict[str, float | None]:
         """null: not up to the last size tried."""
         ends = {"value": self.value, "low": self.low, "high": self.high}
-        told: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
-        return {**told, "first_tried": self.first, "last_tried": self.last}
+        reached: dict[str, float | None] = {name: (v if np.isfinite(v) else None) for name, v in ends.items()}
+        return {**reached, "first_tried": self.first, "last_tried": self.last}
 
     def _size_text(self, size: float) -> str:
         if not np.isfinite(size):
@@ -43,14 +43,14 @@ class Crossing:
 
 
 def crossing(
-    sizes: Sequence[int], learnt: Sequence[Sequence[PushScores]], baseline: Sequence[Sequence[PushScores]]
+    sizes: Sequence[int], learned: Sequence[Sequence[PushScores]], baseline: Sequence[Sequence[PushScores]]
 ) -> Crossing:
     """Training size from which the learned model's total NMSE stays below the baseline's.
 
-    By size, by seed (fold) the scores of both on the same windows. The interval draws pushes anew, the same for both
+    By size, by seed (fold) the scores of both on the same windows. The interval resamples pushes, the same for both
     and for all sizes and seeds, and the seeds as well.
     """
-    gaps = [_gap(first, second) for first, second in zip(learnt, baseline, strict=True)]
+    gaps = [_gap(first, second) for first, second in zip(learned, baseline, strict=True)]
     value = below_zero_from(sizes, np.array([[gap[0] for gap in gaps]]))[0]
     draws = below_zero_from(sizes, np.column_stack([gap[1:] for gap in gaps]))
     low, high = np.quantile(draws, [0.025, 0.975], method="inverted_cdf")  # never the mean of a size and infinity
@@ -74,10 +74,10 @@ def below_zero_from(sizes: Sequence[int], gaps: Array) -> Array:
     return np.where(after > 0, np.where(k == 0, float(sizes[0]), size), np.inf)
 
 
-def _gap(learnt: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
+def _gap(learned: Sequence[PushScores], baseline: Sequence[PushScores]) -> Array:
     """Total NMSE of the first minus that of the second, (1 + draws,): the value, then each draw."""
-    weights = _weights(learnt)
-    return _total(learnt, weights) - _total(baseline, weights)
+    weights = _weights(learned)
+    return _total(learned, weights) - _total(baseline, weights)
 
 
 def _weights(scores: Sequence[PushScores]) -> list[Array]:

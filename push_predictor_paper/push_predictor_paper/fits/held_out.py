@@ -160,7 +160,7 @@ def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
 def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
     """Mean of observed minus predicted as a share of the pusher's travel; interval by push.
 
-    Across (output 1) it counts towards the side to which the analytical model says the slider goes, lest left and
+    Across (output 1) it counts towards the side to which the slider goes by the analytical model, lest left and
     right cancel.
     """
     side = np.sign(windows.predicted["analytical"][:, 1]) if output == 1 else 1.0

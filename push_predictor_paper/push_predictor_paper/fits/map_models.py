@@ -23,8 +23,8 @@ Question = tuple[Corpus, Pair, Fit, RepeatedGrid | None]
 
 @dataclass(frozen=True, eq=False)
 class ModelMap:
-    """What a model says. mean, sd, process_sd: maps (61, 41, 3) over ANGLES and FRACTIONS, NaN outside the domain of
-    its training; at_pushes: of the pushes of a grid, at the inputs as measured, None where no grid was asked for."""
+    """What a model predicts. mean, sd, process_sd: maps (61, 41, 3) over ANGLES and FRACTIONS, NaN outside the domain
+    of its training; at_pushes: of the pushes of a grid, at the inputs as measured, None where no grid was asked for."""
 
     mean: Array
     sd: Array

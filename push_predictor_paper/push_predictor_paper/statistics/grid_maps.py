@@ -19,7 +19,7 @@ Place = tuple[float, float]  # contact as a fraction of the side, angle in rad
 Statistic = Callable[[Array, Array], Array]  # of values (m,) and weights (d, m): (d,)
 
 
-def told(place: Place) -> str:
+def place_text(place: Place) -> str:
     """A push in words: contact as a fraction of the side, angle in degrees."""
     return f"c = {place[0]:.2f}, {in_degrees(place[1])}"
 

@@ -49,7 +49,7 @@ def ceiling(grid: RepeatedGrid, widest: float = np.inf) -> Shape | None:
     return _shape((f"{grid.surface}, odd", "even repetitions"), cells, halves[0], halves[1])
 
 
-def learnt_shapes(grids: Mapping[str, RepeatedGrid], models: Mapping[str, ModelMap]) -> list[Shape]:
+def learned_shapes(grids: Mapping[str, RepeatedGrid], models: Mapping[str, ModelMap]) -> list[Shape]:
     """Correlations of the process noise of the surfaces' models, at pushes known on both."""
     sds: dict[str, dict[tuple[float, float], Array]] = {}
     for surface, model in models.items():

@@ -31,11 +31,11 @@ def coverage_finding(found: Calibrated, model: str) -> Finding:
     """Do a model's intervals cover as often as they should, output by output?"""
     coverages = found.coverages[model, "push"]
     states = [promise([level[k] for level in coverages]) for k in range(len(OUTPUTS))]
-    told = "; ".join(f"{name} {coverages[-1][k].text('.3f')}, {states[k]}" for k, name in enumerate(OUTPUTS))
+    listed = "; ".join(f"{name} {coverages[-1][k].text('.3f')}, {states[k]}" for k, name in enumerate(OUTPUTS))
     return Finding(
         f"The intervals of the {NAMES[model]} cover as often as they should ({found.name})",
         _all_of([s == "kept" for s in states], "open" in states and "broken" not in states),
-        f"Coverage of the 95 % intervals: {told}. Furthest from its level: {_furthest(coverages)}. "
+        f"Coverage of the 95 % intervals: {listed}. Furthest from its level: {_furthest(coverages)}. "
         f"{found.windows('push')}, {SPLIT_WORDS['push']}. Rule: an output is `kept` if its coverages at 50, 90 and "
         f"95 % all have intervals that contain the level. Each interval is widened for {TESTS} tests (Bonferroni). "
         f"An output is `open` if so, but a 95 % interval is wider than {TOO_WIDE}; else `broken`. The claim holds if "
@@ -48,13 +48,13 @@ def shape_finding(found: Calibrated) -> Finding:
     """Does the exact predictive distribution have the right shape?"""
     shape = found.shapes[EXACT, "push"]
     flat = [not p <= UNEVEN for p in shape.p.tolist()]
-    told = "; ".join(f"{n} {m:.1%}, p = {p:.3f}" for n, m, p in zip(OUTPUTS, shape.misplaced, shape.p, strict=True))
+    listed = "; ".join(f"{n} {m:.1%}, p = {p:.3f}" for n, m, p in zip(OUTPUTS, shape.misplaced, shape.p, strict=True))
     few = len(found.judged["vhgp", "push"].push_scores.push_id) < FEWEST_PUSHES
     return Finding(
         f"The VHGP's exact predictive distribution has the right shape ({found.name})",
         _all_of(flat, all(flat) and few),
         f"Share of windows in the wrong one of {BARS} bars of the PIT histogram, and p if the true one is flat: "
-        f"{told}. {found.windows('push')}, {SPLIT_WORDS['push']}. Rule: an output agrees if p > {UNEVEN:.3f} (0.05 "
+        f"{listed}. {found.windows('push')}, {SPLIT_WORDS['push']}. Rule: an output agrees if p > {UNEVEN:.3f} (0.05 "
         f"over {len(OUTPUTS)} outputs). The claim holds if all agree, in part if some do. Agreement of fewer than "
         f"{FEWEST_PUSHES} pushes decides nothing.",
         OURS,

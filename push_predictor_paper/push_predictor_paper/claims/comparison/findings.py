@@ -46,9 +46,9 @@ def crossings_of(
 
 def early(corpus: Corpus, where: Crossings) -> Finding:
     """Do both learned models beat the analytical one from about 100 windows?"""
-    told = "; ".join(f"{LEARNED[kind]} {at.text()}" for kind, at in where.items())
+    listed = "; ".join(f"{LEARNED[kind]} {at.text()}" for kind, at in where.items())
     sentence = (
-        f"The NMSE stays below the analytical model's from this number of training windows on: {told}. "
+        f"The NMSE stays below the analytical model's from this number of training windows on: {listed}. "
         f"{SPLIT_WORDS['push'].capitalize()}, {_set(corpus)}, interval by resampling pushes and folds. Rule: about "
         f"{PAPER_SIZE} means up to {ABOUT}. Holds if both intervals end by then, in part if one does, does not hold if "
         "both begin later."
@@ -61,9 +61,9 @@ def early(corpus: Corpus, where: Crossings) -> Finding:
 def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
     """Do both learned models have the smaller NMSE at the plan's size?"""
     gaps = {kind: _gap(corpus, found, "analytical", kind, n) for kind in LEARNED}
-    told = "; ".join(f"{LEARNED[kind]} {gap.text('.3f')}" for kind, gap in gaps.items())
+    listed = "; ".join(f"{LEARNED[kind]} {gap.text('.3f')}" for kind, gap in gaps.items())
     sentence = (
-        f"NMSE minus that of the analytical model at n = {n}: {told} (paper: −0.34; −0.35). "
+        f"NMSE minus that of the analytical model at n = {n}: {listed} (paper: −0.34; −0.35). "
         f"{_how(corpus, found, n)}. Rule: holds if both intervals lie below 0, in part if one does, does not hold if "
         "both lie above."
     )

@@ -244,10 +244,10 @@ def _data(corpus: Corpus, found: Curves, sizes: Mapping[SplitName, tuple[int, ..
         for n in sizes[split]:
             for kind in KINDS:
                 push_scores = found.push_scores(corpus.reference, kind, split, n)
-                told = {m: by_push(push_scores, output_figure(m, None)).json() for _, m, _ in MEASURES}
+                measures = {m: by_push(push_scores, output_figure(m, None)).json() for _, m, _ in MEASURES}
                 seeds = {
                     m: over_seeds([f(s) for s in found.cells[corpus.reference, kind, split, n]]).json()
                     for m, f in (("nmse_by_seed", nmse_of), ("nlpd_by_seed", nlpd_of))
                 }
-                rows.append({"split": split, "n": n, "kind": kind, **told, **seeds})
+                rows.append({"split": split, "n": n, "kind": kind, **measures, **seeds})
     return rows

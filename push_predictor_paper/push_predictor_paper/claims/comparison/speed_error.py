@@ -72,9 +72,9 @@ def captured(corpus: Corpus, windows: HeldOut, groups: list[int]) -> Finding:
     if not fast:
         return Finding(claim, "not decided", f"{corpus.name}: no pushes of {_speed(FAST)} or faster.")
     gaps = {k: within_nmse(windows.at(k), ("analytical", "vhgp")) for k in fast}
-    told = "; ".join(f"{_speed(windows.speeds[k])} {gap.text()}" for k, gap in gaps.items())
+    listed = "; ".join(f"{_speed(windows.speeds[k])} {gap.text()}" for k, gap in gaps.items())
     sentence = (
-        f"NMSE of the VHGP minus that of the analytical model within each speed: {told}. n = {windows.size}, "
+        f"NMSE of the VHGP minus that of the analytical model within each speed: {listed}. n = {windows.size}, "
         f"{SPLIT_WORDS['push']}, {_set(corpus)}, interval by push. Rule: holds if the interval lies below 0 at all of "
         "these speeds, in part if at some, does not hold if it lies above 0 at some and below at none."
     )

@@ -45,15 +45,15 @@ def circle(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
     sizes = found.sizes(pairs, KIND, "push")
     if not sizes or not others or CIRCLE not in {shape for shape, _ in pairs}:
         return Finding(claim, "not decided", f"{corpus.name}: no circle and other shape with a common training size.")
-    told, wins, losses = [], 0, 0
+    listed, wins, losses = [], 0, 0
     for shape in others:
         for name, measure, form in MEASURES:
             gap = _harder(found, pairs, shape, sizes[-1], measure)
             wins, losses = wins + (gap.low > 0.0), losses + (gap.high < 0.0)
-            told.append(f"{word(shape)} {name} {gap.text(form)}")
+            listed.append(f"{word(shape)} {name} {gap.text(form)}")
     verdict = _counted(wins, losses, 2 * len(others))
     sentence = (
-        f"Score of the other shape minus that of the circle at n = {sizes[-1]}: {'; '.join(told)}. Mean over folds, "
+        f"Score of the other shape minus that of the circle at n = {sizes[-1]}: {'; '.join(listed)}. Mean over folds, "
         f"{SPLIT_WORDS['push']}, {judged(found, pairs, sizes[-1])} pushes; interval over surfaces, each one difference "
         "(Student; one surface gives none). Rule: holds if all of these lie above 0, in part if half of them do, does "
         "not hold if some lie below and fewer above. The intervals are not corrected for their number."

@@ -37,7 +37,7 @@ AXIS_NAMES = {"NMSE": "NMSE, sum of 3", "NLPD": "NLPD, sum of 3 (SI)"}
 SIMULATOR = (
     "The simulated surfaces differ in the level of their friction, in its variation over the table, and in the fit of "
     "slider and table (push_predictor/simulation/surface.py). A slow push does not depend on the level; the variation "
-    "is representative, not measured. How much the surface matters here is an assumption and says nothing about real "
+    "is representative, not measured. How much the surface matters here is an assumption and shows nothing about real "
     "materials. As on the rig, the contact point of a circle is redundant up to uneven pressure."
 )
 

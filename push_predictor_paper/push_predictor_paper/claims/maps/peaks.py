@@ -14,7 +14,15 @@ from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.estimate import Estimate, of_draws, over_seeds
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap
 from push_predictor_paper.section import Finding, Table, Verdict
-from push_predictor_paper.statistics.grid_maps import Place, at_places, in_degrees, on_grid, redrawn, told, unbiased
+from push_predictor_paper.statistics.grid_maps import (
+    Place,
+    at_places,
+    in_degrees,
+    on_grid,
+    place_text,
+    redrawn,
+    unbiased,
+)
 from push_predictor_paper.statistics.peaks import Peak, peak
 
 TURNED = float(np.radians(30.0))
@@ -26,7 +34,7 @@ NAMED: dict[str, tuple[Place, ...]] = {
 }
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 STEP: Place = (0.1, 0.1)  # of the side, rad: the paper's grid
-ENOUGH = (np.inf, 0.9, np.inf)  # of the largest; for dy the paper says only that the slider moves far
+ENOUGH = (np.inf, 0.9, np.inf)  # of the largest; for dy the paper states only that the slider moves far
 NEARLY = (0.9, 0.75, 0.9)  # of the largest: holds in part
 PART = ".1%"
 FEW = 2  # places that are listed one by one
@@ -49,7 +57,7 @@ class Peaks:
     """
 
     repeated: tuple[Peak, ...]
-    learnt: tuple[Peak, ...]
+    learned: tuple[Peak, ...]
     handedness: tuple[Estimate, Estimate]
 
 
@@ -94,16 +102,16 @@ def peak_table(peaks: Peaks, caption: str) -> Table:
     head = ("", "largest", "where", "where, in 95 % of the draws", "the paper's push (our signs)", "it reaches")
     rows = []
     for k, name in enumerate(NAMES):
-        for source, found in (("repetitions", peaks.repeated[k]), ("VHGP", peaks.learnt[k])):
+        for source, found in (("repetitions", peaks.repeated[k]), ("VHGP", peaks.learned[k])):
             rows.append((f"|{name}| ({UNITS[k]}), {source}", *peak_cells(found, k)))
     return Table(caption, head, tuple(rows))
 
 
 def peak_cells(found: Peak, k: int) -> tuple[str, ...]:
     """The cells of a row: output k."""
-    paper = " or ".join(told(place) for place in NAMED[OUTPUTS[k]])
+    paper = " or ".join(place_text(place) for place in NAMED[OUTPUTS[k]])
     value = scaled(found.value, SCALES[k]).cell()
-    return value, told(found.place), region(found.places), paper, found.reach.cell(PART)
+    return value, place_text(found.place), region(found.places), paper, found.reach.cell(PART)
 
 
 def peak_json(found: Peak) -> dict[str, Any]:
@@ -120,7 +128,7 @@ def peak_json(found: Peak) -> dict[str, Any]:
 def region(places: Sequence[Place]) -> str:
     """A few places one by one; of more, their range, mirrored onto one half of the side."""
     if len(places) <= FEW:
-        return " or ".join(map(told, places))
+        return " or ".join(map(place_text, places))
     contacts, angles = np.array([place if place[0] >= 0.5 else (1.0 - place[0], -place[1]) for place in places]).T
     contact = _span([f"{c:.2f}" for c in (contacts.min(), contacts.max())])
     angle = _span([in_degrees(a) for a in (angles.min(), angles.max())])
@@ -144,14 +152,14 @@ def agreed(one: Verdict, other: Verdict) -> Verdict:
 
 
 def _finding(peaks: Peaks, k: int, pushes: int) -> Finding:
-    named, repeated, learnt = NAMED[OUTPUTS[k]], peaks.repeated[k], peaks.learnt[k]
-    verdict = agreed(_verdict(repeated, k), _verdict(learnt, k))
+    named, repeated, learned = NAMED[OUTPUTS[k]], peaks.repeated[k], peaks.learned[k]
+    verdict = agreed(_verdict(repeated, k), _verdict(learned, k))
     sentence = (
         f"Largest |{NAMES[k]}| of {pushes} repeated pushes: {scaled(repeated.value, SCALES[k]).text()} {UNITS[k]} at "
-        f"{told(repeated.place)}; in 95 % of the draws at {region(repeated.places)}. VHGP: at {told(learnt.place)}; "
-        f"over draws of training windows at {region(learnt.places)}. The paper's push "
-        f"({' or '.join(map(told, named))} in our signs) reaches {repeated.reach.text(PART)} of the largest by "
-        f"repetitions, {learnt.reach.text(PART)} by the VHGP. {_rule(k)}"
+        f"{place_text(repeated.place)}; in 95 % of the draws at {region(repeated.places)}. VHGP: at "
+        f"{place_text(learned.place)}; over draws of training windows at {region(learned.places)}. The paper's push "
+        f"({' or '.join(map(place_text, named))} in our signs) reaches {repeated.reach.text(PART)} of the largest by "
+        f"repetitions, {learned.reach.text(PART)} by the VHGP. {_rule(k)}"
     )
     return Finding(CLAIMS[k], verdict, sentence)
 
@@ -184,13 +192,13 @@ def _handedness(fractions: Array, angles: Array, turned: Array) -> Array:
 
 def _handedness_finding(peaks: Peaks) -> Finding:
     verdicts = [_sign(estimate) for estimate in peaks.handedness]
-    repeated, learnt = (estimate.text() for estimate in peaks.handedness)
+    repeated, learned = (estimate.text() for estimate in peaks.handedness)
     return Finding(
         "Between middle and corner, a push that leads away from the middle turns the slider more (the paper's "
         "handedness)",
         agreed(verdicts[0], verdicts[1]),
         f"|rotation| at c = 0.75, −30° minus that at +30° (our signs; mean with c = 0.25 mirrored): {repeated} deg "
-        f"by repetitions, {learnt} deg by the VHGP over draws of training windows. Rule: holds if both intervals lie "
+        f"by repetitions, {learned} deg by the VHGP over draws of training windows. Rule: holds if both intervals lie "
         "above zero, in part if one does, does not hold if both lie below. Geometry suggests it: the force has a "
         "longer lever about the centre.",
     )

@@ -83,7 +83,7 @@ def section(study: Study) -> Section:
 def _json(peaks: Peaks, alike: Likenesses) -> dict[str, Any]:
     return {
         "repetitions": {name: peak_json(peaks.repeated[k]) for k, name in enumerate(OUTPUTS)},
-        "vhgp": {name: peak_json(peaks.learnt[k]) for k, name in enumerate(OUTPUTS)},
+        "vhgp": {name: peak_json(peaks.learned[k]) for k, name in enumerate(OUTPUTS)},
         "handedness_deg": [estimate.json() for estimate in peaks.handedness],
         "agreement": agreement_json(alike),
     }

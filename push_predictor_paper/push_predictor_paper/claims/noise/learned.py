@@ -20,7 +20,7 @@ HEAD = ("output", "RMS ratio", "median of sd over |mean|", "within 10 to 40 %", 
 NAMES = ("dx", "dy", "rotation")
 
 
-def learnt_parts(study: Study) -> tuple[list[Table], list[str], dict[str, Any]]:
+def learned_parts(study: Study) -> tuple[list[Table], list[str], dict[str, Any]]:
     """A table for each corpus with a square pushed at about 20 mm/s, a note for any other, and the numbers."""
     tables, notes, data = [], [], {}
     for corpus in study.corpora:
@@ -28,7 +28,7 @@ def learnt_parts(study: Study) -> tuple[list[Table], list[str], dict[str, Any]]:
         if not models:
             notes.append(f"{corpus.title}: no windows of a square at about 20 mm/s, so its noise cannot be learned.")
             continue
-        figures = [learnt_figures(models, k) for k in range(len(OUTPUTS))]
+        figures = [learned_figures(models, k) for k in range(len(OUTPUTS))]
         rows = [
             (name, *(e.cell(f) for e, f in zip(row, FORMS, strict=True)))
             for name, row in zip(NAMES, figures, strict=True)
@@ -45,7 +45,7 @@ FORMS = (".0%", ".0%", ".0%", ".1f")
 KEYS = ("rms_ratio", "median_ratio", "within_10_to_40", "p95_over_p5")
 
 
-def learnt_figures(models: Sequence[ModelMap], k: int) -> tuple[Estimate, ...]:
+def learned_figures(models: Sequence[ModelMap], k: int) -> tuple[Estimate, ...]:
     """RMS ratio, median ratio, share within 10 to 40 % and range of output k, over the models."""
     known = [np.isfinite(model.mean[..., k]) for model in models]
     parts = [(m.mean[at][:, k], m.process_sd[at][:, k]) for m, at in zip(models, known, strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from push_predictor.reporting.canvas import SYMBOLS, Picture, draw
-from push_predictor_paper.claims.noise.learned import learnt_parts
+from push_predictor_paper.claims.noise.learned import learned_parts
 from push_predictor_paper.claims.noise.shape import shape_finding, shape_json, shape_tables
 from push_predictor_paper.claims.noise.size import (
     NAMES,
@@ -22,7 +22,7 @@ from push_predictor_paper.fits.map_models import surface_maps
 from push_predictor_paper.section import Finding, Section
 from push_predictor_paper.statistics.grid_maps import in_degrees
 from push_predictor_paper.statistics.noise_figures import Ratios, noise_ratios, radius_of_gyration, spans
-from push_predictor_paper.statistics.noise_shapes import FEWEST_PUSHES, ceiling, learnt_shapes, shapes
+from push_predictor_paper.statistics.noise_shapes import FEWEST_PUSHES, ceiling, learned_shapes, shapes
 from push_predictor_paper.study import Study
 
 TITLE = "Size, range and shape of the noise"
@@ -42,20 +42,20 @@ def section(study: Study) -> Section:
     reach = {"all": spans(grid.seen), "near": spans(near)}
     counts = {"all": len(grid.seen), "near": len(near)}
     found, found_near, most = shapes(study.grids), shapes(study.grids, WIDE), ceiling(grid)
-    learnt = learnt_shapes(study.grids, surface_maps(study, "vhgp"))
-    tables, notes, data = learnt_parts(study)
+    learned = learned_shapes(study.grids, surface_maps(study, "vhgp"))
+    tables, notes, data = learned_parts(study)
     return Section(
         key="noise",
         title=TITLE,
         findings=(
             size_finding(ratios["all"], grid),
             span_finding(reach, counts),
-            shape_finding(found, found_near, most, learnt),
+            shape_finding(found, found_near, most, learned),
         ),
         tables=(
             size_table(ratios, counts, grid, arm),
             span_table(reach, counts, grid),
-            *shape_tables(study, found, found_near, most, learnt),
+            *shape_tables(study, found, found_near, most, learned),
             *tables,
         ),
         pictures=(_ratio_picture(study, ratios["all"]), *_map_pictures(study)),
@@ -63,7 +63,7 @@ def section(study: Study) -> Section:
         data={
             "ratio": {which: ratio_json(parts) for which, parts in ratios.items()},
             "span": {which: span_json(parts) for which, parts in reach.items()},
-            "shape": shape_json(found, most, learnt),
+            "shape": shape_json(found, most, learned),
             "learnt": data,
         },
     )

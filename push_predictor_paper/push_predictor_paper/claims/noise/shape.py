@@ -20,19 +20,19 @@ CLAIM = "The shape of the noise is the same on different surfaces"
 
 
 def shape_finding(
-    found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
+    found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learned: Sequence[Shape]
 ) -> Finding:
     """Is the shape the same for all pairs of surfaces? near: only pushes at moderate angles."""
     if not found or most is None:
         return Finding(CLAIM, "not decided", "Fewer than two surfaces have repetitions of the same pushes.")
-    verdict = agreed(_verdict(found), _verdict(learnt))
+    verdict = agreed(_verdict(found), _verdict(learned))
     halves = ", ".join(f"{name} {e.text()}" for name, e in zip(OUTPUT_NAMES, most.pearson, strict=True))
     return Finding(
         CLAIM,
         verdict,
         f"Correlation of log sd over the pushes, for {len(found)} pairs of surfaces. By repetitions: "
         f"{_ranges(found)}; within {in_degrees(WIDE)}: {_ranges(near)}. Two halves of one surface's repetitions "
-        f"reach {halves}. By the VHGPs' process noise, of which the paper speaks: {_ranges(learnt)}. Rule, over all "
+        f"reach {halves}. By the VHGPs' process noise, of which the paper speaks: {_ranges(learned)}. Rule, over all "
         f"pushes: holds if the intervals of all pairs and outputs lie above {ALIKE:g}; in part if some lie above "
         f"{UNLIKE:g}; does not hold if all lie below {UNLIKE:g}. In part also if it holds, or holds in part, only by "
         "repetitions or only by VHGPs. The simulator's surfaces share one mechanism of noise, so this holds partly "
@@ -52,7 +52,7 @@ def _verdict(found: Sequence[Shape]) -> Verdict:
 
 
 def shape_tables(
-    study: Study, found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]
+    study: Study, found: Sequence[Shape], near: Sequence[Shape], most: Shape | None, learned: Sequence[Shape]
 ) -> tuple[Table, ...]:
     """Correlations by repetitions, by repetitions at moderate angles, and by the VHGPs."""
     block = f"Intervals resample blocks of neighbouring pushes ({BLOCK[0]:g} of the side × {in_degrees(BLOCK[1])})."
@@ -73,16 +73,16 @@ def shape_tables(
             (
                 f"Correlation of the log sd of the VHGPs' process noise, {size} on each surface, the first of "
                 f"{study.plan.seeds} draws of these; simulated.",
-                list(learnt),
+                list(learned),
             ),
         )
         if rows
     )
 
 
-def shape_json(found: Sequence[Shape], most: Shape | None, learnt: Sequence[Shape]) -> dict[str, Any]:
+def shape_json(found: Sequence[Shape], most: Shape | None, learned: Sequence[Shape]) -> dict[str, Any]:
     """By pair."""
-    named = {"repetitions": list(found), "halves": [] if most is None else [most], "vhgp": list(learnt)}
+    named = {"repetitions": list(found), "halves": [] if most is None else [most], "vhgp": list(learned)}
     return {
         name: {
             f"{one.first}/{one.second}": {

@@ -19,8 +19,8 @@ from push_predictor_paper.study import Study
 
 FEWEST, MOST = 10, 50  # training windows of a speed
 EQUAL = 200  # training windows of the control, in every bracket
-MAIN, GP, SAME_SIZE, TOLD = "VHGP", "GP", "VHGP, equal n", "VHGP with speed as input"
-SERIES = (MAIN, GP, SAME_SIZE, TOLD)
+MAIN, GP, SAME_SIZE, WITH_SPEED = "VHGP", "GP", "VHGP, equal n", "VHGP with speed as input"
+SERIES = (MAIN, GP, SAME_SIZE, WITH_SPEED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def facts_of(study: Study) -> Facts:
 
 def _bracket(series: str, speeds: int, fold: int, rows: int, same_size: int) -> Bracket:
     kind = "gp" if series == GP else "vhgp"
-    return Bracket(kind, speeds, _rows(series, speeds, rows, same_size), series == TOLD, fold)
+    return Bracket(kind, speeds, _rows(series, speeds, rows, same_size), series == WITH_SPEED, fold)
 
 
 def _rows(series: str, speeds: int, rows: int, same_size: int) -> int:

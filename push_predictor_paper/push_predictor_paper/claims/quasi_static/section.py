@@ -15,7 +15,7 @@ from push_predictor_paper.claims.quasi_static.facts import (
     MAIN,
     SAME_SIZE,
     SERIES,
-    TOLD,
+    WITH_SPEED,
     Facts,
     facts_of,
 )
@@ -31,7 +31,7 @@ from push_predictor_paper.claims.quasi_static.rules import (
     turning_bracket,
     turns_there,
 )
-from push_predictor_paper.claims.quasi_static.tables import bracket_table, single_table, speed_table, told
+from push_predictor_paper.claims.quasi_static.tables import bracket_table, single_table, speed_table, speed_text
 from push_predictor_paper.data.time_scaled import TRAVEL
 from push_predictor_paper.estimate import Estimate
 from push_predictor_paper.figures.quasi_static import Curve, paint_quasi_static
@@ -53,7 +53,7 @@ def section(study: Study) -> Section:
             _course(facts),
             _turn(facts),
             _direct(facts, departures),
-            _told(facts),
+            _speed_as_input(facts),
         ),
         tables=(bracket_table(facts), single_table(facts), speed_table(facts)),
         pictures=(_picture(study, facts, departures),),
@@ -66,7 +66,7 @@ TITLE = "The quasi-static assumption: pushes of all speeds scaled to 10 mm/s"
 CLAIM_COURSE = "Adding faster pushes to a model without the speed as an input first helps, then harms"
 CLAIM_TURN = "A model without the speed as an input is best with pushes of up to 50 to 80 mm/s"
 CLAIM_DIRECT = "The quasi-static assumption does not hold beyond 50 to 80 mm/s"
-CLAIM_TOLD = "The speed is a useful input"
+CLAIM_INPUT = "The speed is a useful input"
 
 
 def _course(facts: Facts) -> Finding:
@@ -80,10 +80,11 @@ def _course(facts: Facts) -> Finding:
     slow_equal = _against(judged.slow(SAME_SIZE), turn)
     sentence = (
         "NMSE of the VHGP on held-out pushes of its own speeds, minus that of the bracket up to "
-        f"{told(judged.speeds[turn])}: the slowest bracket {gain.text('+.3f')} (above 0: adding helped), the bracket "
-        f"up to {told(judged.speeds[-1])} {harm.text('+.3f')} (above 0: adding harmed). With {facts.same_sizes} "
-        f"windows in every bracket: {equal_gain.text('+.3f')} and {equal_harm.text('+.3f')}; a gain only in the "
-        f"first pair comes from more data, not from faster pushes. On slow pushes alone (up to {told(SLOW)}): "
+        f"{speed_text(judged.speeds[turn])}: the slowest bracket {gain.text('+.3f')} (above 0: adding helped), the "
+        f"bracket up to {speed_text(judged.speeds[-1])} {harm.text('+.3f')} (above 0: adding harmed). With "
+        f"{facts.same_sizes} windows in every bracket: {equal_gain.text('+.3f')} and {equal_harm.text('+.3f')}; "
+        f"a gain only in the first pair comes from more data, not from faster pushes. On slow pushes alone "
+        f"(up to {speed_text(SLOW)}): "
         f"{slow_gain.text('+.3f')} and {slow_harm.text('+.3f')}; at equal n {slow_equal[0].text('+.3f')} and "
         f"{slow_equal[1].text('+.3f')}. {facts.judged_on} Rule: holds if both of the first pair lie above 0, in part "
         "if one does, does not hold if none does and one lies below."
@@ -102,7 +103,7 @@ def _turn(facts: Facts) -> Finding:
     others = {
         "the GP's": judged.same(GP),
         "the VHGP's at equal n": judged.same(SAME_SIZE),
-        f"the VHGP's on pushes of up to {told(SLOW)} only": judged.slow(MAIN),
+        f"the VHGP's on pushes of up to {speed_text(SLOW)} only": judged.slow(MAIN),
     }
     elsewhere = "; ".join(f"{name} {_speeds(turn_of(judged.speeds, curve))}" for name, curve in others.items())
     sentence = (
@@ -117,9 +118,9 @@ def _turn(facts: Facts) -> Finding:
 def _direct(facts: Facts, departures: Sequence[Estimate]) -> Finding:
     error = estimated(facts.judged.slow(SAME_SIZE)[0])
     by_speed = dict(zip(facts.speeds[1:], departures[1:], strict=True))
-    found = ", ".join(f"{told(speed)} {d.text('.3f')}" for speed, d in by_speed.items())
+    found = ", ".join(f"{speed_text(speed)} {d.text('.3f')}" for speed, d in by_speed.items())
     sentence = (
-        f"Departure from the outcome at {told(facts.speeds[0])}, in units of its variance, sum of 3, interval by "
+        f"Departure from the outcome at {speed_text(facts.speeds[0])}, in units of its variance, sum of 3, interval by "
         f"push: {found}. It is the mean squared distance of the outcomes of the same {facts.pushes} pushes after "
         f"{1e3 * TRAVEL:.0f} mm from the first contact. The VHGP of the slowest pushes has an error of "
         f"{error.text('.3f')} on slow pushes (n = {facts.same_size}). Rule: a departure is notable from "
@@ -129,16 +130,17 @@ def _direct(facts: Facts, departures: Sequence[Estimate]) -> Finding:
     return Finding(CLAIM_DIRECT, breaks_beyond(by_speed, error.value), sentence)
 
 
-def _told(facts: Facts) -> Finding:
+def _speed_as_input(facts: Facts) -> Finding:
     judged = facts.judged
-    difference = estimated(judged.same(TOLD)[-1] - judged.same(MAIN)[-1])
-    slowest = estimated(judged.same(TOLD)[0] - judged.same(MAIN)[0])
+    difference = estimated(judged.same(WITH_SPEED)[-1] - judged.same(MAIN)[-1])
+    slowest = estimated(judged.same(WITH_SPEED)[0] - judged.same(MAIN)[0])
     sentence = (
         f"NMSE of the VHGP with the speed as an input minus that without it, same windows: {difference.text('+.3f')} "
-        f"with pushes of up to {told(judged.speeds[-1])}, {slowest.text('+.3f')} at {told(judged.speeds[0])} alone. "
-        f"{facts.judged_on} Rule: holds if the first lies below 0, does not hold if above."
+        f"with pushes of up to {speed_text(judged.speeds[-1])}, {slowest.text('+.3f')} at "
+        f"{speed_text(judged.speeds[0])} alone. {facts.judged_on} Rule: holds if the first lies below 0, does not "
+        "hold if above."
     )
-    return Finding(CLAIM_TOLD, lower(difference), sentence)
+    return Finding(CLAIM_INPUT, lower(difference), sentence)
 
 
 def _picture(study: Study, facts: Facts, departures: Sequence[Estimate]) -> Picture:
@@ -159,10 +161,10 @@ def _picture(study: Study, facts: Facts, departures: Sequence[Estimate]) -> Pict
         path,
         "NMSE by the top speed of the training pushes, map of NMSE by speed, departure from quasi-static outcomes",
         f"Simulated, {' on '.join(study.simulated.reference)}. Above: NMSE (sum of 3) by the top speed of the "
-        f"training pushes, on held-out pushes of the same speeds, and on those of up to {told(SLOW)} only; "
+        f"training pushes, on held-out pushes of the same speeds, and on those of up to {speed_text(SLOW)} only; "
         f"{facts.rows} windows of every speed, or {facts.same_sizes} in every bracket (equal n). Below left: the "
         "VHGP without the speed, trained up to one speed, tested at another. Below right: departure of the outcome "
-        f"from that at {told(facts.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s. "
+        f"from that at {speed_text(facts.speeds[0])} after equal travel. Grey: the paper's turn, 50 to 80 mm/s. "
         f"{facts.judged_on}",
     )
 
@@ -181,7 +183,7 @@ def _notes(study: Study, facts: Facts) -> tuple[str, ...]:
         "noise, on the number of windows at each speed, and on the length of a window: the slider is at rest at the "
         "first contact, so short windows see more of its acceleration. None of this proves anything about a real "
         "rig.",
-        *([f"Too few training windows at {', '.join(map(told, skipped))}."] if skipped else []),
+        *([f"Too few training windows at {', '.join(map(speed_text, skipped))}."] if skipped else []),
         *(
             f"{corpus.title}: its windows have equal duration, not equal travel, so they are not used here."
             for corpus in study.measured

@@ -17,7 +17,7 @@ from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.estimate import of_draws
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.section import Table
-from push_predictor_paper.statistics.grid_maps import told
+from push_predictor_paper.statistics.grid_maps import place_text
 
 
 def kinds_table(grid: RepeatedGrid, kinds: Kinds) -> Table:
@@ -66,4 +66,4 @@ def three(kinds: Kinds) -> tuple[tuple[str, int, Array], ...]:
 
 def place_of(cell: Repetitions) -> str:
     """Contact and angle, in words."""
-    return told((cell.fraction, cell.angle))
+    return place_text((cell.fraction, cell.angle))

@@ -11,7 +11,7 @@ from push_predictor_paper.claims.repeated_pushes.modality_rules import LEVEL, PO
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
 from push_predictor_paper.section import Table
 from push_predictor_paper.statistics.densities import Shape
-from push_predictor_paper.statistics.grid_maps import told
+from push_predictor_paper.statistics.grid_maps import place_text
 
 SEPARATIONS = (3.0, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0)
 LISTED = 10
@@ -83,4 +83,4 @@ def repetitions_of(grid: RepeatedGrid) -> int:
 
 def place_of(cell: Repetitions) -> str:
     """Contact and angle, in words."""
-    return told((cell.fraction, cell.angle))
+    return place_text((cell.fraction, cell.angle))
