@@ -23,8 +23,10 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import empty_table
 
-KINDS = ("analytical", "gp", "vhgp", "sparse", "extended")
+KINDS = ("analytical", "prior", "gp", "vhgp", "sparse", "extended")
+CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 WINDOWS, PROBES = 75, 12  # to train on, to compare predictions on
 
 
@@ -58,6 +60,8 @@ def models_of_every_kind() -> dict[str, PushModel]:
     table, rig = made_up_table(WINDOWS, 0), square_rig()
     models = {kind: train_model(table, rig, kind, name=kind) for kind in ("analytical", "gp", "vhgp")}
     models["sparse"] = train_model(table, rig, "vhgp", name="sparse", options=TrainingOptions(inducing=15))
+    on_corners = replace(rig, support_points=CORNERS)
+    models["prior"] = train_model(empty_table(), on_corners, "prior", name="prior")
     drifting = extended_model(models["gp"], drifting_effect("contact_friction", 0.1))
     return {**models, "extended": replace(drifting, name="extended")}
 

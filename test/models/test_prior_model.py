@@ -272,7 +272,7 @@ def test_trained_model_returns_from_its_file_with_its_noise(after_ten: PushModel
 
 
 @pytest.mark.parametrize(
-    "draws", [np.zeros((4, 3)), np.full((64, 16), 9.0), np.full((64, 16), -9.0), np.zeros((1, 16)), np.full((64, 16), np.nan)]
+    "draws", [np.zeros((4, 3)), np.zeros((1, 16)), *(np.full((64, 16), value) for value in (9.0, -9.0, np.nan))]
 )
 def test_rejects_damaged_draws(untrained: PushModel, tmp_path: Path, draws: Array) -> None:
     untrained.save(tmp_path / "m.pushmodel")
