@@ -15,7 +15,7 @@ from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, Kerne
 from push_predictor.models.gaussian_process.regression import Regression, best_held_out, held_out_score
 from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
-from push_predictor.models.mechanics.fit import fit_jointly
+from push_predictor.models.mechanics.fit import fit_jointly, held_out_residuals
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import candidates
@@ -93,7 +93,7 @@ def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
     fit = fit_jointly(mechanics, known, names)
     mean = MechanicsMean(FittedMechanics(mechanics, fit.values, fit.covariance), _mean_travel(rows))
     push = Push(rows.inputs, rows.duration, rows.covariates)
-    return FittedMean(mean, fit.held_out_residuals / mean.size(push)[:, None])
+    return FittedMean(mean, held_out_residuals(mechanics, fit) / mean.size(push)[:, None])
 
 
 def _mean_travel(rows: PushTable) -> float:

@@ -72,16 +72,11 @@ class JointFit:
         Few pushes decide on some parameters, such as friction, which only those show that slip. The sandwich estimate
         is then too small, because the residuals of these pushes have shrunk.
         """
-        change = self._without_pushes
+        change = self.without_pushes
         return np.asarray(change.T @ change * (1.0 - 1.0 / self.rows.pushes))
 
-    @property
-    def held_out_residuals(self) -> Array:
-        """Residuals (n, 3) of each push under the parameters fitted without it."""
-        return np.asarray(self.residuals - np.einsum("nkp,np->nk", self.jacobian, self._without_pushes[self.rows.push]))
-
     @cached_property
-    def _without_pushes(self) -> Array:
+    def without_pushes(self) -> Array:
         """Change (pushes, p) of the values when a push is left out of the fit, by a Gauss-Newton step."""
         scaled = self.residuals / self.scale
         weight, bend = student_weights(scaled) / self.scale**2, student_curvature(scaled) / self.scale**2
@@ -136,6 +131,20 @@ def with_candidates(mechanics: PushMechanics, fit: JointFit, candidates: Sequenc
         fit.scale,
         np.concatenate([fit.jacobian, added], axis=2),
     )
+
+
+def held_out_residuals(mechanics: PushMechanics, fit: JointFit) -> Array:
+    """Residuals (n, 3) of each push under the parameters fitted without it; no parameter moves by more than its prior's
+    standard deviation.
+
+    The displacement is computed again: where a tip is close to a corner, derivatives hold for tiny changes only.
+    """
+    spread = np.array([BY_NAME[name].spread for name in fit.names])
+    low, high = (np.array([getattr(BY_NAME[name], end) for name in fit.names]) for end in ("low", "high"))
+    change = np.clip(fit.without_pushes, -spread, spread)
+    values = np.clip(np.array(list(fit.values.values())) + change, low, high)[fit.rows.push]
+    rows, given = fit.rows, dict(zip(fit.names, values.T, strict=True))
+    return np.asarray(rows.outcomes - mechanics.displacement(given, rows.inputs, rows.duration, rows.covariates))
 
 
 def student_scale(residuals: Array) -> Array:
