@@ -9,10 +9,10 @@ import pytest
 from synthetic import square_rig
 
 from push_predictor.errors import TrainingError
-from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_residuals
+from push_predictor.models.mechanics.fit import FitRows, fit_jointly, held_out_residuals, refit
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation
-from push_predictor.models.mechanics.ladder import candidates, climb
+from push_predictor.models.mechanics.ladder import Rung, candidates, climb, worthwhile
 from push_predictor.models.mechanics.limit_surface import uniform_support
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 
@@ -70,6 +70,48 @@ def test_ladder_finds_the_parameters_that_differ_from_the_textbook() -> None:
 def test_ladder_adds_nothing_to_textbook_outcomes_with_noise(seed: int) -> None:
     ladder = climb(ellipsoidal_mechanics(), simulated({}, seed=seed))
     assert [rung.fit.names for rung in ladder] == [()]
+
+
+def test_ladder_adds_a_pair_that_shows_only_together() -> None:
+    ladder = climb(ellipsoidal_mechanics(), simulated({"centre_x": 0.003, "outline_x": -0.003}))
+    assert [rung.added for rung in ladder] == [(), ("centre_x", "outline_x")]
+
+
+def test_ladder_drops_a_parameter_that_mimicked_others() -> None:
+    true = {"contact_friction": 0.15, "friction_by_angle": 0.2}
+    first, mimic, last = climb(ellipsoidal_mechanics(), simulated(true, seed=1))
+    assert mimic.added == mimic.fit.names == last.dropped == ("friction_by_speed",)
+    assert set(last.fit.names) == set(true) and not first.fit.names
+
+
+def test_gain_must_exceed_its_standard_error_and_five_nats_a_parameter() -> None:
+    mechanics, rows = ellipsoidal_mechanics(), simulated({})
+    none, one = (fit_jointly(mechanics, rows, names) for names in ((), ("contact_friction",)))
+    found = [
+        worthwhile(none, Rung(one, ("contact_friction",), (), gain, error)) for gain, error in ((9, 8), (9, 10), (4, 1))
+    ]
+    assert found == [True, False, False]
+
+
+def test_refit_without_a_parameter_is_the_fit_of_the_others() -> None:
+    mechanics, rows = ellipsoidal_mechanics(), simulated(TRUE)
+    both, alone = (fit_jointly(mechanics, rows, names) for names in (tuple(TRUE), ("centre_y",)))
+    again = refit(mechanics, both, ("centre_y",))
+    np.testing.assert_allclose(again.residuals / NOISE, alone.residuals / NOISE, atol=0.5)
+
+
+def test_held_out_residuals_are_those_of_a_fit_to_the_other_pushes() -> None:
+    mechanics, rows = ellipsoidal_mechanics(), simulated(TRUE, n=15)
+    fit = fit_jointly(mechanics, rows, tuple(TRUE))
+    known, exact = CrossValidation(fit), np.zeros((15, 3))
+    for fold in range(5):
+        others = known.fold != fold
+        push = np.unique(rows.push[others], return_inverse=True)[1]
+        kept = FitRows(rows.inputs[others], rows.duration[others], rows.outcomes[others], push)
+        values = fit_jointly(mechanics, kept, fit.names, fit.values).values
+        exact[~others] = (rows.outcomes - mechanics.displacement(values, rows.inputs, rows.duration))[~others]
+    moved, expected = (known.residuals(fit.names) - fit.residuals) / NOISE, (exact - fit.residuals) / NOISE
+    assert np.sum(moved * expected) / np.sum(expected**2) == pytest.approx(1.0, abs=0.15)
 
 
 def test_dropping_a_parameter_of_the_fit_predicts_as_the_fit_without_it() -> None:

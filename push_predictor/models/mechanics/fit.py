@@ -226,20 +226,19 @@ class _Problem:
         return np.moveaxis(rows.outcomes - found, 0, 2)
 
     def solved(self, values: Array, residuals: Array, jacobian: Array | None, enough: float = CONVERGED) -> JointFit:
-        """The fit from a start. Derivatives are taken again after a long step, and at the end."""
-        scale, renewed = student_scale(residuals), jacobian is None
+        """The fit from a start: steps are taken until one with derivatives of this point gains less than `enough`."""
+        scale, fresh = student_scale(residuals), False
         for _ in range(MOST_STEPS if self.names else 0):
-            fresh = jacobian is None
             if jacobian is None:
-                jacobian = self.jacobian(values, residuals)
+                jacobian, fresh = self.jacobian(values, residuals), True
             stepped, residuals, fall = self._stepped(values, residuals, scale, jacobian)
             moved = float(np.max(np.abs(stepped - values) / self.spread))
             values, scale = stepped, student_scale(residuals)
-            if fall < enough and (fresh or not renewed):  # old derivatives may not show the way
+            if fall < enough and fresh:
                 break
-            if moved > LONG_STEP or fall < enough:
-                jacobian = None
-        jacobian = self.jacobian(values, residuals)
+            jacobian, fresh = (None if fall < enough or moved > LONG_STEP else jacobian), False
+        if jacobian is None or not fresh:
+            jacobian = self.jacobian(values, residuals)
         named = dict(zip(self.names, values.tolist(), strict=True))
         return JointFit(self.rows, self.names, named, residuals, scale, jacobian)
 

@@ -94,7 +94,7 @@ def _next(mechanics: PushMechanics, fit: JointFit) -> Rung | None:
         ranked = [Change(c.added, c.dropped, float((now - known.scores(_after(fit, c))).sum())) for c in changes]
         ranked = sorted((c for c in ranked if c.expected > _least(fit, c)), key=lambda c: -c.expected)
         rungs = [_taken(mechanics, fit, wide, change, ranked) for change in ranked[:REFITTED]]
-        if good := [rung for rung in rungs if _accepted(fit, rung)]:
+        if good := [rung for rung in rungs if worthwhile(fit, rung)]:
             return max(good, key=lambda rung: rung.gain)
     return None
 
@@ -132,7 +132,8 @@ def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Chan
     return Rung(after, change.added, change.dropped, float(gain.sum()), _error(gain), rivals)
 
 
-def _accepted(fit: JointFit, rung: Rung) -> bool:
+def worthwhile(fit: JointFit, rung: Rung) -> bool:
+    """Whether the gain of a rung after `fit` is large enough and, for more parameters, beyond its standard error."""
     more = len(rung.fit.names) > len(fit.names)
     least = _least(fit, Change(rung.added, rung.dropped))
     clear = CLEARLY * rung.error if more else 0.0
