@@ -15,8 +15,10 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
-from push_predictor.models.mechanics.limit_surface import Support, body_twist, uniform_support
-from push_predictor.models.mechanics.quasi_static import DiscContact, Sweep, advance, slide
+from push_predictor.models.mechanics.forward import Motion
+from push_predictor.models.mechanics.limit_surface import Support, contact_force, uniform_support
+from push_predictor.models.mechanics.motion.recorded_push import TruePush
+from push_predictor.models.mechanics.parameters import RowValues
 
 RADIUS = 0.00475
 LEVER = 0.03  # m, at which a turn is compared with a shift
@@ -36,12 +38,27 @@ def pushes(n: int, seed: int = 0, travel: float = 0.004, speed: float = 0.02) ->
     return inputs, np.full(n, travel / speed)
 
 
-def sweeps(model: AnalyticalPush, inputs: np.ndarray, duration: np.ndarray) -> tuple[DiscContact, Sweep]:
+def sweep(start: np.ndarray, ahead: np.ndarray, travel: np.ndarray, radius: float = RADIUS) -> TruePush:
+    """Straight paths of a disc from start (n, 2) in the frame of the slider's first pose."""
+    return TruePush(
+        start, np.full(len(travel), radius), ahead, travel, np.ones_like(travel), ahead, np.zeros_like(start)
+    )
+
+
+def sweeps(model: AnalyticalPush, inputs: np.ndarray, duration: np.ndarray) -> TruePush:
     """The same pushes as paths of the disc in the body frame."""
     normal = model.outline.inward_normal(inputs[:, 1])
     start = model.outline.point(inputs[:, 1]) - model.pusher_radius * normal
-    contact = DiscContact(model.outline, model.pusher_radius, model.contact_friction, model.support)
-    return contact, Sweep(start, rotate(normal, inputs[:, 2]), inputs[:, 0] * duration)
+    return sweep(start, rotate(normal, inputs[:, 2]), inputs[:, 0] * duration, model.pusher_radius)
+
+
+def slide(model: AnalyticalPush, path: TruePush) -> np.ndarray:
+    """Poses (n, 3) after the paths."""
+    return model.mechanics.poses(of(model, path), path)
+
+
+def of(model: AnalyticalPush, path: TruePush) -> RowValues:
+    return RowValues({"contact_friction": model.contact_friction}, len(path.travel), {})
 
 
 def size(displacement: np.ndarray) -> np.ndarray:
@@ -53,15 +70,17 @@ def size(displacement: np.ndarray) -> np.ndarray:
 
 def one_contact(point: tuple[float, float], angle: float, friction: float, support: Support) -> dict[str, np.ndarray]:
     """Twist of a slider touched at a point with inward normal +x, and the wrench that the ellipsoid gives for it."""
-    at, normal = np.array([point]), np.array([[1.0, 0.0]])
     velocity = np.array([[np.cos(angle), np.sin(angle)]])
-    twist, slip = body_twist(at, normal, velocity, support, friction)
-    vx, vy, spin = twist[0]
+    x, y = np.subtract(point, support.centre) / support.length
+    p, q, along, across = (np.array([value]) for value in (-y, x, np.cos(angle), np.sin(angle)))
+    push, rub, slips = contact_force(1.0 + p * p, p * q, 1.0 + q * q, along, across, friction)
+    vx, vy, spin, slip = push[0], rub[0], (p * push + q * rub)[0] / support.length, slips[0]
+    vx, vy = vx + spin * support.centre[1], vy - spin * support.centre[0]
     of_contact = np.array([vx - spin * point[1], vy + spin * point[0]])
     of_centre = np.array([vx - spin * support.centre[1], vy + spin * support.centre[0]])
     arm = np.subtract(point, support.centre)
     return {
-        "pusher": velocity[0], "contact": of_contact, "force": of_centre, "spin": spin, "slip": slip[0], "arm": arm,
+        "pusher": velocity[0], "contact": of_contact, "force": of_centre, "spin": spin, "slip": slip, "arm": arm,
         "moment": support.length**2 * spin,
     }  # fmt: skip
 
@@ -253,12 +272,12 @@ def test_scaling_all_lengths_scales_the_motion():
 @EVERY_OUTLINE
 def test_disc_ends_on_the_outline_or_outside_it(outline, travel):
     model = AnalyticalPush(outline, RADIUS)
-    contact, sweep = sweeps(model, *pushes(300, travel=travel))
-    pose = slide(contact, sweep)
-    end = to_body(sweep.centre(sweep.travel), pose)
+    path = sweeps(model, *pushes(300, travel=travel))
+    pose = slide(model, path)
+    end = to_body(path.tip + path.travel[:, None] * path.ahead, pose)
     nearest = outline.project(end)
     gap = nearest.distance - RADIUS
-    approaching = np.sum(rotate(sweep.direction, -pose[:, 2]) * -nearest.normal, axis=1) > 0.02
+    approaching = np.sum(rotate(path.ahead, -pose[:, 2]) * -nearest.normal, axis=1) > 0.02
     assert np.min(gap) > -1e-7
     assert np.max(np.abs(gap[approaching])) < 1e-6  # who has not left touches
     assert np.mean(approaching) > 0.8
@@ -276,19 +295,19 @@ def test_a_pusher_that_slides_off_leaves_the_slider_behind():
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.0, 0.013), st.floats(-0.03, 0.03))
 def test_disc_moves_slider_only_after_touch(distance, y):
-    contact = DiscContact(square(0.09), RADIUS, 0.3, Support((0.0, 0.0), 0.034))
+    model = AnalyticalPush(square(0.09), RADIUS, 0.3, Support((0.0, 0.0), 0.034))
     start, ahead = np.array([[-0.045 - RADIUS - distance, y]]), np.array([[1.0, 0.0]])
-    after_gap = slide(contact, Sweep(start, ahead, np.array([0.014])))
-    at_once = slide(contact, Sweep(start + distance * ahead, ahead, np.array([0.014 - distance])))
+    after_gap = slide(model, sweep(start, ahead, np.array([0.014])))
+    at_once = slide(model, sweep(start + distance * ahead, ahead, np.array([0.014 - distance])))
     assert after_gap == pytest.approx(at_once, abs=5e-4 * 0.014 / LEVER)
 
 
 def test_a_disc_crosses_a_notch_and_pushes_its_far_side():
     notch = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.07, 0.06], [0.07, 0.03], [0.03, 0.03], [0.03, 0.06], [0.0, 0.06]]
     outline = Outline(np.array(notch))
-    contact = DiscContact(outline, RADIUS, 0.3, Support((0.05, 0.05), 0.03))
+    model = AnalyticalPush(outline, RADIUS, 0.3, Support((0.05, 0.05), 0.03))
     start, travel = np.array([[0.03 + RADIUS + 1e-4, 0.05]]), np.array([0.035])
-    pose = slide(contact, Sweep(start, np.array([[1.0, 0.0]]), travel))
+    pose = slide(model, sweep(start, np.array([[1.0, 0.0]]), travel))
     assert pose[0] == pytest.approx([0.035 - (0.04 - 2 * RADIUS - 1e-4), 0.0, 0.0], abs=3e-5)
 
 
@@ -316,30 +335,39 @@ def test_rows_do_not_depend_on_their_neighbours():
 # --- convergence and cost --------------------------------------------------------------------------------------------
 
 
-def in_equal_steps(contact: DiscContact, sweep: Sweep, steps: int) -> np.ndarray:
-    pose, step = np.zeros((len(sweep.travel), 3)), sweep.travel / steps
+def in_equal_steps(model: AnalyticalPush, path: TruePush, steps: int) -> np.ndarray:
+    """Poses (n, 3) by equal steps of the classical fourth-order Runge-Kutta method, while the disc touches."""
+    motion, rows = Motion(model.mechanics, of(model, path), path), np.arange(len(path.travel))
+    pose, step = np.zeros((len(rows), 3)), path.travel / steps
+    h = step[:, None]
     for k in range(steps):
-        pose = advance(contact, sweep, pose, k * step, step)
+        k1, gap, _ = motion.rate(rows, pose, k * step)
+        k2, *_ = motion.rate(rows, pose + 0.5 * h * k1, (k + 0.5) * step)
+        k3, *_ = motion.rate(rows, pose + 0.5 * h * k2, (k + 0.5) * step)
+        k4, *_ = motion.rate(rows, pose + h * k3, (k + 1) * step)
+        pose = pose + np.where((gap < 2e-5)[:, None], h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), 0.0)
     return pose
 
 
 @pytest.mark.slow
 @EVERY_OUTLINE
 def test_displacements_are_within_a_thousandth_of_fine_steps(outline):
-    contact, sweep = sweeps(AnalyticalPush(outline, RADIUS), *pushes(60, seed=3, travel=0.0145))
-    exact = in_equal_steps(contact, sweep, 512)
-    error = size(slide(contact, sweep) - exact)
-    moved = size(exact) > 0.001 * sweep.travel
+    model = AnalyticalPush(outline, RADIUS)
+    path = sweeps(model, *pushes(60, seed=3, travel=0.0145))
+    exact = in_equal_steps(model, path, 512)
+    error = size(slide(model, path) - exact)
+    moved = size(exact) > 0.001 * path.travel
     assert np.all(error[moved] < 1e-3 * size(exact)[moved])
-    assert np.all(error[~moved] < 1e-5 * sweep.travel[~moved])
+    assert np.all(error[~moved] < 1e-5 * path.travel[~moved])
 
 
-def test_integration_is_fourth_order_while_contact_mode_is_constant():
+def test_motion_is_smooth_while_contact_mode_is_constant():
+    """A method of fourth order converges as such only on a rate that is."""
     model = AnalyticalPush(square(0.09), RADIUS)
     inputs = np.array([[0.02, 0.07, 0.05], [0.02, 0.11, 0.9], [0.02, 0.16, -0.8]])  # sticks, slips left, slips right
-    contact, sweep = sweeps(model, inputs, np.full(3, 1.0))
-    exact = in_equal_steps(contact, sweep, 128)
-    errors = [size(in_equal_steps(contact, sweep, steps) - exact) for steps in (2, 4, 8)]
+    path = sweeps(model, inputs, np.full(3, 1.0))
+    exact = in_equal_steps(model, path, 128)
+    errors = [size(in_equal_steps(model, path, steps) - exact) for steps in (2, 4, 8)]
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.all(orders > 3.5)
 

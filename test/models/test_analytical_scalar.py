@@ -15,9 +15,10 @@ from push_predictor.geometry.nearest import nearest_on
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.analytical_scalar import FEW, scalar_analytical
+from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.limit_surface import Support
-from push_predictor.models.mechanics.quasi_static import LONGEST_STEP
+from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP
+from push_predictor.models.mechanics.scalar.mechanics import FEW
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array
 

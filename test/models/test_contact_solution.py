@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.shapes import square
-from push_predictor.models.mechanics.limit_surface import Support, body_twist
+from push_predictor.models.mechanics.limit_surface import contact_force
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, TwistOf, driven
+from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, TwistOf, driven, driven_on_ellipsoid
 from push_predictor.models.mechanics.pressure import patch
 from push_predictor.types import Array
 
@@ -81,18 +81,16 @@ def test_pushing_dissipates_energy(name: str) -> None:
 
 
 def test_ellipsoid_gives_the_closed_form() -> None:
-    support, draw = Support((0.0, 0.0), 0.03), np.random.default_rng(3)
-    normal_angle, angle, friction = draw.uniform(-np.pi, np.pi, N), draw.uniform(-1.5, 1.5, N), 0.4
-    normal = np.column_stack([np.cos(normal_angle), np.sin(normal_angle)])
-    velocity = np.column_stack([np.cos(normal_angle + angle), np.sin(normal_angle + angle)])
-    point = draw.uniform(-0.06, 0.06, (N, 2))
-    (x, y), (nx, ny) = (point / 0.03).T, normal.T
-    touch = Touch(nx, ny, x * ny - y * nx, x * nx + y * ny, np.cos(angle), np.sin(angle))
-    edge = np.full(N, np.arctan(friction))
+    touch, friction = touches(3), 0.4
+    p, q, edge = touch.normal_arm, touch.left_arm, np.full(N, np.arctan(friction))
     motion = driven(twist_of("ellipsoid"), touch, edge, edge)
-    twist, slip = body_twist(point, normal, velocity, support, friction)
-    assert np.column_stack([motion.vx, motion.vy, motion.spin / 0.03]) == pytest.approx(twist, abs=1e-6, rel=1e-6)
+    push, rub, slip = contact_force(1.0 + p * p, p * q, 1.0 + q * q, touch.along, touch.across, friction)
+    assert motion.vx == pytest.approx(push * touch.normal_x - rub * touch.normal_y, abs=1e-12)
+    assert motion.vy == pytest.approx(push * touch.normal_y + rub * touch.normal_x, abs=1e-12)
+    assert motion.spin == pytest.approx(push * p + rub * q, abs=1e-12)
     assert motion.slip.tolist() == slip.tolist()
+    closed = driven_on_ellipsoid(touch, np.full(N, friction))
+    assert np.stack(closed) == pytest.approx(np.stack(motion), abs=1e-12)
 
 
 @EVERY_SURFACE

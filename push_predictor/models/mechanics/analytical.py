@@ -1,4 +1,4 @@
-"""The analytical push model of Lynch, Maekawa and Tanie 1992, for any outline and a disc of finite radius."""
+"""The analytical push model of Lynch, Maekawa and Tanie 1992: the forward model on an ellipsoid."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from push_predictor.errors import RequestError, RigError, TrainingError
-from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
+from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surface import Support, uniform_support
-from push_predictor.models.mechanics.quasi_static import DiscContact, Sweep, slide
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.types import Array
 
 TEXTBOOK_FRICTION = 0.3
 FRICTION_BOUNDS = (0.0, 2.0)  # of the fit; above 2 the motion cone of a usual slider covers all pushes
 LENGTH_BOUNDS = (0.02, 1.0)  # of the fit, as fractions of the farthest distance the support can reach
+ACCURACY = 1e-4  # of a displacement, relative
 WEIGHTING_ROUNDS = 3
 DIFFERENCE_STEP = 1e-3  # relative, above the error of the integration
 PARAMETER_TOLERANCE = 1e-5  # relative
@@ -54,13 +55,13 @@ class AnalyticalPush:
         """
         velocity, contact, angle = np.asarray(inputs, dtype=np.float64).T
         _check_request(velocity, contact, angle, np.asarray(duration, dtype=np.float64))
-        normal = self.outline.inward_normal(contact)
-        start = self.outline.point(contact) - self.pusher_radius * normal
-        direction = rotate(normal, angle)
-        disc = DiscContact(self.outline, self.pusher_radius, self.contact_friction, self.support)
-        pose = slide(disc, Sweep(start, direction, velocity * duration))
-        heading = np.arctan2(direction[:, 1], direction[:, 0])
-        return np.column_stack([rotate(pose[:, :2], -heading), pose[:, 2]])
+        return self.mechanics.displacement({"contact_friction": self.contact_friction}, inputs, duration)
+
+    @property
+    def mechanics(self) -> PushMechanics:
+        """The forward model on the support's ellipsoid."""
+        ellipsoid = PowerSurface(np.array(self.support.centre), self.support.length)
+        return PushMechanics(self.outline, self.pusher_radius, ellipsoid, accuracy=ACCURACY)
 
 
 def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcomes: Array) -> AnalyticalPush:

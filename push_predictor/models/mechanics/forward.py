@@ -19,10 +19,11 @@ from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, loa
 from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, SameSurface, row_surfaces
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
-from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, driven
+from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, driven, driven_on_ellipsoid
+from push_predictor.models.mechanics.motion.fine_sweep import swept_finely
 from push_predictor.models.mechanics.motion.friction_cone import friction_cone
 from push_predictor.models.mechanics.motion.recorded_push import TruePush, true_push
-from push_predictor.models.mechanics.motion.sweep import swept
+from push_predictor.models.mechanics.motion.sweep import FINE, swept
 from push_predictor.models.mechanics.parameters import ParameterValues, RowValues
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.types import Array, IntArray
@@ -80,7 +81,13 @@ class PushMechanics:
             return np.zeros((0, 3))
         rows = RowValues(values, len(inputs), covariates or {})
         push = true_push(self.outline, self.pusher_radius, rows, inputs, np.asarray(duration, dtype=np.float64))
-        return _Motion(self, self.surfaces(rows), rows, push).displacement()
+        return push.recorded_displacement(self.poses(rows, push))
+
+    def poses(self, values: RowValues, push: TruePush) -> Array:
+        """Poses (n, 3: x, y in m, heading in rad) of sliders after true pushes, in the frames of their first poses."""
+        motion = Motion(self, values, push)
+        sweep = swept if self.accuracy > FINE else swept_finely
+        return sweep(motion.rate, push.travel, motion.length, self.accuracy)
 
     def _known(self, key: str, support: PressureDistribution) -> LoadMap:
         if key not in self._tables:
@@ -115,12 +122,13 @@ class PushMechanics:
         return np.maximum(below - first, 0), share, list(EXPONENT_KNOTS[first : last + 1])
 
 
-class _Motion:
+class Motion:
     """The motion of sliders under pushes."""
 
-    def __init__(self, mechanics: PushMechanics, surfaces: PushSurfaces, values: RowValues, push: TruePush) -> None:
-        self.mechanics, self.surfaces, self.values, self.push = mechanics, surfaces, values, push
-        of_rows = surfaces.of_rows
+    def __init__(self, mechanics: PushMechanics, values: RowValues, push: TruePush) -> None:
+        self.mechanics, self.values, self.push = mechanics, values, push
+        self.surfaces = mechanics.surfaces(values)
+        of_rows = self.surfaces.of_rows
         self.length, self.centre = of_rows.length, of_rows.centre + values.pair("centre_x", "centre_y")
         self.heading = np.zeros(values.n)  # of the slider in the world at the start, where a parameter needs it
         if values.active("grain_x", "grain_diagonal", "slope_x", "slope_y", "gradient_x", "gradient_y"):
@@ -129,13 +137,7 @@ class _Motion:
         self.grain, self.slope = values.pair("grain_x", "grain_diagonal"), values.pair("slope_x", "slope_y")
         self.gradient, self.square = values.pair("gradient_x", "gradient_y"), of_rows.square
 
-    def displacement(self) -> Array:
-        """See PushMechanics.displacement."""
-        return self.push.recorded_displacement(
-            swept(self._rate, self.push.travel, self.length, self.mechanics.accuracy)
-        )
-
-    def _rate(self, rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
+    def rate(self, rows: IntArray, pose: Array, done: Array) -> tuple[Array, Array, Array]:
         """Change of the poses per metre of the tip's path, gap (m) and the approach of the disc."""
         found = self._quasi_static(rows, pose, done, None)
         if not self.values.active("inertia"):
@@ -186,11 +188,20 @@ class _Motion:
             steady = np.column_stack([rotate(self.slope[rows], -world), np.zeros(len(rows))])
             pull = steady if pull is None else pull + steady
         height = values.of("pushing_height")[rows] if values.active("pushing_height") else None
-        surface = LoadedSurface(self.surfaces, rows, stretch, pull, height)
         gauge = np.ones(0)
         if values.active("friction_by_load"):
             gauge = self.surfaces.gauge(rows, touch.normal_x, touch.normal_y, touch.normal_arm)
-        return driven(surface.twist, touch, *friction_cone(values, rows, touch, self.push.speed[rows], gauge))
+        left, right = friction_cone(values, rows, touch, self.push.speed[rows], gauge)
+        if self._plain and stretch is None and pull is None and height is None:
+            return driven_on_ellipsoid(touch, np.tan(left))
+        return driven(LoadedSurface(self.surfaces, rows, stretch, pull, height).twist, touch, left, right)
+
+    @property
+    def _plain(self) -> bool:
+        """Whether the surface is an ellipsoid, and friction the same to both sides."""
+        support = self.mechanics.support
+        ellipsoid = isinstance(support, PowerSurface) and support.power == 2.0
+        return ellipsoid and not self.values.active("friction_difference")
 
 
 def _of_point(rate: Array, pose: Array, point: Array) -> Array:

@@ -54,42 +54,6 @@ def uniform_support(outline: Outline) -> Support:
     return Support((float(x), float(y)), length)
 
 
-def body_twist(
-    contact_point: Array, inward_normal: Array, pusher_velocity: Array, support: Support, friction: float
-) -> tuple[Array, IntArray]:
-    """Twist (n, 3: vx, vy, w) of the body frame's origin under a point pusher, and slip of the contact (n,).
-
-    contact_point (n, 2) in m, inward_normal (n, 2) of length 1, pusher_velocity (n, 2) in m/s: all in the
-    body frame; the twist has the velocity's units, and rad/s. Slip is 0 where the pusher sticks, +1 where it
-    slips to the left of the inward normal, -1 to the right. A pusher that does not approach the slider leaves
-    it at rest, with slip 0.
-
-    The velocity at the contact is A f (force f, A = 1 + perp(r) perp(r)^T / c^2, r from the centre of
-    friction). The images of the friction cone's edges under A bound the motion cone (Mason 1986): inside it
-    the contact sticks and moves with the pusher, outside it the force lies on the nearer edge and only normal
-    velocities agree.
-    """
-    normal_arm, tangent_arm = _moment_arms(contact_point, inward_normal, support)
-    nx, ny = inward_normal[:, 0], inward_normal[:, 1]
-    along = pusher_velocity[:, 0] * nx + pusher_velocity[:, 1] * ny
-    across = pusher_velocity[:, 1] * nx - pusher_velocity[:, 0] * ny
-    p, q = normal_arm, tangent_arm
-    normal_force, tangent_force, slip = contact_force(1.0 + p * p, p * q, 1.0 + q * q, along, across, friction)
-    spin = (normal_arm * normal_force + tangent_arm * tangent_force) / support.length
-    x, y = support.centre
-    vx = nx * normal_force - ny * tangent_force + spin * y
-    vy = ny * normal_force + nx * tangent_force - spin * x
-    return np.stack([vx, vy, spin], axis=1), slip
-
-
-def _moment_arms(contact_point: Array, inward_normal: Array, support: Support) -> tuple[Array, Array]:
-    """Moments per c of unit forces along the inward normal and along its left, each (n,)."""
-    rx = (contact_point[:, 0] - support.centre[0]) / support.length
-    ry = (contact_point[:, 1] - support.centre[1]) / support.length
-    nx, ny = inward_normal[:, 0], inward_normal[:, 1]
-    return rx * ny - ry * nx, rx * nx + ry * ny
-
-
 def contact_force(
     pp: Array, pq: Array, qq: Array, along: Array, across: Array, friction: float | Array
 ) -> tuple[Array, Array, IntArray]:

@@ -128,7 +128,7 @@ def _in_first_frame(twist: Array, turn: Array) -> Array:
 
 
 def _solve(physics: AnalyticalPush, touch: _Touch, change: Change) -> tuple[Array, Array, IntArray]:
-    """Twist (n, 3) of the body's origin, load (n, 3) and slip (n,) under a touch; see limit_surface.body_twist."""
+    """Twist (n, 3) of the body's origin, load (n, 3) and slip (n,) under a touch; see limit_surface.contact_force."""
     length = physics.support.length * np.exp(change.spread)
     centre = np.asarray(physics.support.centre) + change.centre
     friction = np.maximum(physics.contact_friction + change.friction, 0.0)

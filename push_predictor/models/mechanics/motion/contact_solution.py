@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from push_predictor.models.mechanics.limit_surface import contact_force
 from push_predictor.types import Array, IntArray
 
 ROOT_STEPS = 40
@@ -71,6 +72,14 @@ def driven(twist_of: TwistOf, touch: Touch, left_edge: Array, right_edge: Array)
     size = np.where(moves, touch.along / np.where(moves, motion.toward, 1.0), 0.0)
     push, rub = (a + share * (b - a) for a, b in zip(right, left, strict=True))
     return Driven(motion.vx * size, motion.vy * size, motion.spin * size, slip * moves, np.arctan2(rub, push))
+
+
+def driven_on_ellipsoid(touch: Touch, friction: Array) -> Driven:
+    """Motion of sliders on an ellipsoid, in closed form, with the same friction (n,) of slip to both sides."""
+    p, q = touch.normal_arm, touch.left_arm
+    push, rub, slip = contact_force(1.0 + p * p, p * q, 1.0 + q * q, touch.along, touch.across, friction)
+    vx, vy = push * touch.normal_x - rub * touch.normal_y, push * touch.normal_y + rub * touch.normal_x
+    return Driven(vx, vy, push * p + rub * q, slip, np.arctan2(rub, push))
 
 
 class _Edge(NamedTuple):

@@ -14,6 +14,7 @@ from push_predictor.types import Array, IntArray
 
 LONGEST_STEP = 0.004  # m: about the radius of a pusher, so that no corner is stepped over
 OF_TRAVEL = 0.1  # of the accuracy: the error of a step that is allowed for the whole travel
+FINE = 1e-4  # accuracy up to which fine_sweep is used
 TOUCHING = 2e-5  # m: a wider gap at the start of a step is no contact
 SHORTEST_STEP = 30.0  # accuracies of the longest: a jump of the rate is crossed in steps of this length
 
@@ -43,8 +44,8 @@ def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Arr
         motion = wide * (2.0 * first + 3.0 * k2 + 4.0 * k3) / 9.0
         last, gap_after, nearing_after = rate_of(rows, before + motion, at + h)
         error = wide * (-5.0 * first + 6.0 * k2 + 8.0 * k3 - 9.0 * last) / 72.0
-        allowed = accuracy * (_size(motion, length[rows]) + OF_TRAVEL * travel[rows])
-        ratio = _size(error, length[rows]) / allowed
+        allowed = accuracy * (size_of(motion, length[rows]) + OF_TRAVEL * travel[rows])
+        ratio = size_of(error, length[rows]) / allowed
         agree = (ratio <= 1.0) | (h <= shortest)
         pose[rows] = np.where(agree[:, None], before + motion, before)
         done[rows] = np.where(agree, at + h, at)
@@ -57,5 +58,6 @@ def swept(rate_of: RateOf, travel: Array, length: Array, accuracy: float) -> Arr
     return pose
 
 
-def _size(motion: Array, length: Array) -> Array:
+def size_of(motion: Array, length: Array) -> Array:
+    """Sizes (n,) of motions (n, 3) in m: a turn counts as its arc at the length (n,)."""
     return np.asarray(np.sqrt(motion[:, 0] ** 2 + motion[:, 1] ** 2 + (length * motion[:, 2]) ** 2))

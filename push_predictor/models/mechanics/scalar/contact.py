@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, ROOT_STEPS, ROOT_TOLERANCE
+from push_predictor.models.mechanics.motion.contact_solution import BISECT_EVERY, ROOT_STEPS
 from push_predictor.models.mechanics.scalar.surface import Three, Twist
 
 
@@ -33,7 +33,9 @@ class LastContact:
 _AT_REST = 0.0, 0.0, 0.0
 
 
-def driven_scalar(twist: Twist, touch: ScalarTouch, left: float, right: float, last: LastContact) -> Three:
+def driven_scalar(
+    twist: Twist, touch: ScalarTouch, left: float, right: float, last: LastContact, tolerance: float
+) -> Three:
     """Velocity of the centre of friction and spin times length, with friction `left` and `right` of the normal."""
     nx, ny, normal_arm, left_arm, along, across = touch
     if along <= 0.0:
@@ -54,8 +56,8 @@ def driven_scalar(twist: Twist, touch: ScalarTouch, left: float, right: float, l
     for step in range(1, ROOT_STEPS + 1):
         vx, vy, spin, toward, lag = under(share)
         if (
-            abs(lag) <= ROOT_TOLERANCE * toward
-            or high - low <= ROOT_TOLERANCE
+            abs(lag) <= tolerance * toward
+            or high - low <= tolerance
             or (share == 1.0 and lag > 0.0)
             or (share == 0.0 and lag < 0.0)
         ):

@@ -15,11 +15,20 @@ import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.fitted import RECORDING, FittedMechanics
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.fine_sweep import OF_TRAVEL_FINELY
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
-from push_predictor.models.mechanics.motion.sweep import LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
+from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
 from push_predictor.models.mechanics.scalar.contact import LastContact, ScalarTouch, driven_scalar
-from push_predictor.models.mechanics.scalar.surface import ScalarSurface, Three, loaded, root_of_stretch, scalar_surface
+from push_predictor.models.mechanics.scalar.surface import (
+    ScalarSurface,
+    Three,
+    loaded,
+    root_of_stretch,
+    scalar_power_surface,
+    scalar_surface,
+)
 from push_predictor.types import Array
 
 FEW = 16  # pushes: as fast as an array of them
@@ -54,9 +63,14 @@ class ScalarMechanics(FittedMechanics):
 
     def _surface(self, recording: float) -> ScalarSurface:
         if recording not in self._surfaces:
-            values = RowValues(self.values, 1, {RECORDING: np.array([recording])})
-            self._surfaces[recording] = scalar_surface(self.mechanics.surfaces(values))
+            self._surfaces[recording] = self._prepared(recording)
         return self._surfaces[recording]
+
+    def _prepared(self, recording: float) -> ScalarSurface:
+        if isinstance(self.mechanics.support, PowerSurface):
+            return scalar_power_surface(self.mechanics.support)
+        values = RowValues(self.values, 1, {RECORDING: np.array([recording])})
+        return scalar_surface(self.mechanics.surfaces(values))
 
 
 def scalar_mechanics(fitted: FittedMechanics) -> ScalarMechanics:
@@ -117,7 +131,9 @@ class _Push:
 
     def displacement(self) -> Three:
         """Displacement in the recorded push frame."""
-        x, y, turn = _swept(self._rate, self.travel, self.surface.length, self.model.mechanics.accuracy)
+        accuracy = self.model.mechanics.accuracy
+        sweep = _swept if accuracy > FINE else _swept_finely
+        x, y, turn = sweep(self._rate, self.travel, self.surface.length, accuracy)
         (ox, oy), (ahead_x, ahead_y) = self.origin, self.recorded
         turned_x, turned_y = _turned(ox, oy, turn)
         x, y = x + turned_x - ox, y + turned_y - oy
@@ -136,7 +152,7 @@ class _Push:
             nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, vx * nx + vy * ny, vy * nx - vx * ny
         )
         left, right = self._friction(touch)
-        vx, vy, spin = driven_scalar(self._loaded(heading), touch, left, right, self.last)
+        vx, vy, spin = driven_scalar(self._loaded(heading), touch, left, right, self.last, self.surface.tolerance)
         spin /= length
         vx, vy = vx + spin * centre_y, vy - spin * centre_x
         return c * vx - s * vy, s * vx + c * vy, spin, distance - self.radius, touch.along
@@ -219,3 +235,46 @@ def _swept(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
         factor = min(max(0.9 * max(ratio, 1e-3) ** (-1.0 / 3.0), 0.2), 4.0)
         step = min(max(h * factor, shortest), LONGEST_STEP)
     return x, y, heading
+
+
+def _swept_finely(rate: Rate, travel: float, length: float, accuracy: float) -> Three:
+    """Pose after the sweep; see fine_sweep.swept_finely."""
+    pose, done, longest = (0.0, 0.0, 0.0), 0.0, min(travel, LONGEST_STEP)
+    first = rate(0.0, 0.0, 0.0, 0.0)
+    while travel - done > 1e-12 * travel:
+        step = min(longest, travel - done)
+        if first[4] > 0.0 and first[3] >= TOUCHING:
+            step = min(step, first[3])
+        half = done + 0.5 * step
+        coarse, middle = _advance(rate, pose, done, step, first), _advance(rate, pose, done, 0.5 * step, first)
+        fine = _advance(rate, middle, half, 0.5 * step, rate(*middle, half))
+        allowed = accuracy * (_distance(fine, pose, length) + OF_TRAVEL_FINELY * travel)
+        if _distance(fine, coarse, length) <= allowed:
+            pose, done, longest = fine, done + step, min(2.0 * step, LONGEST_STEP)
+            first = rate(*pose, done)
+        else:
+            longest = 0.5 * step
+    return pose
+
+
+def _advance(rate: Rate, pose: Three, done: float, step: float, first: Rates) -> Three:
+    """Pose after one step of the classical Runge-Kutta method; first: the rate where it begins."""
+    x, y, heading = pose
+    ax, ay, ah, gap, _ = first
+    if gap >= TOUCHING:
+        return pose
+    h, middle = 0.5 * step, done + 0.5 * step
+    bx, by, bh, _, _ = rate(x + h * ax, y + h * ay, heading + h * ah, middle)
+    cx, cy, ch, _, _ = rate(x + h * bx, y + h * by, heading + h * bh, middle)
+    dx, dy, dh, _, _ = rate(x + step * cx, y + step * cy, heading + step * ch, done + step)
+    k = step / 6.0
+    return (
+        x + k * (ax + 2.0 * bx + 2.0 * cx + dx),
+        y + k * (ay + 2.0 * by + 2.0 * cy + dy),
+        heading + k * (ah + 2.0 * bh + 2.0 * ch + dh),
+    )
+
+
+def _distance(one: Three, other: Three, length: float) -> float:
+    x, y, turn = one[0] - other[0], one[1] - other[1], (one[2] - other[2]) * length
+    return sqrt(x * x + y * y + turn * turn)

@@ -18,7 +18,11 @@ from push_predictor.models.mechanics.limit_surfaces.loaded_surface import (
     SMALLEST_MARGIN,
 )
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, RowSurfaces, SameSurface
+from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.motion.contact_solution import ROOT_TOLERANCE
 from push_predictor.types import Array
+
+EXACT = 1e-13  # rad: on an ellipsoid the velocity is linear in the force, so the second secant is exact
 
 Three: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = Callable[[float, float, float], Three]  # of a load (force x, y, moment over length)
@@ -27,7 +31,7 @@ Gauge: TypeAlias = Callable[[float, float, float], float]
 
 @dataclass(frozen=True, eq=False)
 class ScalarSurface:
-    """One limit surface: see LimitSurface."""
+    """One limit surface: see LimitSurface. tolerance: rad, of a contact that sticks."""
 
     centre: tuple[float, float]
     length: float
@@ -35,6 +39,7 @@ class ScalarSurface:
     reach: Array
     twist: Twist
     gauge: Gauge
+    tolerance: float = ROOT_TOLERANCE
 
 
 class Stretch(NamedTuple):
@@ -48,16 +53,24 @@ class Stretch(NamedTuple):
 
 def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
     """The surface of the first push."""
-    of_rows = surfaces.of_rows
-    if isinstance(surfaces, RowSurfaces):
-        twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
-    elif isinstance(surfaces, SameSurface):
-        twist, gauge = _of_arrays(surfaces)
-    else:
+    if isinstance(surfaces, SameSurface):
+        return scalar_power_surface(surfaces.surface)
+    if not isinstance(surfaces, RowSurfaces):
         raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
+    of_rows = surfaces.of_rows
     x, y = of_rows.centre[0].tolist()
     xx, xy, yy = of_rows.square[0].tolist()
+    twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
     return ScalarSurface((x, y), float(of_rows.length[0]), (xx, xy, yy), of_rows.reach[0], twist, gauge)
+
+
+def scalar_power_surface(surface: PowerSurface) -> ScalarSurface:
+    """The surface of that power."""
+    (x, y), (xx, xy, yy) = surface.centre.tolist(), surface.square.tolist()
+    twist, gauge, tolerance = _of_arrays(surface), _gauge_of_arrays(surface), ROOT_TOLERANCE
+    if surface.power == 2.0:
+        twist, gauge, tolerance = _ellipsoid, _norm, EXACT
+    return ScalarSurface((x, y), surface.length, (xx, xy, yy), surface.reach, twist, gauge, tolerance)
 
 
 def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
@@ -159,20 +172,24 @@ def _gauge_of_cells(cells: list[tuple[float, ...]]) -> Gauge:
     return gauge
 
 
-def _of_arrays(surfaces: SameSurface) -> tuple[Twist, Gauge]:
-    surface = surfaces.surface
+def _ellipsoid(x: float, y: float, m: float) -> Three:
+    return x, y, m
 
-    def ellipsoid(x: float, y: float, m: float) -> Three:
-        return x, y, m
 
-    def size(x: float, y: float, m: float) -> float:
-        return sqrt(x * x + y * y + m * m)
+def _norm(x: float, y: float, m: float) -> float:
+    return sqrt(x * x + y * y + m * m)
 
+
+def _of_arrays(surface: PowerSurface) -> Twist:
     def twist(x: float, y: float, m: float) -> Three:
         vx, vy, spin = surface.twist(*(np.array([part]) for part in (x, y, m)))
         return float(vx[0]), float(vy[0]), float(spin[0])
 
+    return twist
+
+
+def _gauge_of_arrays(surface: PowerSurface) -> Gauge:
     def gauge(x: float, y: float, m: float) -> float:
         return float(surface.gauge(*(np.array([part]) for part in (x, y, m)))[0])
 
-    return (ellipsoid, size) if surface.power == 2.0 else (twist, gauge)
+    return gauge
