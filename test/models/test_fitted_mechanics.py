@@ -14,7 +14,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.pressure import supported_at
+from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.models.predictors import ExtendedPredictor, MechanicsPredictor
 from push_predictor.models.push_model import Provenance, PushModel
 from push_predictor.models.pushes import Pushes
@@ -104,6 +104,17 @@ def test_rejects_a_file_whose_rows_lack_a_needed_covariate(by_recording: PushMod
 def test_rejects_a_file_with_a_parameter_beyond_its_range(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match="contact_friction"):
         saved(mechanics_model({"contact_friction": 1.6}), tmp_path)
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e5])
+def test_rejects_a_file_whose_support_does_not_match_the_outline(scale: float, tmp_path: Path) -> None:
+    model = mechanics_model({})
+    assert isinstance(model.predictor, MechanicsPredictor)
+    far = PressureDistribution(scale * ON_CORNERS.points, ON_CORNERS.shares)
+    mechanics = PushMechanics(model.rig.outline, model.rig.pusher_radius, far)
+    predictor = replace(model.predictor, fitted=FittedMechanics(mechanics))
+    with pytest.raises(ModelFileError, match="support points"):
+        saved(replace(model, predictor=predictor), tmp_path)
 
 
 def test_retraining_keeps_the_parameters_and_estimates_the_noise_again() -> None:

@@ -12,6 +12,8 @@ from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanics.pressure import PressureDistribution, supported_at
 from push_predictor.recordings.rig import Rig
 
+LARGEST_RATIO = 100.0  # of the support's size to the outline's
+
 
 def mechanics_record(fitted: FittedMechanics) -> dict[str, Any]:
     """The record of fitted mechanics; outline and pusher are those of the model's rig."""
@@ -35,9 +37,17 @@ def mechanics_of(record: dict[str, Any], rig: Rig) -> FittedMechanics:
     covariance = np.array(record["covariance"], dtype=np.float64).reshape(len(values), len(values))
     if not np.all(np.isfinite(covariance)):
         raise ValueError("the covariance of the mechanics is not finite")
-    supports = {int(number): supported_at(np.array(points)) for number, points in record["supports"].items()}
-    support = None if record["support"] is None else supported_at(np.array(record["support"]))
+    supports = {int(number): _support(points, rig) for number, points in record["supports"].items()}
+    support = None if record["support"] is None else _support(record["support"], rig)
     return FittedMechanics(PushMechanics(rig.outline, rig.pusher_radius, support, supports), values, covariance)
+
+
+def _support(points: list[list[float]], rig: Rig) -> PressureDistribution:
+    """A known support. Raises ValueError for one far larger or smaller than the slider: integration would never end."""
+    support, reach = supported_at(np.array(points)), float(np.abs(rig.outline.vertices).max())
+    if not (float(np.abs(support.points).max()) < LARGEST_RATIO * reach and support.length > reach / LARGEST_RATIO):
+        raise ValueError("support points are far too large or too close together for the outline")
+    return support
 
 
 def _points(support: PressureDistribution) -> list[list[float]]:
