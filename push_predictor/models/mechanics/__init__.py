@@ -1,4 +1,5 @@
-"""Quasi-static mechanics of pushing: limit surface, contact, and the analytical model of Lynch et al. (1992).
+"""Quasi-static mechanics of pushing: the exact forward model, its fit, and its setting of Lynch et al. (1992).
 
-Import `analytical`, or `analytical_scalar` for single pushes without array overhead.
+Import `forward` for the model, `fitted` for it with values, `analytical` for the ellipsoid; `scalar.mechanics` and
+`analytical_scalar` compute single pushes without array overhead.
 """
