@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.special import ndtr, ndtri
-from scipy.stats import qmc
 
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
@@ -85,5 +84,7 @@ def displacements(
 
 
 def _sobol(dimensions: int, count: int, seed: int) -> Array:
+    from scipy.stats import qmc  # its import would take every node 0.4 s at the start
+
     uniform = qmc.Sobol(dimensions, scramble=True, seed=seed).random(count)
     return np.asarray(np.clip(uniform, 1e-9, 1.0 - 1e-9))
