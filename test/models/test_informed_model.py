@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from synthetic import RADIUS, square_rig
 
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.gaussian_process.constant import ConstantNoise, fit_constant
 from push_predictor.models.gaussian_process.gp import fit_gp
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import best_held_out, held_out_score
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.store.model_file import load_model, save_model
@@ -126,6 +128,24 @@ def test_the_table_with_mechanics_added_is_the_model(informed: PushModel, with_f
             np.testing.assert_allclose(found.std, expected.std, rtol=5e-3)
         one = table.predict_one(PushRequest(*few.inputs[0], 0.2))
         np.testing.assert_allclose(one.mean[0], model.predict_rows(few.inputs[:1], few.duration[:1]).mean[0], rtol=1e-3)
+
+
+def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel, tmp_path: Path) -> None:
+    basis = DriverBasis("constant", (), (), (), 0.0, ())
+    effect = Effect("contact_friction", "constant", basis, np.array([0.05]), np.array([[1e-4]]), np.ones(3))
+    base, table = learnt(with_function), pushes(5, 11)
+    extended = replace(
+        with_function, predictor=ExtendedPredictor(base, base.physics, (effect,), np.array([1.5, 1.0, 1.0]))
+    )
+    expected = extended.predict_rows(table.inputs, table.duration)
+    shift, _ = extended.predictor.shift(Push(table.inputs, table.duration, {}))
+    alone = with_function.predict_rows(table.inputs, table.duration)
+    np.testing.assert_allclose(expected.mean, alone.mean + shift, rtol=1e-9)
+    save_model(extended, tmp_path / "m")
+    for found in (load_model(tmp_path / "m"), tabulate(extended)):
+        again = found.predict_rows(table.inputs, table.duration)
+        assert np.max(np.abs(again.mean - expected.mean) / expected.std) < 1e-3
+        np.testing.assert_allclose(again.std, expected.std, rtol=5e-3)
 
 
 @pytest.mark.slow
