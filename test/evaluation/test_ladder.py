@@ -23,7 +23,7 @@ from push_predictor.recordings.table import PushTable
 NOISE = np.array([1e-4, 1e-4, 1e-3])
 
 
-def made_up_ladder() -> ScoredLadder:
+def made_up_ladder(windows_per_push: int = 4) -> ScoredLadder:
     """A linear world: outcomes follow one parameter, 0.2 m per unit along dy; ten pushes of four windows."""
     rng, n = np.random.default_rng(0), 40
     slope = np.zeros((n, 3, 1))
@@ -31,7 +31,7 @@ def made_up_ladder() -> ScoredLadder:
     noise = NOISE * rng.standard_normal((n, 3))
     moved = 0.1 * slope[:, :, 0]
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), np.zeros(n)])
-    rows = FitRows(inputs, np.full(n, 0.2), moved + noise, np.arange(n) // 4)
+    rows = FitRows(inputs, np.full(n, 0.2), moved + noise, np.arange(n) // windows_per_push)
     textbook = JointFit(rows, (), {}, moved + noise, NOISE, np.zeros((n, 3, 0)))
     fitted = JointFit(rows, ("body_anisotropy",), {"body_anisotropy": 0.1}, noise, NOISE, slope)
     rival = Change(("centre_x",), (), 3.0)
@@ -55,6 +55,11 @@ def test_held_out_scores_are_those_of_the_noise_once_the_parameter_is_free(ladde
     expected = np.log(NOISE * np.sqrt(2.0 * np.pi * np.e)).sum()
     assert fitted.nlpd.value == pytest.approx(expected, abs=0.4)
     assert textbook.nlpd.low > fitted.nlpd.high
+
+
+def test_single_push_gives_finite_scores() -> None:
+    step = made_up_ladder(windows_per_push=40).steps[0]
+    assert np.isfinite([step.nmse.value, step.nlpd.value]).all()
 
 
 def test_gain_is_per_push(ladder: ScoredLadder) -> None:

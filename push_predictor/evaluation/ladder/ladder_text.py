@@ -18,7 +18,7 @@ def ladder_lines(ladder: ScoredLadder) -> list[str]:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
     return [
         *lines,
-        f"Held out: each push is predicted from the others, in ten folds ({count(ladder)}). Brackets: 95 % intervals.",
+        f"Each held-out push is predicted from others, in at most ten folds ({count(ladder)}). Brackets: 95 % intervals.",
         "",
         f"Parameters fitted to all {len(ladder.model.training)} windows, with 95 % intervals from push to push:",
         *parameter_lines(ladder.final),
@@ -54,7 +54,7 @@ def unit(fitted: FittedParameter) -> str:
 
 def count(ladder: ScoredLadder) -> str:
     """The windows of the search in words."""
-    return f"{ladder.windows} windows of {ladder.pushes} pushes"
+    return f"{ladder.windows} windows of {ladder.pushes} {'push' if ladder.pushes == 1 else 'pushes'}"
 
 
 def ladder_json(ladder: ScoredLadder) -> dict[str, Any]:

@@ -91,7 +91,7 @@ def _held_out(rung: Rung) -> Comparison:
     residuals = known.residuals(rung.fit.names)
     covariance = np.zeros((len(residuals), 3, 3))
     for fold in np.unique(known.fold):
-        others = residuals[known.fold != fold]
+        others = residuals[known.fold != fold] if known.fold.any() else residuals  # a single push has no others
         covariance[known.fold == fold] = others.T @ others / len(others)
     mean = rows.outcomes - residuals
     names, reference = rows.push.astype(str), rows.outcomes.mean(axis=0)
