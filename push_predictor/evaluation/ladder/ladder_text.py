@@ -18,7 +18,7 @@ def ladder_lines(ladder: ScoredLadder) -> list[str]:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
     return [
         *lines,
-        f"Held-out pushes are predicted from others, in up to ten folds ({count(ladder)}). In brackets: 95 % intervals.",
+        f"Held-out pushes are predicted from others, in up to ten folds ({count(ladder)}). Brackets: 95 % intervals.",
         "",
         f"Parameters fitted to all {len(ladder.model.training)} windows, with 95 % intervals from push to push:",
         *parameter_lines(ladder.final),
