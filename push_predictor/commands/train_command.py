@@ -115,8 +115,8 @@ def run(options: argparse.Namespace) -> None:
     }
     if not write_json(options, result):
         used = f"trained on {len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
-        about = " about fitted mechanics" if result.get("mean") == "mechanics" else ""
-        print(f"{options.out}: {model.kind}{about}, {used if len(table) else 'from outline and priors alone'}")
+        about = ", about fitted mechanics" if result.get("mean") == "mechanics" else ""
+        print(f"{options.out}: {model.kind}, {used if len(table) else 'from outline and priors alone'}{about}")
         print("\n".join(lines), end="\n" if lines else "")
 
 

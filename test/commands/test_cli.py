@@ -188,6 +188,7 @@ def test_train_reports_model_windows_and_pushes(place: Place):
     learned = json.loads(place.printed["vhgp"])
     assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
     assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
+    assert learned["mean"] == "mechanics"
     assert json.loads(Path(place.path("train.json")).read_text())["kind"] == "analytical"
     assert load_model(Path(place.path("gp.pushmodel"))).name == "gp"
 
@@ -402,6 +403,7 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (changed(TRAIN, "train", "{tmp}/absent"), ["{tmp}/absent", "no such file"]),
         (changed(TRAIN, "train", "{gp}"), ["{gp}", "push table"]),
         (changed(TRAIN, "train", "{junk}.csv"), ["junk.csv"]),
+        (changed([*TRAIN, "--mean", "zero"], "--kind", "analytical"), ["--kind", "--mean"]),
         ([*TRAIN, "--n-train", "100000"], ["n_train", "100000"]),
         ([*TRAIN, "--n-train", "3"], ["3", "at least 10"]),
         ([*TRAIN, "--seed", "-1"], ["--seed", "-1"]),

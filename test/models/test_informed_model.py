@@ -17,12 +17,13 @@ from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import best_held_out, held_out_score
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor, Shift
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import TrainingOptions, retrain_model, train_model
+from push_predictor.models.train_learnt import fitted_mean
 from push_predictor.recordings.table import PushTable
 
 RIG = square_rig()
@@ -146,6 +147,20 @@ def test_effects_extend_it_and_are_saved_and_tabulated(with_function: PushModel,
         again = found.predict_rows(table.inputs, table.duration)
         assert np.max(np.abs(again.mean - expected.mean) / expected.std) < 1e-3
         np.testing.assert_allclose(again.std, expected.std, rtol=5e-3)
+
+
+def test_a_shift_of_prediction_and_outcome_leaves_the_density(informed: PushModel) -> None:
+    table, step = pushes(10, 12, (0.05, 0.05)), np.array([1e-3, -5e-4, 0.02])
+    push = Push(table.inputs, table.duration, {})
+    shift = Shift(np.tile(step, (10, 1)), np.zeros((10, 3, 3)))
+    shifted = learnt(informed).shifted_log_density(push, table.outcomes + step, shift, np.ones(3))
+    np.testing.assert_allclose(shifted, informed.exact_log_density(table), rtol=1e-9)
+
+
+def test_it_needs_no_covariate_that_requests_lack() -> None:
+    table = pushes(12, 13)
+    headed = replace(table, covariates={"push_heading": np.linspace(-3.0, 3.0, 12)})
+    assert fitted_mean(headed, RIG).mean.fitted.needs == ()
 
 
 @pytest.mark.slow
