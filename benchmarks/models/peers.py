@@ -32,10 +32,8 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density, gaussian_log_density
 from push_predictor.models.gaussian_process.sparse.fit import fit_sparse_vhgp
 from push_predictor.models.gaussian_process.vhgp import fit_vhgp
-from push_predictor.models.mechanics.fit import FitRows
 from push_predictor.models.mechanics.fitted import FittedMechanics
-from push_predictor.models.mechanics.forward import PushMechanics
-from push_predictor.models.mechanics.ladder import climb
+from push_predictor.models.train_learnt import fitted_mean
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
@@ -233,11 +231,8 @@ def square_rows(data: Path, folds: int = 1) -> list[Measured]:
 
 
 def fitted_mechanics(rig: Rig, known: PushTable) -> FittedMechanics:
-    """The last rung of the ladder on these rows."""
-    mechanics = PushMechanics(rig.outline, rig.pusher_radius)
-    push = np.unique(known.push_id, return_inverse=True)[1]
-    fit = climb(mechanics, FitRows(known.inputs, known.duration, known.outcomes, push, known.covariates))[-1].fit
-    return FittedMechanics(mechanics, fit.values, fit.covariance)
+    """The mean of an informed model of these rows."""
+    return fitted_mean(known, rig).mean.fitted
 
 
 def standardised(title: str, inputs: Array, outcomes: Array, training: IntArray, test: IntArray) -> Rows:
