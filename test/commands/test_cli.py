@@ -184,7 +184,7 @@ def test_seed_determines_the_simulated_recording(place: Place, run):
 
 
 def test_train_reports_model_windows_and_pushes(place: Place):
-    assert ": gp about fitted mechanics, trained on 32 of 32 windows, 6 pushes" in place.printed["gp"]
+    assert ": gp, trained on 32 of 32 windows, 6 pushes" in place.printed["gp"]
     learned = json.loads(place.printed["vhgp"])
     assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
     assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
