@@ -40,8 +40,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "train",
         "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
-        "mean with constant noise; analytical is quasi-static mechanics. prior predicts from outline and priors before "
-        "the first push; DATA sharpen it.",
+        "mean with constant noise. analytical is quasi-static mechanics. prior predicts from outline and priors "
+        "before the first push; DATA update it.",
         "push_predictor train bags/square_abs_train --kind vhgp --out square_abs.pushmodel",
     )
     parser.add_argument(
@@ -54,7 +54,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--n-train",
         type=int,
         metavar="N",
-        help="train on N random windows (default: all; of more than 1000, 1000 spread over all pushes)",
+        help="train on N random windows (default: all; at most 1000, with --fit 4000, spread over all pushes)",
     )
     parser.add_argument(
         "--inducing",
@@ -65,14 +65,20 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--mean",
         choices=MEANS,
-        help="vhgp, gp: learn what fitted mechanics miss (mechanics), or the outcome itself (zero). auto takes the one "
-        "that predicts held-out training pushes better (default)",
+        help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero). auto, the "
+        "default, trains both and keeps the one that predicts held-out training pushes better",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of --n-train (default 0)")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="K",
+        help="random seed of --n-train and of the draws of a prior model (default 0)",
+    )
     parser.add_argument(
         "--fit",
         action="store_true",
-        help="analytical: choose and estimate parameters of friction, pressure and measurement",
+        help="analytical: choose and estimate parameters of friction, pressure, measurement and table",
     )
     parser.add_argument(
         "--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"
@@ -115,7 +121,7 @@ def run(options: argparse.Namespace) -> None:
     }
     if not write_json(options, result):
         used = f"trained on {len(model.training)} of {len(table)} windows, {model.provenance.pushes} pushes"
-        about = ", about fitted mechanics" if result.get("mean") == "mechanics" else ""
+        about = ", with fitted mechanics as mean" if result.get("mean") == "mechanics" else ""
         print(f"{options.out}: {model.kind}, {used if len(table) else 'from outline and priors alone'}{about}")
         print("\n".join(lines), end="\n" if lines else "")
 
@@ -134,7 +140,7 @@ def _check(options: argparse.Namespace, kind: str) -> None:
     check_seed(options.seed)
     check_output("--out", options.out)
     if options.fit and kind != "analytical":
-        raise RequestError("--kind", kind, "analytical with --fit: a learnt model has no friction to estimate")
+        raise RequestError("--kind", kind, "analytical with --fit (the other kinds have no such choice)")
     if options.mean is not None and kind not in LEARNT:
         raise RequestError("--kind", kind, "vhgp or gp with --mean")
     if options.inducing is not None and kind != "vhgp":

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 PARAMETER_HEAD = ("Meaning", "Value", "Unit", "Textbook", "Parameter")
 METHOD = (
-    "Each step adds the parameter that improves the log density of held-out pushes most, if by more than one standard "
-    "error from push to push.",
-    "Where no single parameter does, a step adds a pair, or takes one or two parameters in place of one.",
+    "Each step adds the parameter that most improves the log density of held-out pushes.",
+    "Where no single parameter helps, a step adds a pair, or replaces one parameter by one or two.",
+    "A step must gain more than one standard error, estimated from the variation between pushes.",
+    "It must also gain 5 nats for each added parameter, or 0.03 nats per push if that is more.",
     "All free parameters are fitted together at each step, with heavy-tailed noise and weak priors.",
-    "The same pushes choose the steps and score them. The scores are therefore slightly optimistic. The "
-    "command push_predictor evaluate scores the model on other pushes.",
+    "The same pushes choose and score the steps, so the scores are slightly optimistic. "
+    "Score the model on other pushes with push_predictor evaluate.",
 )
 
 
@@ -44,9 +45,11 @@ def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
         html.paragraph(_answer(ladder), "lead"),
         html.figure(_picture(folder, ladder)),
         html.heading("Fitted parameters"),
-        html.table("Value with 95 % interval from push to push.", PARAMETER_HEAD, _parameter_rows(ladder)),
+        html.table(
+            "Values with 95 % intervals from the variation between pushes.", PARAMETER_HEAD, _parameter_rows(ladder)
+        ),
         html.heading("Steps"),
-        html.table(f"Scores by push-blocked cross-validation, {count(ladder)}.", head, steps),
+        html.table(f"Scores by cross-validation over whole pushes: {count(ladder)}.", head, steps),
         html.heading("Method"),
         html.bullets(METHOD),
     ]
@@ -56,7 +59,7 @@ def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
 def _answer(ladder: ScoredLadder) -> str:
     first, last = ladder.steps[0], ladder.steps[-1]
     if len(ladder.steps) == 1:
-        return f"The textbook's parameters fit: no other value predicts held-out pushes better ({count(ladder)})."
+        return f"The textbook values suffice: no fitted parameter clearly improves held-out scores ({count(ladder)})."
     change = f"from {first.nmse.text('.3f')} to {last.nmse.text('.3f')}"
     share = 100.0 * (1.0 - last.nmse.value / first.nmse.value)
     number = len(ladder.final)

@@ -18,9 +18,9 @@ def ladder_lines(ladder: ScoredLadder) -> list[str]:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
     return [
         *lines,
-        f"Held-out pushes are predicted from others, in up to ten folds ({count(ladder)}). Brackets: 95 % intervals.",
+        f"Each push is predicted from other pushes, in at most ten folds ({count(ladder)}). Brackets: 95 % intervals.",
         "",
-        f"Parameters fitted to all {len(ladder.model.training)} windows, with 95 % intervals from push to push:",
+        f"Parameters fitted to all {len(ladder.model.training)} windows, with 95 % intervals over pushes:",
         *parameter_lines(ladder.final),
     ]
 
@@ -33,7 +33,7 @@ def ladder_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:
 def parameter_lines(parameters: list[FittedParameter]) -> list[str]:
     """A line for each parameter: value, interval, unit and meaning."""
     if not parameters:
-        return ["  none: every parameter keeps its textbook value"]
+        return ["  none: all parameters keep their textbook values"]
     cells = [(p.parameter.name, interval(p.estimate), unit(p)) for p in parameters]
     widths = [max(len(cell[k]) for cell in cells) for k in range(3)]
     return [
