@@ -1,4 +1,4 @@
-"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/explanation/informed_models.md.
+"""Learnt models about fitted mechanics next to plain ones, by number of windows: docs/results/informed.md.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.informed --data FOLDER [--bags bags] [--sizes N ...]
         [--models vhgp:zero vhgp:mechanics ...]
