@@ -247,7 +247,7 @@ def test_import_train_evaluate_score_what_the_regressors_score_by_themselves(
         write_table(tmp_path / f"{name}.csv", table.take(rows))
         shutil.copy(square.with_suffix(".rig.yaml"), tmp_path / f"{name}.rig.yaml")
     model, report = str(tmp_path / "square.pushmodel"), tmp_path / "metrics.json"
-    options = ["--kind", kind, "--n-train", "100", "--seed", str(fold), "--out", model]
+    options = ["--kind", kind, "--mean", "zero", "--n-train", "100", "--seed", str(fold), "--out", model]
     assert main(["train", str(tmp_path / "training.csv"), *options]) == 0
     assert main(["evaluate", model, str(tmp_path / "test.csv"), "--json", str(report)]) == 0
     metrics = json.loads(report.read_text())
