@@ -51,7 +51,7 @@ def train(
     n_train: int | None = None,
     seed: int = 0,
     fit: bool = False,
-    mean: MeanChoice = "auto",
+    mean: MeanChoice = "zero",
     watch: Watch | None = None,
 ) -> PushModel:
     """Train a model on recordings or push tables; a prior model needs none, but then a rig.
@@ -59,9 +59,9 @@ def train(
     kind: vhgp, gp, analytical or prior. rig: a Rig or a rig file, needed only where the data name none. name: of the
     model in the services; the first file's stem unless given. n_train: that many windows at random by the seed; by
     default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
-    an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
-    auto, which takes the one that predicts held-out training pushes better. watch: called with each stage and the
-    share of the work done; by default stages are printed to stderr.
+    an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero, the
+    default; or auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
+    and the share of the work done; by default stages are printed to stderr.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
     watch = watch or _print_stage
