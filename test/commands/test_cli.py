@@ -188,7 +188,7 @@ def test_train_reports_model_windows_and_pushes(place: Place):
     learned = json.loads(place.printed["vhgp"])
     assert (learned["name"], learned["kind"], learned["n_train"]) == ("hetero", "vhgp", 15)
     assert learned["n_rows"] == len(load_data([Path(place.path("train"))]))
-    assert learned["mean"] == "mechanics"
+    assert learned["mean"] == "zero"
     assert json.loads(Path(place.path("train.json")).read_text())["kind"] == "analytical"
     assert load_model(Path(place.path("gp.pushmodel"))).name == "gp"
 
