@@ -27,6 +27,8 @@ from push_predictor.models.train import TrainingOptions, retrain_model, train_mo
 from push_predictor.models.train_learnt import fitted_mean
 from push_predictor.recordings.table import PushTable
 
+pytestmark = pytest.mark.slow
+
 RIG = square_rig()
 TRUE = {"contact_friction": 0.15, "rim_exponent": 1.0, "friction_difference": 0.05}
 NOISE = np.array([2e-4, 2e-4, 5e-3])  # m, m, rad on a path of 4 mm
@@ -84,7 +86,6 @@ def test_a_residual_that_is_a_function_is_learnt(with_function: PushModel) -> No
     assert learnt(with_function).gaussian
 
 
-@pytest.mark.slow
 def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: PushModel, tmp_path: Path) -> None:
     rows, later = with_function.training, pushes(50, 6)
     sparse, dense = trained(rows, inducing=30), trained(rows)
@@ -98,7 +99,6 @@ def test_a_sparse_vhgp_learns_the_residual_as_a_dense_one_does(with_function: Pu
     np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-6)
 
 
-@pytest.mark.slow
 def test_auto_takes_mechanics_where_they_help_and_zero_where_they_do_not() -> None:
     table = pushes(24, 3)
     assert learnt(trained(table, mean="auto")).mean is not None
@@ -178,7 +178,6 @@ def test_it_needs_no_covariate_that_requests_lack() -> None:
     assert fitted_mean(headed, RIG).mean.fitted.needs == ()
 
 
-@pytest.mark.slow
 def test_retrained_it_keeps_its_kind_of_mean(informed: PushModel) -> None:
     assert learnt(retrain_model(informed, pushes(30, 10))).mean is not None
 

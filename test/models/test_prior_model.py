@@ -38,6 +38,8 @@ from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
+pytestmark = pytest.mark.slow
+
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 RIG = replace(square_rig(), support_points=CORNERS)
 TRUTH = {"contact_friction": 0.15, "centre_x": 0.004, "tracker_rotation": 0.04}
@@ -322,7 +324,6 @@ def test_table_that_is_too_far_off_is_not_used(untrained: PushModel, monkeypatch
     np.testing.assert_array_equal(found.mean, untrained.predict_rows(inputs, np.full(3, 0.2)).mean)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
 def test_table_is_accurate_and_fast(rig: Rig) -> None:
     model = train_model(empty_table(), rig, "prior", name="p")
