@@ -8,11 +8,10 @@ Both sides are measured in one run; the figure is their ratio of CPU time.
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.models.training import least_cpu_seconds
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
@@ -29,21 +28,11 @@ def main(arguments: list[str] | None = None) -> int:
     alone = scalar_analytical(model)
     inputs = np.column_stack([np.full(n, 0.02), rng.random(n), rng.uniform(-1.4, 1.4, n)])
     duration = np.full(n, 0.2)
-    together = _cpu_seconds(lambda: model.displacement(inputs, duration))
-    in_turn = _cpu_seconds(lambda: [alone.displacement(inputs[k : k + 1], duration[k : k + 1]) for k in range(n)])
+    together = least_cpu_seconds(lambda: model.displacement(inputs, duration))
+    in_turn = least_cpu_seconds(lambda: [alone.displacement(inputs[k : k + 1], duration[k : k + 1]) for k in range(n)])
     print(f"{n} windows as arrays: {1e3 * together:.1f} ms; one by one: {1e6 * in_turn / n:.0f} us each")
     print(f"arrays are {in_turn / together:.1f} times as fast")
     return 0
-
-
-def _cpu_seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """The least CPU time of some repeats, s."""
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        work()
-        times.append(time.process_time() - begin)
-    return min(times)
 
 
 if __name__ == "__main__":

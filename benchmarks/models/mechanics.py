@@ -8,12 +8,11 @@ For an even patch, a support on three points, and the ellipsoid; textbook parame
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
+from benchmarks.models.training import least_cpu_seconds
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -64,24 +63,14 @@ def _row(fitted: FittedMechanics, n: int) -> str:
     def displacement(model: FittedMechanics, rows: slice) -> Array:
         return model.displacement(inputs[rows], duration[rows], {"push_heading": heading[rows]})
 
-    first = _cpu_seconds(lambda: displacement(fitted, slice(0, 1)), 1)
-    together = _cpu_seconds(lambda: displacement(fitted, slice(None)))
+    first = least_cpu_seconds(lambda: displacement(fitted, slice(0, 1)), 1)
+    together = least_cpu_seconds(lambda: displacement(fitted, slice(None)))
     alone = scalar_mechanics(fitted)
     displacement(alone, slice(0, 1))  # takes the table over into plain numbers
     rows = [slice(k, k + 1) for k in range(min(SINGLE, n))]
-    single = 1e6 * np.array([_cpu_seconds(partial(displacement, alone, row)) for row in rows])
+    single = 1e6 * np.array([least_cpu_seconds(partial(displacement, alone, row)) for row in rows])
     times = f"{np.median(single):.0f} us | {np.mean(single):.0f} us | {np.quantile(single, 0.95):.0f} us"
     return f"{1e3 * first:.0f} ms | {1e3 * together:.1f} ms | {times}"
-
-
-def _cpu_seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """The least CPU time of some repeats, s."""
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        work()
-        times.append(time.process_time() - begin)
-    return min(times)
 
 
 if __name__ == "__main__":

@@ -15,11 +15,12 @@ import argparse
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measured.informed import OWN_FOLDS, Case
 from benchmarks.measured.scores import WITHIN
 from benchmarks.measured.square import imported_square
 from push_predictor.evaluation.estimate import by_push, total_exact_nlpd, total_nmse
@@ -33,20 +34,9 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, empty_table
 
 PUSHES = (0, 5, 10, 20, 50)
-OWN_FOLDS = ("ellipse_plywood", "hexagon_delrin", "circle_pu")
 SQUARE_TRAINING, SQUARE_TESTS = "square_abs_train", ("square_abs_test", "square_abs_repeats")
 SEEDS = 3  # draws of training pushes for the square
 HEAD = "| pushes | windows | model | NMSE (95 %) | exact NLPD (95 %) | within 95 % (dx dy dtheta) | CPU, s |"
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """Rows to draw training pushes from, and rows to test on."""
-
-    training: PushTable
-    test: PushTable
-    rig: Rig
-    seed: int
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

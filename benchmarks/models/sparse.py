@@ -16,7 +16,10 @@ import argparse
 import os
 import resource
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +42,7 @@ from push_predictor.models.gaussian_process.vhgp import fit_vhgp
 from push_predictor.simulation.outcomes import push_outcomes
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.spec import SimulationSpec
+from push_predictor.types import Array
 
 DENSE = 1000
 HELD_OUT = 1000
@@ -90,10 +94,10 @@ def simulated(n: int, inducing: list[int]) -> None:
     )
     report(rows.first(DENSE), "VHGP", fit_vhgp)
     for m in inducing:
-        report(rows, f"sparse VHGP {m}", lambda x, y, m=m: fit_sparse_vhgp(x, y, m))
+        report(rows, f"sparse VHGP {m}", partial(fit_sparse_vhgp, most_inducing=m))
 
 
-def report(rows: Rows, name: str, fit) -> None:  # type: ignore[no-untyped-def]  # any of ours
+def report(rows: Rows, name: str, fit: Callable[[Array, Array], Any]) -> None:
     """Train, predict, print."""
     cpu, wall = time.process_time(), time.perf_counter()
     models = [fit(rows.inputs, column) for column in rows.outputs.T]

@@ -24,7 +24,7 @@ from push_predictor.models.mechanics.limit_surfaces.point_friction import load_o
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.sweep import swept
-from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS, MechanicsParameter
 from push_predictor.models.mechanics.pressure import PressureDistribution, patch
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array, IntArray
@@ -213,7 +213,7 @@ def test_rejects_a_name_that_is_no_parameter() -> None:
 
 
 @pytest.mark.parametrize("parameter", [p for p in PARAMETERS if p.needs], ids=lambda p: p.name)
-def test_demands_the_covariate_that_a_parameter_needs(parameter) -> None:  # type: ignore[no-untyped-def]
+def test_demands_the_covariate_that_a_parameter_needs(parameter: MechanicsParameter) -> None:
     with pytest.raises(KeyError, match="push_heading"):
         mechanics().displacement({parameter.name: parameter.high / 2.0}, *one())
 

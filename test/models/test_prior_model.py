@@ -289,7 +289,7 @@ def test_untrained_model_is_scored_against_a_slider_at_rest(untrained: PushModel
     test = pushed(30, 12)
     found = metrics_json(compare(untrained, test))
     rest = np.sum((test.outcomes - compare(untrained, test).mean) ** 2, axis=0) / np.sum(test.outcomes**2, axis=0)
-    assert found["nmse"]["total"] == pytest.approx(rest.sum())  # type: ignore[index]
+    assert found["nmse"]["total"] == pytest.approx(rest.sum())
     assert found["n_train"] == 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,9 +53,9 @@ def test_lists_tuples_and_arrays_mean_the_same_and_scalars_apply_to_all(
         ((0.02, 0.1, 0.3, 0.2, {"dwell_time": np.nan}), "covariate dwell_time: nan is not accepted"),
     ],
 )
-def test_rejects_invalid_push_by_field_and_value(arguments: tuple[object, ...], message: str):
+def test_rejects_invalid_push_by_field_and_value(arguments: tuple[Any, ...], message: str):
     with pytest.raises(RequestError, match=message):
-        Pushes(*arguments)  # type: ignore[arg-type]
+        Pushes(*arguments)
 
 
 def test_the_repr_states_count_and_ranges():

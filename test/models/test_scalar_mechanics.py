@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 from supports import FOUR_POINTS, THREE_POINTS
@@ -54,7 +56,9 @@ def computed_as_arrays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     calls: list[int] = []
     plain = FittedMechanics.displacement
 
-    def counted(self, inputs, duration, covariates=None):  # type: ignore[no-untyped-def]
+    def counted(
+        self: FittedMechanics, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
+    ) -> Array:
         calls.append(len(inputs))
         return plain(self, inputs, duration, covariates)
 

@@ -8,15 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanics.fitted import RECORDING, FittedMechanics
+from push_predictor.models.mechanics.fitted import RECORDING
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameter_draws import displacements
 from push_predictor.models.mechanics.process_noise import ProcessNoise
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.predictor import Moments, Shift
-from push_predictor.models.predictors.without_effects import WithoutEffects
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.models.predictors.of_mechanics import OfFittedMechanics
+from push_predictor.models.predictors.predictor import Moments
+from push_predictor.types import Array, BoolArray
 
 ACCURACY = 0.01  # of a draw's displacement: moves means by less than 0.3 % of a standard deviation, in half the time
 FASTEST = 0.15  # m/s: beyond it inertia, which the draws lack, changes the motion by more than the noise
@@ -24,46 +23,15 @@ STEEPEST = 1.4  # rad: in a grazing push the tip soon leaves the slider, or miss
 
 
 @dataclass(frozen=True, eq=False)
-class PriorPredictor(WithoutEffects):
+class PriorPredictor(OfFittedMechanics):
     """The moments of the mechanics' answers under draws of their parameters, and process noise.
 
     fitted: the most probable parameters. draws (k, p): of these, in the order of `fitted.values`. All of them are known
     before the first push, from priors; pushes narrow the draws.
     """
 
-    fitted: FittedMechanics
     draws: Array
     noise: ProcessNoise
-
-    @cached_property
-    def physics(self) -> AnalyticalPush:
-        """See Predictor: the nearest ellipsoidal model."""
-        return self.fitted.ellipsoid()
-
-    @property
-    def learnt(self) -> bool:
-        """See Predictor."""
-        return False
-
-    @property
-    def gaussian(self) -> bool:
-        """See BasePredictor."""
-        return True
-
-    @property
-    def integrates(self) -> bool:
-        """See Predictor."""
-        return True
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See Predictor."""
-        return self.fitted.needs
-
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """See Predictor."""
-        return self.fitted.needs
 
     def in_own_domain(self, inputs: Array) -> BoolArray:
         """See Predictor: pushes all around the slider, at the speeds and angles for which the priors are meant."""
@@ -81,22 +49,6 @@ class PriorPredictor(WithoutEffects):
         away = drawn - mean[:, None]
         of_parameters = np.einsum("nka,nkb->nab", away, away) / len(self.draws)
         return Moments(mean, of_parameters + noise, noise)
-
-    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
-        """See Predictor: the same as `moments`, since no function of the inputs was fitted to the rows."""
-        return self.moments(rows)
-
-    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
-        """See Predictor: None, the predictive is taken for a Gaussian."""
-        return None
-
-    def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
-        """See BasePredictor: None, the predictive is taken for a Gaussian."""
-        return None
-
-    def with_independent_outputs(self) -> PriorPredictor:
-        """See Predictor: itself."""
-        return self
 
     def with_scalar_mechanics(self) -> PriorPredictor:
         """See Predictor: itself."""

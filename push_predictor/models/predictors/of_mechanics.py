@@ -1,0 +1,77 @@
+"""The part of the predictor protocol that predictors share whose mean is mechanics alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors.predictor import Moments, Shift
+from push_predictor.models.predictors.without_effects import WithoutEffects
+from push_predictor.types import Array, IntArray
+
+Self = TypeVar("Self")
+
+
+class OfMechanics(WithoutEffects):
+    """A predictor without a learnt function of its inputs, whose predictive is taken for a Gaussian."""
+
+    @property
+    def learnt(self) -> bool:
+        """See Predictor."""
+        return False
+
+    @property
+    def gaussian(self) -> bool:
+        """See BasePredictor."""
+        return True
+
+    @property
+    def integrates(self) -> bool:
+        """See Predictor."""
+        return True
+
+    def moments(self, push: Push) -> Moments:
+        """See Predictor."""
+        raise NotImplementedError
+
+    def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
+        """See Predictor: the same as `moments`, since no function of the inputs was fitted to the rows."""
+        return self.moments(rows)
+
+    def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
+        """See Predictor: None, the predictive is taken for a Gaussian."""
+        return None
+
+    def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
+        """See BasePredictor: None, the predictive is taken for a Gaussian."""
+        return None
+
+    def with_independent_outputs(self: Self) -> Self:
+        """See Predictor: itself."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class OfFittedMechanics(OfMechanics):
+    """A predictor by mechanics with fitted parameters."""
+
+    fitted: FittedMechanics
+
+    @cached_property
+    def physics(self) -> AnalyticalPush:
+        """See Predictor: the nearest ellipsoidal model."""
+        return self.fitted.ellipsoid()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See Predictor."""
+        return self.fitted.needs
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """See Predictor: those that the parameters depend on."""
+        return self.fitted.needs
