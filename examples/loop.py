@@ -12,10 +12,10 @@ import shutil
 import textwrap
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import rclpy
 from rclpy.action import ActionClient
@@ -80,8 +80,9 @@ class Operator:
         if not self._trace.wait_for_server(PATIENCE):
             raise SystemExit(f"no action server trace_residual within {PATIENCE:.0f} s")
         goal = TraceResidual.Goal(model=model, output=str(output))
-        handle = _answer(self._trace.send_goal_async(goal, feedback_callback=self._progress), PATIENCE)
-        result = _answer(handle.get_result_async(), TRACE_PATIENCE).result
+        sent = self._in_spin(lambda: self._trace.send_goal_async(goal, feedback_callback=self._progress))
+        handle = _answer(sent, PATIENCE)
+        result = _answer(self._in_spin(handle.get_result_async), TRACE_PATIENCE).result
         if not result.success:
             raise SystemExit(f"trace_residual: {result.message}")
         extended = Path(result.extended_model) if result.extended_model else None
@@ -95,6 +96,10 @@ class Operator:
         if not response.success:
             raise SystemExit(f"load_model: {response.message}")
         return str(response.message)
+
+    def _in_spin(self, request: Callable[[], Future]) -> Future:
+        """Send a request in the thread that spins: from another one, rclpy's action client loses an early answer."""
+        return cast(Future, _answer(self._executor.create_task(request), PATIENCE))
 
     def _receive(self, message: PushAlarm) -> None:
         if self._listens and self.alarm is None:

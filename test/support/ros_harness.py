@@ -167,6 +167,17 @@ def wait_until(condition: Callable[[], bool], timeout: float = START_TIMEOUT) ->
     return True
 
 
+def in_spin(node: Node, function: Callable[[], Any]) -> Any:
+    """`function()` in the thread that spins `node`.
+
+    rclpy's action client notes a request after it has sent it: from another thread an early answer is lost.
+    """
+    assert node.executor
+    task = node.executor.create_task(function)
+    assert wait_until(task.done)
+    return task.result()
+
+
 def acquaint(node: Node, server: str, timeout: float = START_TIMEOUT) -> None:
     """Wait until the node named `server` knows every subscription and client that `node` has made so far.
 

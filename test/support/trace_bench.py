@@ -61,7 +61,8 @@ class Server:
         self.predict = node.create_client(PredictPush, "predict_push")  # last: once answered, the others are known too
 
     def trace(self, output: Path | str, covariates: list[str] = DRIVERS, model: str = "") -> Goal:
-        return Goal(self._action, TraceResidual.Goal(model=model, covariates=covariates, output=str(output)))
+        goal = TraceResidual.Goal(model=model, covariates=covariates, output=str(output))
+        return Goal(self.node, self._action, goal)
 
     def push(self, covariates: dict[str, float] | None = None, model: str = "") -> PredictPush.Response:
         """A push that slides along the side, so that contact friction matters."""
@@ -84,14 +85,17 @@ class Server:
 class Goal:
     """A goal that was accepted: its feedback so far, its status and result."""
 
-    def __init__(self, action: ActionClient, goal: TraceResidual.Goal) -> None:
+    def __init__(self, node: Node, action: ActionClient, goal: TraceResidual.Goal) -> None:
         assert action.wait_for_server(harness.START_TIMEOUT)
         self.stages: list[tuple[str, float]] = []
-        sent = action.send_goal_async(goal, lambda m: self.stages.append((m.feedback.stage, m.feedback.progress)))
+        sent = harness.in_spin(node, lambda: action.send_goal_async(goal, self._feedback))
         assert harness.wait_until(sent.done, PATIENCE)
         self.handle: Any = sent.result()
         assert self.handle.accepted
-        self._result = self.handle.get_result_async()
+        self._result = harness.in_spin(node, self.handle.get_result_async)
+
+    def _feedback(self, message: Any) -> None:
+        self.stages.append((message.feedback.stage, message.feedback.progress))
 
     @property
     def ended(self) -> bool:
