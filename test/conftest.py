@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
+from collections.abc import Generator
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +26,17 @@ MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
 NEEDS_ROS = re.compile(
     r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
 )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Spare the garbage collector the modules and tests collected: all of them stay until the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

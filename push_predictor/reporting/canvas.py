@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 160
+LAYOUTS = 2  # the first moves colour bars, which changes their ticks: the second fits
 UNITS = (1e3, 1e3, 180.0 / np.pi)  # factors from m, m, rad to mm, mm, deg
 UNIT_NAMES = ("mm", "mm", "deg")
 SYMBOLS = (r"$\Delta x$", r"$\Delta y$", r"$\Delta\theta$")
@@ -70,12 +71,21 @@ def draw(path: Path, size: tuple[float, float], paint: Callable[[Figure], None])
     image = io.BytesIO()
     with rc_context(STYLE):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+        canvas = FigureCanvasAgg(figure)
         paint(figure)
-        figure.draw_without_rendering()  # the layout moves colour bars, which changes their ticks: a second layout fits
-        figure.savefig(image, format="png")
+        _lay_out(figure)
+        canvas.print_png(image)
     write_whole(path, image.getvalue())
     return path
+
+
+def _lay_out(figure: Figure) -> None:
+    """Fix the positions of the axes. `savefig` would draw the whole figure once more for each layout."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        for _ in range(LAYOUTS):
+            engine.execute(figure)
+        figure.set_layout_engine("none")
 
 
 def output_label(index: int) -> str:

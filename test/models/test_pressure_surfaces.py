@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -28,11 +30,15 @@ SUPPORTS = {
     "three points": THREE_POINTS,
     "four points": FOUR_POINTS,
 }
-MAPS = {name: load_map(support) for name, support in SUPPORTS.items()}
 EVERY_SUPPORT = pytest.mark.parametrize("name", SUPPORTS)
 twists = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).filter(
     lambda t: np.linalg.norm(t) > 0.1
 )
+
+
+@cache
+def map_of(name: str) -> LoadMap:
+    return load_map(SUPPORTS[name])
 
 
 def about_centre(support: PressureDistribution) -> PressureDistribution:
@@ -94,7 +100,7 @@ def test_even_disc_has_the_load_of_the_integral_over_its_area(distance: float) -
 
 @pytest.mark.parametrize("distance", [0.4, 0.8, 1.2, 2.0, 5.0])
 def test_table_of_an_even_disc_inverts_the_integral_over_its_area(distance: float) -> None:
-    disc = MAPS["disc"]
+    disc = map_of("disc")
     force, moment = disc_load(distance * RADIUS)
     load = np.array([[0.0, force, moment / disc.length]])
     twist = tabulated(disc, load)
@@ -104,7 +110,7 @@ def test_table_of_an_even_disc_inverts_the_integral_over_its_area(distance: floa
 
 @EVERY_SUPPORT
 def test_tabulated_twist_has_the_load_it_was_asked_for(name: str) -> None:
-    support, surface = about_centre(SUPPORTS[name]), MAPS[name]
+    support, surface = about_centre(SUPPORTS[name]), map_of(name)
     load = directions(400)
     twist = tabulated(surface, load)
     spun = PressureDistribution(support.points, support.shares, max(support.spread, 3e-3 * surface.length))
@@ -117,7 +123,7 @@ def test_tabulated_twist_has_the_load_it_was_asked_for(name: str) -> None:
 
 @EVERY_SUPPORT
 def test_gauge_is_one_on_the_limit_surface(name: str) -> None:
-    support, surface = about_centre(SUPPORTS[name]), MAPS[name]
+    support, surface = about_centre(SUPPORTS[name]), map_of(name)
     twist = directions(500, 1)
     load = load_of_twist(support, twist / [1.0, 1.0, surface.length]) / [1.0, 1.0, surface.length]
     assert surface.gauge(*load.T) == pytest.approx(1.0, abs=0.01)
@@ -127,15 +133,15 @@ def test_gauge_is_one_on_the_limit_surface(name: str) -> None:
 @EVERY_SUPPORT
 def test_friction_dissipates_and_opposite_loads_drive_opposite_twists(name: str) -> None:
     load = directions(500, 2)
-    twist = tabulated(MAPS[name], load)
+    twist = tabulated(map_of(name), load)
     assert np.all(np.sum(twist * load, axis=1) > 0.0)
-    assert tabulated(MAPS[name], -load) == pytest.approx(-twist, abs=1e-9)
-    assert tabulated(MAPS[name], 2.0 * load) == pytest.approx(2.0 * twist, abs=1e-9)
+    assert tabulated(map_of(name), -load) == pytest.approx(-twist, abs=1e-9)
+    assert tabulated(map_of(name), 2.0 * load) == pytest.approx(2.0 * twist, abs=1e-9)
 
 
 @EVERY_SUPPORT
 def test_pure_forces_and_moments_have_unit_size(name: str) -> None:
-    surface, zero, one = MAPS[name], np.zeros(1), np.ones(1)
+    surface, zero, one = map_of(name), np.zeros(1), np.ones(1)
     assert surface.gauge(one, zero, zero)[0] == pytest.approx(1.0, abs=1e-4)
     assert surface.gauge(zero, one, zero)[0] == pytest.approx(1.0, abs=1e-4)
     assert surface.gauge(zero, zero, one)[0] == pytest.approx(1.0, abs=5e-3)
@@ -184,7 +190,7 @@ def test_power_surface_moves_along_the_gradient_of_its_gauge(power: float) -> No
 def test_ellipsoid_is_near_an_even_patch_and_far_from_three_points() -> None:
     load = directions(2000, 4)
     ellipsoid = tabulated(PowerSurface(np.zeros(2), 1.0), load)
-    even, three = (angle_between(tabulated(MAPS[name], load), ellipsoid) for name in ("square", "three points"))
+    even, three = (angle_between(tabulated(map_of(name), load), ellipsoid) for name in ("square", "three points"))
     assert np.mean(even) < 0.09
     assert np.max(even) < 0.2
     assert np.mean(three) > 2.0 * np.mean(even)
@@ -222,11 +228,11 @@ def test_pressure_of_a_disc_follows_its_exponent() -> None:
 
 
 def test_mean_squares_and_reach_are_those_of_the_points() -> None:
-    surface, about = MAPS["three points"], about_centre(THREE_POINTS)
+    surface, about = map_of("three points"), about_centre(THREE_POINTS)
     x, y = about.points.T
     assert surface.square == pytest.approx([about.shares @ (x * x), about.shares @ (x * y), about.shares @ (y * y)])
-    assert MAPS["square"].square == pytest.approx([0.09**2 / 12.0, 0.0, 0.09**2 / 12.0], rel=0.01, abs=1e-7)
-    assert MAPS["square"].reach.sum() == pytest.approx(1.0)
+    assert map_of("square").square == pytest.approx([0.09**2 / 12.0, 0.0, 0.09**2 / 12.0], rel=0.01, abs=1e-7)
+    assert map_of("square").reach.sum() == pytest.approx(1.0)
     line = spread_by_direction(np.array([[0.0, -0.02], [0.0, 0.01]]), np.array([0.5, 0.5]))
     assert np.flatnonzero(line).tolist() == [DIRECTIONS // 2]
     turn = 0.25 * np.pi / DIRECTIONS  # a quarter of the way from the first direction to the second
@@ -235,7 +241,7 @@ def test_mean_squares_and_reach_are_those_of_the_points() -> None:
 
 
 def test_blend_of_two_tables_lies_between_them() -> None:
-    low, high = MAPS["square"], MAPS["rim"]
+    low, high = map_of("square"), map_of("rim")
     share = np.array([0.0, 0.25, 1.0])
     rows = row_surfaces([low, high], np.zeros(3, dtype=np.int64), np.ones(3, dtype=np.int64), share)
     load = np.tile(directions(1, 5), (3, 1))
