@@ -145,6 +145,12 @@ class Outline:
         return np.roll(self.vertices, -1, axis=0)
 
     @cached_property
+    def _edges(self) -> tuple[Array, Array]:
+        """Edges (V, 2) as vectors in m, and their squared lengths (V,)."""
+        along = self._ends - self.vertices
+        return along, np.asarray(np.sum(along**2, axis=1))
+
+    @cached_property
     def _edge_normals(self) -> Array:
         along = self._ends - self.vertices
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -164,8 +170,7 @@ class Outline:
         return bool(np.allclose(image, np.roll(self.vertices, -(len(image) // order), axis=0), atol=SAME_LENGTH))
 
     def _project_polygon(self, points: Array) -> Projection:
-        along = self._ends - self.vertices
-        squared = np.sum(along**2, axis=1)
+        along, squared = self._edges
         offset = points[:, None, :] - self.vertices[None]
         fraction = np.clip(np.einsum("nej,ej->ne", offset, along) / squared, 0.0, 1.0)
         away = offset - fraction[..., None] * along
@@ -183,10 +188,10 @@ class Outline:
 
     def _contains(self, points: Array) -> BoolArray:
         x, y = points[:, :1], points[:, 1:]
-        (x0, y0), (x1, y1) = self.vertices.T, self._ends.T
-        crosses = (y0 > y) != (y1 > y)
-        rise = np.where(y1 == y0, 1.0, y1 - y0)
-        return np.asarray(np.sum(crosses & (x < x0 + (y - y0) * (x1 - x0) / rise), axis=1) % 2 == 1)
+        (x0, y0), (along, rise) = self.vertices.T, self._edges[0].T
+        crosses = (y0 > y) != (self._ends[:, 1] > y)
+        right_of = x < x0 + (y - y0) * along / np.where(rise == 0.0, 1.0, rise)
+        return np.asarray(np.sum(crosses & right_of, axis=1) % 2 == 1)
 
     # --- circles and ellipses -----------------------------------------------------------------------------------
 

@@ -50,9 +50,12 @@ class _Drag:
     i: Array
 
     def solve(self, b: Array) -> Array:
-        """A^-1 b for b (n, 3)."""
-        turn = (b[:, 2] - (self.e * b[:, 0] + self.f * b[:, 1]) / self.a) / (self.i - (self.e**2 + self.f**2) / self.a)
-        return np.stack([(b[:, 0] - self.e * turn) / self.a, (b[:, 1] - self.f * turn) / self.a, turn], axis=1)
+        """A^-1 b for b (..., n, 3)."""
+        x, y, solution = b[..., 0], b[..., 1], np.empty_like(b)
+        turn = (b[..., 2] - (self.e * x + self.f * y) / self.a) / (self.i - (self.e**2 + self.f**2) / self.a)
+        solution[..., 0], solution[..., 1] = (x - self.e * turn) / self.a, (y - self.f * turn) / self.a
+        solution[..., 2] = turn
+        return solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +65,23 @@ class _DirectedDrag:
     matrix: Array
 
     def solve(self, b: Array) -> Array:
-        """A^-1 b for b (n, 3)."""
-        return np.asarray(np.linalg.solve(self.matrix, b[:, :, None])[:, :, 0])
+        """A^-1 b for b (..., n, 3)."""
+        return np.asarray(np.linalg.solve(self.matrix, b[..., None])[..., 0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Contact:
     """Contact geometry of a step.
 
-    normal, tangent (n, 3): rows of the Jacobian; gap (n,) m; drive_normal, drive_tangent (n,) m/s: the tip's velocity
-    along them; outward (n, 2): the outward normal in the world; fraction (n,): contact as a fraction of the perimeter.
+    normal, tangent (n, 3): rows of the Jacobian; restore (n,) m/s: the speed with which spring and damper close the
+    gap, compliance (n,) 1/kg; drive_normal, drive_tangent (n,) m/s: the tip's velocity along the rows; outward (n, 2):
+    the outward normal in the world; fraction (n,): contact as a fraction of the perimeter.
     """
 
     normal: Array
     tangent: Array
-    gap: Array
+    restore: Array
+    compliance: Array
     drive_normal: Array
     drive_tangent: Array
     outward: Array
@@ -104,37 +109,38 @@ def run(
     """
     dt = steps_of(path) if time_step is None else time_step
     pose, speed = start.copy(), np.zeros_like(start) if velocity is None else velocity.copy()
-    tip, wrench = path.position(np.zeros_like(dt)), np.zeros_like(start)
-    rows = [(pose, tip, wrench)]
-    for step in range(1, int(np.ceil(np.max(duration / dt))) + 1):
-        ahead = path.position(step * dt)
-        travelled = np.hypot(*(tip - path.start).T)
-        speed, wrench = _advance(physics, pose, speed, tip, travelled, (ahead - tip) / dt[:, None], dt)
-        pose, tip = pose + dt[:, None] * speed, ahead
-        rows.append((pose, tip, wrench))
-    time = dt[:, None] * np.arange(len(rows))
-    return Motion(time, *(np.stack(column, axis=1) for column in zip(*rows, strict=True)))
+    steps = np.arange(int(np.ceil(np.max(duration / dt))) + 1)
+    tip = path.position(steps[:, None] * dt)
+    travelled, drive = np.hypot(*np.moveaxis(tip - path.start, -1, 0)), np.diff(tip, axis=0) / dt[:, None]
+    poses, wrenches = [pose], [np.zeros_like(start)]
+    for here, far, ahead in zip(tip, travelled, drive, strict=False):  # the last tip has no step ahead
+        speed, wrench = _advance(physics, pose, speed, here, far, ahead, dt)
+        pose = pose + dt[:, None] * speed
+        poses.append(pose)
+        wrenches.append(wrench)
+    motion = np.stack(poses, axis=1), np.ascontiguousarray(tip.swapaxes(0, 1)), np.stack(wrenches, axis=1)
+    return Motion(dt[:, None] * steps, *motion)
 
 
 def _advance(
     physics: Physics, pose: Array, velocity: Array, tip: Array, travelled: Array, drive: Array, dt: Array
 ) -> tuple[Array, Array]:
     """New velocities (n, 3) and the wrench on the tip (n, 3) after a step with the tip at velocity drive (n, 2)."""
-    contact = _contact(physics, pose, tip, drive)
+    contact = _contact(physics, pose, tip, drive, dt)
     arms = _arms(physics.support, pose[:, 2])
     points = pose[:, :1] + arms[0], pose[:, 1:2] + arms[1]
     acting = physics.acting(pose, velocity, contact.fraction, travelled, points)
-    momentum = velocity * np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
+    momentum = velocity * physics.inertias
     if acting.pull is not None:
         momentum = momentum + dt[:, None] * acting.pull
     drag_of = _drag if acting.grain is None and acting.viscosity is None else _directed_drag
-    new = velocity
+    new, loads, wrench = velocity, np.stack([momentum, contact.normal, contact.tangent]), np.empty_like(momentum)
     for _ in range(DRAG_ITERATIONS):
         drag = drag_of(physics, acting, arms, new, dt)
-        new, push, rub = _with_contact(drag, momentum, contact, acting.friction, dt)
-    across = np.stack([-contact.outward[:, 1], contact.outward[:, 0]], axis=1)
-    force = (push[:, None] * contact.outward - rub[:, None] * across) / dt[:, None]
-    return new, np.column_stack([force, physics.radius * rub / dt])
+        new, push, rub = _with_contact(drag.solve(loads), contact, acting.friction)
+    x, y = contact.outward.T
+    wrench[:, 0], wrench[:, 1], wrench[:, 2] = push * x + rub * y, push * y - rub * x, physics.radius * rub
+    return new, wrench / dt[:, None]
 
 
 def _arms(support: Array, heading: Array) -> tuple[Array, Array]:
@@ -148,11 +154,11 @@ def _drag(physics: Physics, acting: ActingForces, arms: tuple[Array, Array], vel
     vy = velocity[:, 1:2] + velocity[:, 2:] * x
     rate = acting.grip / np.sqrt(vx * vx + vy * vy + REST_SPEED**2)
     along_x, along_y = rate * x, rate * y
-    turn = np.sum(along_x * x + along_y * y, axis=1)
+    turn = (along_x * x + along_y * y).sum(axis=1)
     return _Drag(
-        physics.mass + dt * np.sum(rate, axis=1),
-        -dt * np.sum(along_y, axis=1),
-        dt * np.sum(along_x, axis=1),
+        physics.mass + dt * rate.sum(axis=1),
+        -dt * along_y.sum(axis=1),
+        dt * along_x.sum(axis=1),
         physics.inertia + dt * turn,
     )
 
@@ -172,8 +178,7 @@ def _directed_drag(
     ex, ey = pxy * x - pxx * y, pyy * x - pxy * y
     upper = [pxx, pxy, ex, pxy, pyy, ey, ex, ey, ey * x - ex * y]
     resistance = np.stack([np.sum(element, axis=1) for element in upper], axis=1).reshape(-1, 3, 3)
-    inertia = np.stack([physics.mass, physics.mass, physics.inertia], axis=1)
-    return _DirectedDrag(dt[:, None, None] * resistance + inertia[:, :, None] * np.eye(3))
+    return _DirectedDrag(dt[:, None, None] * resistance + physics.inertias[:, :, None] * np.eye(3))
 
 
 def _inverse(grain: Array | None, n: int) -> tuple[Array, Array, Array]:
@@ -185,14 +190,16 @@ def _inverse(grain: Array | None, n: int) -> tuple[Array, Array, Array]:
     return (1.0 - a) / determinant, -b / determinant, (1.0 + a) / determinant
 
 
-def _contact(physics: Physics, pose: Array, tip: Array, drive: Array) -> _Contact:
+def _contact(physics: Physics, pose: Array, tip: Array, drive: Array, dt: Array) -> _Contact:
     nearest = physics.outline.project(to_body(tip, pose))
     outward, arm = rotate(nearest.normal, pose[:, 2]), rotate(nearest.point, pose[:, 2])
-    nx, ny, x, y = outward[:, 0], outward[:, 1], arm[:, 0], arm[:, 1]
+    (nx, ny), (x, y) = outward.T, arm.T
+    gap, stiff = nearest.distance - physics.radius, STIFFNESS * dt + DAMPING
     return _Contact(
         normal=np.stack([nx, ny, x * ny - y * nx], axis=1),
         tangent=np.stack([-ny, nx, x * nx + y * ny], axis=1),
-        gap=nearest.distance - physics.radius,
+        restore=-gap * np.where(gap > 0.0, 1.0 / dt, STIFFNESS / stiff),
+        compliance=1.0 / (dt * stiff),
         drive_normal=drive[:, 0] * nx + drive[:, 1] * ny,
         drive_tangent=drive[:, 1] * nx - drive[:, 0] * ny,
         outward=outward,
@@ -200,23 +207,19 @@ def _contact(physics: Physics, pose: Array, tip: Array, drive: Array) -> _Contac
     )
 
 
-def _with_contact(
-    drag: _Drag | _DirectedDrag, momentum: Array, contact: _Contact, friction: Array, dt: Array
-) -> tuple[Array, Array, Array]:
+def _with_contact(solved: Array, contact: _Contact, friction: Array) -> tuple[Array, Array, Array]:
     """Velocities (n, 3) and the contact's impulses: push (n,) >= 0 along -normal and rub (n,) along the tangent.
 
+    solved (3, n, 3): A^-1 of momentum, normal and tangent.
     A sticking contact solves (Gnn + C) push - Gnt rub = r, Gtt rub - Gnt push = s, where G is the inverse inertia at
     the contact and C the compliance of the implicit spring-damper. A sliding contact has rub = +-friction push.
     """
-    free, back_n, back_t = drag.solve(momentum), drag.solve(contact.normal), drag.solve(contact.tangent)
-    gnn = np.sum(contact.normal * back_n, axis=1) + 1.0 / (dt * (STIFFNESS * dt + DAMPING))
-    gnt = np.sum(contact.normal * back_t, axis=1)
-    gtt = np.sum(contact.tangent * back_t, axis=1)
-    spring = STIFFNESS / (STIFFNESS * dt + DAMPING)
-    restore = -contact.gap * np.where(contact.gap > 0.0, 1.0 / dt, spring)
-    r = restore - (contact.drive_normal - np.sum(contact.normal * free, axis=1))
-    s = contact.drive_tangent - np.sum(contact.tangent * free, axis=1)
-    push, rub = _impulses(gnn, gnt, gtt, r, s, friction)
+    free, back_n, back_t = solved
+    normal_speed, gnn, gnt = (contact.normal * solved).sum(axis=-1)
+    tangent_speed, _, gtt = (contact.tangent * solved).sum(axis=-1)
+    r = contact.restore - (contact.drive_normal - normal_speed)
+    s = contact.drive_tangent - tangent_speed
+    push, rub = _impulses(gnn + contact.compliance, gnt, gtt, r, s, friction)
     return free - push[:, None] * back_n + rub[:, None] * back_t, push, rub
 
 

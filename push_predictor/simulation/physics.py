@@ -6,6 +6,7 @@ All are explicit per push. They change with the position on the table and with t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -54,6 +55,11 @@ class Physics:
     contact_noise: PushNoise
     changes: Changes = PLAIN
     conditions: Conditions = field(default_factory=lambda: Conditions(np.zeros(0, dtype=np.int64)))
+
+    @cached_property
+    def inertias(self) -> Array:
+        """Mass (twice) and moment of inertia (n, 3) of each slider."""
+        return np.stack([self.mass, self.mass, self.inertia], axis=1)
 
     def grip(self, x: Array, y: Array, travelled: Array) -> Array:
         """Coulomb friction (n, k) in N at support points x, y (n, k) m, after the tips travelled (n,) m."""

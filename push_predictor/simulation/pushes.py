@@ -105,11 +105,11 @@ class PusherPath:
         return self.push_time + HOLD + ramp_time(np.array(RETRACT), np.array(RETRACT_SPEED), self.acceleration)
 
     def position(self, time: Array) -> Array:
-        """Tip centres (n, 2) in m, time (n,) s after the start."""
+        """Tip centres (..., n, 2) in m, time (..., n) s after the start."""
         out = ramp_distance(time, self.length, self.speed, self.acceleration)
         later = time - self.push_time - HOLD
         back = ramp_distance(later, np.array(RETRACT), np.array(RETRACT_SPEED), self.acceleration)
-        return self.start + (out - back)[:, None] * self.direction
+        return np.asarray(self.start + (out - back)[..., None] * self.direction)
 
     def take(self, rows: np.ndarray) -> PusherPath:
         """The given rows."""

@@ -38,6 +38,7 @@ class PushSegmenter:
         self._pushes = 0
         self._free_force: deque[Array] = deque(maxlen=TARE_SAMPLES)
         self._resting_force: deque[Array] = deque(maxlen=TARE_SAMPLES)  # at rest near the slider, before a push
+        self._zero: tuple[Array | None, float] | None = None  # of these forces; None after a new one
         self._touching = False
         self._inside = False
         self._first_touch: int | None = None
@@ -79,8 +80,10 @@ class PushSegmenter:
             return
         if sample.height > self.options.lift or sample.gap > FREE_GAP:
             self._free_force.append(sample.force)
+            self._zero = None
         elif sample.speed < self.options.least_speed and self.push is None:
             self._resting_force.append(sample.force)
+            self._zero = None
 
     def _touches(self, sample: ContactSample) -> bool:
         if sample.height > self.options.lift:
@@ -99,17 +102,19 @@ class PushSegmenter:
         return not separates and (self._touching or sample.closing_speed <= limit)
 
     def _presses(self, force: Array | None) -> bool:
-        zero, noise = self._zero()
+        zero, noise = self._tare()
         if force is None or zero is None:
             return False
         return float(np.hypot(*(force - zero))) > max(self.options.least_force, NOISE_FACTOR * noise)
 
-    def _zero(self) -> tuple[Array | None, float]:
+    def _tare(self) -> tuple[Array | None, float]:
         """Mean force and its noise (N) in free motion; before any, at rest near the slider; else None."""
-        if not (forces := self._free_force or self._resting_force):
-            return None, 0.0
-        readings = np.array(forces)
-        return readings.mean(axis=0), float(np.hypot(*readings.std(axis=0)))
+        if self._zero is None:
+            readings = np.array(self._free_force or self._resting_force)
+            known = len(readings) > 0
+            noise = float(np.hypot(*readings.std(axis=0))) if known else 0.0
+            self._zero = readings.mean(axis=0) if known else None, noise
+        return self._zero
 
     def _pushing(self, sample: ContactSample) -> list[tuple[int, int]]:
         if self.push is None or self._idle > self.options.push_pause:
@@ -140,7 +145,7 @@ class PushSegmenter:
         if self.push is not None and first == self.push.first_touch:
             first = sample.stamp  # the pusher rested in contact; this push begins with its motion
         dwell = (first - self._last_contact) * NANOSECOND if self._last_contact is not None else 0.0
-        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._zero()[0], None, 0)
+        self.push = PushContext(_push_id(first), self._pushes, first, max(dwell, 0.0), self._tare()[0], None, 0)
         self._pushes += 1
         self._start = None
 
