@@ -22,8 +22,8 @@ VERDICTS = {"holds", "holds in part", "does not hold", "not decided"}
 
 
 SMALL = replace(
-    QUICK, speeds=(0.02, 0.05, 0.1), pushes=60, reference_pushes=80, sizes=(20, 100), contacts=3, angle_step=0.75,
-    repetitions=12, other_repetitions=12, speed_pushes=10, informed=False,
+    QUICK, speeds=(0.02, 0.05, 0.1), pushes=50, reference_pushes=70, sizes=(20, 100), contacts=3, angle_step=0.75,
+    repetitions=12, other_repetitions=12, speed_pushes=6, informed=False,
 )  # fmt: skip
 
 
