@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.optimize import nnls
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.normal_scores import normal_scores
@@ -112,6 +111,8 @@ def _pairs(table: PushTable) -> tuple[IntArray, IntArray, int]:
 
 def _fit(apart: Array, products: Array) -> tuple[float, float, float]:
     """Persistent and decaying fraction and decay length with the least squared error to products (k,)."""
+    from scipy.optimize import nnls  # its import would take every predict_server 0.2 s at the start
+
     fits = []
     for length in LENGTHS.tolist():
         decay = np.exp(-apart / length)

@@ -124,8 +124,9 @@ def node_process(
 def node_environment(domain: int) -> dict[str, str]:
     """The environment of a node under test: its domain, this machine only, this repository's packages."""
     environment = dict(os.environ)
-    # If inherited, it would keep the Python of another environment from setting its library path.
-    environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+    # A Python with its library path starts once; without it, ROS makes it start again, unless this variable is set.
+    if str(Path(sys.prefix, "lib")) not in environment.get("LD_LIBRARY_PATH", "").split(os.pathsep):
+        environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
     environment.update(
         ROS_DOMAIN_ID=str(domain),
         ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from push_predictor.models.gaussian_process.gp import check_rows
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
@@ -73,6 +72,7 @@ def fit_constant(inputs: Array, outputs: Array, *, heavy_tails: bool, observed: 
     gaussian = float(np.log(np.mean(observed**2) + _SMALLEST_VARIANCE))
     if not heavy_tails:
         return ConstantNoise(inputs, outputs, ConstantParameters(gaussian, 0.0))
+    from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
 
     def cost(vector: Array) -> float:
         spread = min(float(np.exp(vector[1])), _WIDEST)

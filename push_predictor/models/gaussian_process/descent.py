@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from push_predictor.types import Array, IntArray
 
@@ -37,6 +36,8 @@ class Descent:
 
     def run(self, cost: Cost, first: Array) -> Minimum:
         """The local minimum reached from a point of the box."""
+        from scipy.optimize import minimize  # its import would take every node 0.2 s at the start
+
         options = {"maxiter": self.most_iterations, "ftol": self.stop}
         found = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=self.box, options=options)
         return Minimum(found.x, np.sqrt(np.diagonal(found.hess_inv.todense())))

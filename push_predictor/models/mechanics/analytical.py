@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from push_predictor.errors import RequestError, RigError, TrainingError
 from push_predictor.geometry.outline import Outline
@@ -73,6 +72,8 @@ def fit_analytical(model: AnalyticalPush, inputs: Array, duration: Array, outcom
     outline's farthest point from the centre of friction, which no pressure can exceed. Deterministic. Raises
     TrainingError for rows of different numbers, fewer than two of them, or values that are not finite.
     """
+    from scipy.optimize import least_squares  # its import would take every node 0.2 s at the start
+
     _check_rows(inputs, duration, outcomes)
     low, high = _bounds(model)
     inset = 1e-3 * (high - low)  # least_squares must start inside the bounds

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from push_predictor.models.mechanics.limit_surfaces.point_friction import power_of_twist, twist_of_load
 from push_predictor.models.mechanics.limit_surfaces.surfaces import spread_by_direction
@@ -122,6 +121,8 @@ def _refined(nodes: Array, every: int) -> Array:
     """All nodes, by cubic splines over azimuth and elevation."""
     if every == 1:
         return nodes
+    from scipy.interpolate import CubicSpline  # its import takes 0.2 s, which no start of a node needs
+
     turn = np.linspace(0.0, 1.0, nodes.shape[1])
     fine = CubicSpline(turn, nodes, axis=1, bc_type="periodic")(np.linspace(0.0, 1.0, AZIMUTHS + 1))
     around = fine[:, (np.arange(AZIMUTHS + 1) + AZIMUTHS // 2) % AZIMUTHS]
