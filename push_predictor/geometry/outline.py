@@ -172,7 +172,7 @@ class Outline:
     def _project_polygon(self, points: Array) -> Projection:
         along, squared = self._edges
         offset = points[:, None, :] - self.vertices[None]
-        fraction = np.clip(np.einsum("nej,ej->ne", offset, along) / squared, 0.0, 1.0)
+        fraction = np.minimum(np.maximum(np.einsum("nej,ej->ne", offset, along) / squared, 0.0), 1.0)
         away = offset - fraction[..., None] * along
         distance = np.einsum("nej,nej->ne", away, away)
         rows = np.arange(len(points))
@@ -191,7 +191,7 @@ class Outline:
         (x0, y0), (along, rise) = self.vertices.T, self._edges[0].T
         crosses = (y0 > y) != (self._ends[:, 1] > y)
         right_of = x < x0 + (y - y0) * along / np.where(rise == 0.0, 1.0, rise)
-        return np.asarray(np.sum(crosses & right_of, axis=1) % 2 == 1)
+        return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=1))
 
     # --- circles and ellipses -----------------------------------------------------------------------------------
 

@@ -125,14 +125,19 @@ class RowValues:
         if unknown:
             raise KeyError(f"{sorted(unknown)[0]!r} is no parameter of the mechanics: {', '.join(BY_NAME)}")
         self.n, self.covariates, self._values = n, covariates, values
+        self._active = {name for name, value in values.items() if np.any(np.asarray(value) != 0.0)}
+        self._rows: dict[str, Array] = {}  # asked for at every step of an integration
 
     def of(self, name: str) -> Array:
         """(n,) of a parameter."""
-        return np.broadcast_to(np.asarray(self._values.get(name, BY_NAME[name].textbook), dtype=np.float64), self.n)
+        if name not in self._rows:
+            value = np.asarray(self._values.get(name, BY_NAME[name].textbook), dtype=np.float64)
+            self._rows[name] = np.broadcast_to(value, self.n)
+        return self._rows[name]
 
     def active(self, *names: str) -> bool:
         """Whether any of these differs from zero."""
-        return any(np.any(np.asarray(self._values.get(name, 0.0)) != 0.0) for name in names)
+        return not self._active.isdisjoint(names)
 
     def pair(self, first: str, second: str) -> Array:
         """(n, 2) of two parameters."""

@@ -26,5 +26,8 @@ def friction_cone(values: RowValues, rows: IntArray, touch: Touch, speed: Array,
         friction = friction + values.of("friction_by_speed")[rows] * np.log(tangential / REFERENCE_SPEED)
     if values.active("friction_by_load"):
         friction = friction - values.of("friction_by_load")[rows] * np.log(gauge)
+    if not values.active("friction_difference"):
+        edge = np.arctan(np.maximum(friction, 0.0))
+        return edge, edge
     difference = values.of("friction_difference")[rows]
     return np.arctan(np.maximum(friction + difference, 0.0)), np.arctan(np.maximum(friction - difference, 0.0))
