@@ -233,7 +233,7 @@ def test_the_index_in_the_error_counts_all_pushes_also_where_durations_differ(mo
 
 @pytest.mark.slow
 def test_windows_are_found_from_the_recorded_rig_end_to_end_or_overlapping():
-    recording = read_recording(str(TEST))
+    recording = read_recording(str(FEW))
     plain, dense = find_windows(recording), find_windows(recording, stride=0.05)
     assert {round(w.duration, 9) for w in plain} == {0.2} and len(dense) > 2 * len(plain)
 
@@ -250,7 +250,7 @@ def test_the_repr_of_a_recording_states_its_rig_length_and_streams():
 @pytest.mark.parametrize("given", [{"duration": 0.0}, {"duration": np.nan}, {"stride": -0.1}])
 def test_a_wrong_duration_or_stride_is_refused(given):
     with pytest.raises(RequestError, match=next(iter(given))):
-        find_windows(read_recording(TEST), **given)
+        find_windows(read_recording(FEW), **given)
 
 
 def flat(tree: Any) -> list[float]:
@@ -259,17 +259,18 @@ def flat(tree: Any) -> list[float]:
 
 
 @pytest.mark.slow
-def test_a_validation_has_the_metrics_of_the_command_line(model: PushModel, tmp_path: Path):
+def test_a_validation_has_the_metrics_of_the_command_line(tmp_path: Path):
+    model = train(FEW, kind="gp", n_train=40, watch=lambda stage, done: None)
     model.save(tmp_path / "m.pushmodel")
-    found = validate(model, str(TEST))
-    call = ["-m", "push_predictor.cli", "validate", str(tmp_path / "m.pushmodel"), str(TEST), "--json", "-"]
+    found = validate(model, str(FEW))
+    call = ["-m", "push_predictor.cli", "validate", str(tmp_path / "m.pushmodel"), str(FEW), "--json", "-"]
     printed = json.loads(
         subprocess.run([sys.executable, *call], check=True, cwd=REPOSITORY, capture_output=True).stdout
     )
     for key in ("nmse", "nlpd", "coverage"):
         np.testing.assert_allclose(flat(found.metrics[key]), flat(printed[key]), rtol=1e-9)
     assert (found.metrics["n_test"], found.metrics["n_pushes"]) == (printed["n_test"], printed["n_pushes"])
-    assert len(found.windows) == printed["n_test"] and "603 windows of 120 pushes" in repr(found)
+    assert len(found.windows) == printed["n_test"] and "53 windows of 10 pushes" in repr(found)
 
 
 @pytest.mark.slow
@@ -279,9 +280,10 @@ def test_an_absent_recording_is_an_error_with_its_name(model: PushModel):
 
 
 @pytest.mark.slow
-def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for():
+def test_a_trace_reports_its_stages_and_tries_the_covariates_that_were_asked_for(model: PushModel, tmp_path: Path):
     seen: list[str] = []
-    model = train(TRAINING, kind="analytical", watch=lambda stage, done: None)
+    write_table(tmp_path / "square_abs_train.csv", model.training)
+    model = train(tmp_path / "square_abs_train.csv", kind="analytical", rig=model.rig, watch=lambda stage, done: None)
     found = trace(model, TEST, alpha=0.05, covariates=["elapsed_time"], watch=lambda stage, done: seen.append(stage))
     assert "motion" in seen and found.alpha == 0.05 and found.model is model
     tried = {each.covariate for each in found.tested if each.mechanism == "contact_friction"}

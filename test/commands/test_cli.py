@@ -359,6 +359,7 @@ def test_import_writes_a_table_and_a_rig_that_train_reads(run, tmp_path: Path):
 
 def test_report_writes_a_page_and_the_metrics(place: Place, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)  # pictures of 160 dpi take seconds
+    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
     models = [place.path("vhgp.pushmodel"), place.path("analytical.pushmodel")]
     call = ["report", "validation", "--model", *models, "--recording", place.path("test.mcap"), "--out", str(tmp_path)]
     found = run(*call, "--json", "-").json

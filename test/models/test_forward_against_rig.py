@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from even_physics import no_noise, uniform_field
@@ -61,14 +63,19 @@ def simulated(
     return np.column_stack([rotate(pose[:, :2], -heading), pose[:, 2]])
 
 
+@cache
+def mechanics(support: PressureDistribution | PowerSurface) -> PushMechanics:
+    """Kept for all tests: a table takes some tenths of a second."""
+    return PushMechanics(OUTLINE, RADIUS, support)
+
+
 def predicted(
     support: PressureDistribution | PowerSurface, pushes: PushPlan, values: dict[str, float] | None = None
 ) -> Array:
     inputs = np.column_stack([pushes.speed, pushes.contact, pushes.angle])
     normal = OUTLINE.inward_normal(pushes.contact)
     heading = {"push_heading": np.arctan2(normal[:, 1], normal[:, 0]) + pushes.angle}
-    model = PushMechanics(OUTLINE, RADIUS, support)
-    return model.displacement(values or {}, inputs, pushes.travel / pushes.speed, heading)
+    return mechanics(support).displacement(values or {}, inputs, pushes.travel / pushes.speed, heading)
 
 
 def relative_error(found: Array, truth: Array) -> float:

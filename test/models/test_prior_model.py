@@ -327,6 +327,8 @@ def test_table_that_is_too_far_off_is_not_used(untrained: PushModel, monkeypatch
 @pytest.mark.parametrize("rig", [RIG, replace(RIG, shape="ellip3", outline=shape_outline("ellip3"))])
 def test_table_is_accurate_and_fast(rig: Rig) -> None:
     model = train_model(empty_table(), rig, "prior", name="p")
+    few_draws = replace(predictor_of(model), draws=predictor_of(model).draws[:24])  # less smooth, and faster
+    model = replace(model, predictor=few_draws)
     tabulated, inputs, duration = tabulate(model), some_inputs(150, 3), np.full(150, 0.3)
     assert tabulated.how.startswith("table of")
     found, exact = (m.predict_rows(inputs, duration) for m in (tabulated, model))

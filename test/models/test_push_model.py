@@ -44,8 +44,8 @@ def test_model_predicts_new_pushes(models: dict[str, PushModel], kind: str) -> N
 @pytest.mark.parametrize("kind", KINDS)
 def test_covariances_are_positive_definite_in_and_out_of_the_domain(models: dict[str, PushModel], kind: str) -> None:
     rng = np.random.default_rng(3)
-    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 300), rng.random(300), rng.uniform(-1.57, 1.57, 300)])
-    prediction = models[kind].predict_rows(inputs, np.full(300, 0.2))
+    inputs = np.column_stack([rng.uniform(1e-3, 2.0, 60), rng.random(60), rng.uniform(-1.57, 1.57, 60)])
+    prediction = models[kind].predict_rows(inputs, np.full(60, 0.2))
     assert np.all(np.linalg.eigvalsh(prediction.covariance) > 0.0)
     assert np.all(np.linalg.eigvalsh(prediction.covariance - prediction.process_covariance) > -1e-15)
     assert not np.all(prediction.in_domain)

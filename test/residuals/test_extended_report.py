@@ -104,8 +104,14 @@ def test_model_without_extension_fixes_no_covariate(base: PushModel, table: Push
 
 @pytest.mark.slow
 def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
-    base: PushModel, table: PushTable, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    base: PushModel,
+    table: PushTable,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)  # the text is checked, not the pictures
+    monkeypatch.setattr("push_predictor.reporting.canvas.DPI", 40)
     model = extended(base, slippery(), grain())
     save_model(model, tmp_path / "extended.pushmodel")
     save_model(base, tmp_path / "plain.pushmodel")

@@ -12,6 +12,7 @@ over the scores is valid for any dependence between them:
 from __future__ import annotations
 
 import json
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,7 @@ POWERS = (0.2, 0.4, 0.6, 0.8)  # exponents e of the bets e p^(e - 1)
 PATIENCE = 50.0  # pushes; prior of the change: P(not begun by push t) = (1 + t / PATIENCE)^-1/2
 SMALLEST = 1e-12  # p value; smaller ones are rounding errors
 SIZE = "size of the residual"  # name of the score that measures how large the errors are
+_LOG_POWERS, _BENDS, _LOG_10 = np.log(POWERS), np.array(POWERS) - 1.0, np.log(10.0)
 MOST_KEPT = 20_000  # scores of each kind that are ranked; beyond that the oldest new ones are dropped
 
 
@@ -177,23 +179,23 @@ class _Ranking:
     """The scores so far in sorted order, which makes ranking a new one fast."""
 
     def __init__(self, calibration: Array) -> None:
-        self._sorted = np.sort(calibration)
+        self._sorted: list[float] = sorted(calibration.tolist())
         self._new: list[float] = []
 
     def p_value(self, score: float, chance: float) -> float:
         """Share of the scores, including the new one, that exceed it; ties count with the fraction `chance`."""
-        low, high = np.searchsorted(self._sorted, score, "left"), np.searchsorted(self._sorted, score, "right")
+        low, high = bisect_left(self._sorted, score), bisect_right(self._sorted, score)
         above, equal = len(self._sorted) - high, high - low
         p_value = (above + chance * (equal + 1)) / (len(self._sorted) + 1)
-        self._sorted = np.insert(self._sorted, low, score)
+        self._sorted.insert(low, score)
         if len(self._sorted) > MOST_KEPT:
             self._drop()
         self._new.append(score)
-        return float(p_value)
+        return p_value
 
     def _drop(self) -> None:
         if self._new:
-            self._sorted = np.delete(self._sorted, np.searchsorted(self._sorted, self._new.pop(0)))
+            self._sorted.pop(bisect_left(self._sorted, self._new.pop(0)))
 
 
 class _Bets:
@@ -215,8 +217,8 @@ class _Bets:
     @property
     def log10(self) -> float:
         """Log10 of the total capital, which starts at 1."""
-        everything = np.append(self._log_running, np.log(_reserve(self._seen)))
-        return float(np.logaddexp.reduce(everything) / np.log(10.0))
+        running = np.logaddexp.reduce(self._log_running)
+        return float(np.logaddexp(running, np.log(_reserve(self._seen))) / _LOG_10)
 
 
 def _reserve(pushes: int) -> float:
@@ -224,5 +226,4 @@ def _reserve(pushes: int) -> float:
 
 
 def _log_bets(p_value: float) -> Array:
-    power = np.array(POWERS)
-    return np.asarray(np.log(power) + (power - 1.0) * np.log(p_value))
+    return np.asarray(_LOG_POWERS + _BENDS * np.log(p_value))
