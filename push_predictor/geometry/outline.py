@@ -58,6 +58,10 @@ class Outline:
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
 
+    def __reduce__(self) -> tuple[type[Outline], tuple[Array, tuple[float, float] | None]]:
+        """Pickle the fields alone: copies and keys of caches do not depend on what was computed before."""
+        return Outline, (self.vertices, self.semi_axes)
+
     @cached_property
     def perimeter(self) -> float:
         """Length of the boundary, m."""

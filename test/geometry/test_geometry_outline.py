@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -34,6 +36,18 @@ def test_contacts_are_counter_clockwise_and_proportional_to_arc_length(outline):
     assert np.sum(steps) == pytest.approx(outline.perimeter, rel=1e-3)
     area = 0.5 * np.sum(points[:, 0] * np.roll(points[:, 1], -1) - np.roll(points[:, 0], -1) * points[:, 1])
     assert area == pytest.approx(outline.area, rel=1e-3)
+
+
+@EVERY_OUTLINE
+def test_pickle_does_not_depend_on_what_was_computed_before(outline):
+    """Cached results of other functions are found by it."""
+    fresh = Outline(outline.vertices, outline.semi_axes)
+    before = pickle.dumps(fresh)
+    assert fresh.perimeter > 0.0 and fresh.area > 0.0 and len(fresh.project(np.zeros((1, 2))).distance) == 1
+    assert pickle.dumps(fresh) == before
+    copy = pickle.loads(before)
+    np.testing.assert_array_equal(copy.vertices, outline.vertices)
+    assert copy.semi_axes == outline.semi_axes
 
 
 @EVERY_OUTLINE

@@ -40,7 +40,8 @@ class Stages:
 
 def report(out: Path, cache: Path) -> Stages:
     stages = Stages()
-    report_paper(SMALL, Work(cache, cores=2), out, None, None, stages)
+    # One process: test_paper_work shows that several do the same work, and each would first import the packages.
+    report_paper(SMALL, Work(cache, cores=1), out, None, None, stages)
     return stages
 
 
