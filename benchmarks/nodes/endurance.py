@@ -1,6 +1,6 @@
 """A day of recorded pushes through the whole chain, accelerated: does any node grow?
 
-    python -m benchmarks.nodes.endurance [--minutes 10] [--hours 24] [--rate 100] [--recording BAG] [--domain D]
+    python -m benchmarks.nodes.endurance [--minutes 10] [--hours 24] [--rate 100] [--recording BAG] [--model FILE]
 
 push_replay plays a recording in a loop, at rate 100 or as fast as the machine can, to push_validator, which requests
 predictions from predict_server. The run ends after `minutes`, or once `hours` of recorded time are covered. It prints
@@ -40,7 +40,7 @@ def main() -> int:
     options = _options()
     stamps = [message.log_time for message in open_bag(options.recording).messages()]
     hours, count = (max(stamps) - min(stamps)) / 3.6e12, len(stamps)
-    model, before = share_path(*DEFAULT_MODEL), load()
+    model, before = options.model, load()
     with ExitStack() as stack:
         output = stack.enter_context(tempfile.TemporaryDirectory(prefix="push_endurance_"))
         stack.enter_context(graph(options.domain))
@@ -157,6 +157,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--hours", type=float, default=24.0, help="of recorded time (default %(default)s)")
     parser.add_argument("--rate", type=float, default=100.0, help="of the replay (default %(default)s)")
     parser.add_argument("--recording", type=Path, default=RECORDING, help="default bags/square_abs_test")
+    parser.add_argument("--model", type=Path, default=share_path(*DEFAULT_MODEL), help="default the shipped one")
     parser.add_argument("--every", type=float, default=30.0, help="s between two looks (default %(default)s)")
     parser.add_argument("--warm-up", type=float, default=2.0, help="minutes (default %(default)s)")
     parser.add_argument("--most-growth", type=float, default=5.0, help="MB of a process (default %(default)s)")

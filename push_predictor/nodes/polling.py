@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from time import monotonic
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+EVENTS_PERIOD = 1.0  # s between two looks at the QoS events
+EVENTS_TURN = 0.03  # s that a look lasts: longer than the period of the timers that keep the executor turning
+
 
 class PolledGroup(CallbackGroup):
-    """Keeps an executor from waiting for subscriptions and services; it still handles their QoS events."""
+    """Keeps an executor from waiting for subscriptions and services; it handles their QoS events once a second.
+
+    While an executor waits for the events of a subscription, each message that is not yet taken ends its wait: it would
+    turn without a pause for as long as messages arrive.
+    """
 
     def can_execute(self, entity: Any) -> bool:
         """See CallbackGroup."""
-        return not isinstance(entity, (Subscription, Service))
+        return not isinstance(entity, (Subscription, Service)) and monotonic() % EVENTS_PERIOD < EVENTS_TURN
 
     def beginning_execution(self, entity: Any) -> bool:
         """See CallbackGroup."""

@@ -88,6 +88,7 @@ class Planning(threading.Thread):
                 begun = time.monotonic()
                 mean = client.predict(self._inputs).mean
                 self.answers.append((time.monotonic() - begun, mean))
+                self._ending.wait(0.02)  # a planner that asks without a pause would keep a processor busy
 
     def stop(self) -> None:
         self._ending.set()

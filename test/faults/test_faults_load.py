@@ -17,12 +17,15 @@ from rclpy.context import Context
 from rclpy.node import Node
 from ros_harness import REPOSITORY, free_domain, node_environment, ros_context, wait_until
 from synthetic import square_rig
+from validator_bench import HEXAGON
 
-from push_predictor.models.train import train_model
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.validator.prediction_client import PredictionClient
 from push_predictor.online.files import row_file
 from push_predictor.online.files.row_file import RowFile
 from push_predictor.online.live_validation import LiveValidation
+from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor_interfaces.srv import PredictPush
 
@@ -84,11 +87,14 @@ def test_answers_are_taken_while_the_executor_is_busy_with_samples():
 
 
 @pytest.mark.slow
-def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours():
+def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours(tmp_path: Path):
     """The long form: 24 recorded hours. A few seconds are too short for memory."""
+    data = [HEXAGON]
+    model = train_model(load_data(data), load_rig_for(data), "gp", name="gp", options=TrainingOptions(n_train=40))
+    save_model(model, tmp_path / "gp.pushmodel")
     done = benchmark(
-        "endurance", "--minutes", "0.14", "--rate", "20", "--every", "0.1", "--warm-up", "0.1", "--most-growth", "60",
-        "--recording", "bags/hexagon_delrin",
+        "endurance", "--minutes", "0.14", "--rate", "10", "--every", "0.1", "--warm-up", "0.1", "--most-growth", "60",
+        "--recording", str(HEXAGON), "--model", str(tmp_path / "gp.pushmodel"),
     )  # fmt: skip
     text = done.stdout + done.stderr
     assert done.returncode == 0, text

@@ -17,7 +17,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.serialization import deserialize_message
 from replay_bags import RIG
 from ros_harness import (
@@ -557,6 +557,7 @@ def test_unusable_messages_are_counted_by_kind(domain: int, models):
         status = Status(node)
         slider, pusher = (node.create_publisher(PoseStamped, f"{name}/pose", 100) for name in ("slider", "pusher"))
         wrench = node.create_publisher(WrenchStamped, "pusher/wrench", 100)
+        node.create_publisher(WrenchStamped, "pusher/wrench", qos_profile_sensor_data)  # best effort: nothing arrives
         rig = node.create_publisher(String, "rig", LATCHED)  # created last: who has received it knows the others too
         for publisher in (slider, pusher, wrench):
             assert wait_until(lambda publisher=publisher: publisher.get_subscription_count() > 0)
@@ -564,6 +565,7 @@ def test_unusable_messages_are_counted_by_kind(domain: int, models):
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
         (info,) = node.get_subscriptions_info_by_topic("/pusher/pose")
         assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        process.wait_for_text("offering incompatible QoS")
 
         rig.publish(String(data='{"shape": "rect1"}'))
         assert "outline" in status.wait_for_message("push_rig lacks")
