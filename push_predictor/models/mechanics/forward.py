@@ -49,7 +49,7 @@ def _tabulated(key: _Patch) -> LoadMap:
 
 
 def _patch_map(outline: Outline, exponent: float) -> LoadMap:
-    """The inverse of an outline's patch; it takes 0.2 s to tabulate."""
+    """The inverse of an outline's patch; it takes 0.1 s to tabulate."""
     return _tabulated(_Patch(outline.vertices.tobytes(), outline.semi_axes, exponent, outline))
 
 

@@ -53,7 +53,7 @@ class LoadMap:
 
 
 def load_map(pressure: PressureDistribution) -> LoadMap:
-    """Tabulate a distribution; takes some tenths of a second."""
+    """Tabulate a distribution; takes about a tenth of a second."""
     centre, length = pressure.centre, pressure.length
     centred = PressureDistribution(pressure.points - centre, pressure.shares, pressure.spread)
     (x, y), shares = centred.points.T, centred.shares

@@ -16,6 +16,7 @@ POINT_SPREAD = 3e-3  # of c, at least: a twist about a single point of support t
 NEWTON_STEPS = 60
 HALVINGS = 30
 CONVERGED = 1e-9
+ROUNDING = 1e-14  # of the squared power: next to the minimum, steps change the function by less than this
 
 
 def load_of_twist(pressure: PressureDistribution, twist: Array) -> Array:
@@ -58,7 +59,7 @@ def _minimum(points: Array, shares: Array, spread: float, load: Array) -> Array:
         moving = -descent > CONVERGED**2
         if not moving.any():
             break
-        value = 0.5 * power**2 - np.sum(wanted * t, axis=1)
+        value = (0.5 + ROUNDING) * power**2 - np.sum(wanted * t, axis=1)
         rows, t, step = rows[moving], t[moving], step[moving]
         share = np.ones(len(rows))
         for _ in range(HALVINGS):
