@@ -338,7 +338,7 @@ def test_friction_gradient_moves_the_centre_by_the_mean_squares_of_the_pressure(
 @pytest.mark.parametrize("values", [{}, {"inertia": 1.0}], ids=["slow", "with inertia"])
 def test_the_place_of_the_body_frames_origin_changes_nothing(values: dict[str, float]) -> None:
     """Outline and support shifted in their frame are the same slider; its origin is another point of it."""
-    (inputs, duration), shift = pushes(6, speed=0.2), np.array([0.01, -0.006])
+    (inputs, duration), shift = pushes(20, speed=0.2), np.array([0.01, -0.006])
     shifted = PushMechanics(
         Outline(SQUARE.vertices + shift),
         RADIUS,

@@ -85,7 +85,8 @@ def written(path: Path, trace: Trace) -> str:
 
 
 @pytest.mark.slow
-def test_page_embeds_six_pictures(tmp_path: Path, drift: Trace) -> None:
+def test_page_embeds_six_pictures(tmp_path: Path, drift: Trace, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 1)  # a second only moves ticks
     page = write_trace_report(tmp_path / "trace.html", drift)
     assert [path.name for path in tmp_path.iterdir()] == ["trace.html"]
     pictures = re.findall(r'<img alt="([^"]+)" src="data:image/png;base64,([^"]+)"', page.read_text())
