@@ -6,7 +6,7 @@ import gc
 import os
 import re
 import sys
-from collections.abc import Generator
+from collections.abc import Collection, Generator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,11 @@ MEASURED_DATA_VARIABLE = "PUSH_PREDICTOR_MEASURED_DATA"
 NEEDS_ROS = re.compile(
     r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
 )
+LONGEST = {  # files that take half a minute or more
+    "test_node_push_validator", "test_node_predict_server", "test_node_trace_residual", "test_node_push_replay",
+    "test_node_push_alarm", "test_faults_kill", "test_faults_load", "test_faults_network_security",
+    "test_extended_model", "test_prior_model", "test_paper_report", "test_trace_verdicts", "test_trace_report",
+}  # fmt: skip
 
 
 @pytest.hookimpl(wrapper=True)
@@ -44,7 +49,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data; put slow files first."""
+    """Mark tests `ros` whose module imports ROS, and `measured` that read measured data; order the files."""
     needs_ros = {path: bool(NEEDS_ROS.search(path.read_text())) for path in {item.path for item in items}}
     for item in items:
         if needs_ros[item.path]:
@@ -52,7 +57,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if "measured_data" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.measured)
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)  # first, so that at the end no worker waits for a long file
+    place = _places(needs_ros, slow)
+    items.sort(key=lambda item: place[item.path])
+
+
+def _places(needs_ros: Mapping[Path, bool], slow: Collection[Path]) -> dict[Path, tuple[bool, float, Path]]:
+    """Places of the files in the order of the tests.
+
+    Long and slow files come first, so that at the end no worker waits for one. Files that wait for nodes are spread
+    evenly among those that compute, so that all cores are busy.
+    """
+    groups: dict[tuple[bool, bool], list[Path]] = {}
+    for path in sorted(needs_ros, key=lambda path: (path.stem not in LONGEST, path)):
+        groups.setdefault((path in slow or path.stem in LONGEST, needs_ros[path]), []).append(path)
+    return {
+        path: (not early, (index + 0.5) / len(group), path)
+        for (early, _), group in groups.items()
+        for index, path in enumerate(group)
+    }
 
 
 @pytest.fixture(scope="session")
