@@ -65,7 +65,7 @@ def simulated(
 
 @cache
 def mechanics(support: PressureDistribution | PowerSurface) -> PushMechanics:
-    """Kept for all tests: a table takes some tenths of a second."""
+    """Kept for all tests: a table takes a tenth of a second."""
     return PushMechanics(OUTLINE, RADIUS, support)
 
 
