@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,11 +46,11 @@ class LoadMap:
 
     def twist(self, force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, Array]:
         """See LimitSurface."""
-        return interpolated(self.cells, 0, force_x, force_y, moment)
+        return interpolated(self.cells, 0, place_of(force_x, force_y, moment))
 
     def gauge(self, force_x: Array, force_y: Array, moment: Array) -> Array:
         """See LimitSurface."""
-        return interpolated_gauge(self.sizes, 0, force_x, force_y, moment)
+        return interpolated_gauge(self.sizes, 0, place_of(force_x, force_y, moment))
 
 
 def load_map(pressure: PressureDistribution) -> LoadMap:
@@ -64,25 +65,33 @@ def load_map(pressure: PressureDistribution) -> LoadMap:
     return LoadMap(_refined(_solved(centred, length, every), every), centre, length, square, reach)
 
 
-def interpolated(
-    cells: Array, first: IntArray | int, force_x: Array, force_y: Array, moment: Array
-) -> tuple[Array, Array, Array]:
+class Place(NamedTuple):
+    """Where loads are in a table, (n,) each: their sign and size, their cells, and shares of the way across a cell."""
+
+    sign: Array
+    size: Array
+    cell: IntArray
+    right: Array
+    up: Array
+
+
+def interpolated(cells: Array, first: IntArray | int, place: Place) -> tuple[Array, Array, Array]:
     """Twists (n,) each, from tables in `cells` that begin at the cell `first`; linear in the size of the load."""
-    sign, size, cell, right, up = _place(force_x, force_y, moment)
+    sign, size, cell, right, up = place
     part, both, size = cells.take(first + cell, axis=1), right * up, sign * size
     vx, vy, spin = (size * (part[k] + right * part[k + 3] + up * part[k + 6] + both * part[k + 9]) for k in range(3))
     return vx, vy, spin
 
 
-def interpolated_gauge(sizes: Array, first: IntArray | int, force_x: Array, force_y: Array, moment: Array) -> Array:
+def interpolated_gauge(sizes: Array, first: IntArray | int, place: Place) -> Array:
     """Sizes (n,) of loads in units of the load on the limit surface in the same direction."""
-    _, size, cell, right, up = _place(force_x, force_y, moment)
+    _, size, cell, right, up = place
     part = sizes.take(first + cell, axis=1)
     return np.asarray(size / (part[0] + right * part[1] + up * part[2] + right * up * part[3]))
 
 
-def _place(force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, IntArray, Array, Array]:
-    """Sign and size of loads, the cells they lie in, and the shares of the way to the cells' next nodes, (n,) each."""
+def place_of(force_x: Array, force_y: Array, moment: Array) -> Place:
+    """Find loads (n,) in a table; it is the same place in all tables."""
     sign = np.where(moment < 0.0, -1.0, 1.0)
     x, y, m = sign * force_x, sign * force_y, sign * moment
     force = np.sqrt(x * x + y * y)
@@ -92,7 +101,7 @@ def _place(force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array,
     column, row = turn.astype(np.int64), rise.astype(np.int64)
     np.minimum(column, AZIMUTHS - 1, out=column)
     np.minimum(row, ELEVATIONS - 2, out=row)
-    return sign, np.sqrt(force * force + m * m), row * AZIMUTHS + column, turn - column, rise - row
+    return Place(sign, np.sqrt(force * force + m * m), row * AZIMUTHS + column, turn - column, rise - row)
 
 
 def _polynomials(nodes: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, interpolated, interpolated_gauge
+from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, interpolated, interpolated_gauge, place_of
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.types import Array, IntArray
 
@@ -54,21 +54,23 @@ class RowSurfaces:
 
     def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
         """See PushSurfaces."""
-        one = interpolated(self.cells, self.low[rows] * self.per_table, x, y, moment)
+        place = place_of(x, y, moment)
+        one = interpolated(self.cells, self.low[rows] * self.per_table, place)
         share = self.share[rows]
         if not share.any():
             return one
-        other = interpolated(self.cells, self.high[rows] * self.per_table, x, y, moment)
+        other = interpolated(self.cells, self.high[rows] * self.per_table, place)
         vx, vy, spin = (a + share * (b - a) for a, b in zip(one, other, strict=True))
         return vx, vy, spin
 
     def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
         """See PushSurfaces."""
-        one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, x, y, moment)
+        place = place_of(x, y, moment)
+        one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, place)
         share = self.share[rows]
         if not share.any():
             return one
-        other = interpolated_gauge(self.sizes, self.high[rows] * self.per_table, x, y, moment)
+        other = interpolated_gauge(self.sizes, self.high[rows] * self.per_table, place)
         return np.asarray(one + share * (other - one))
 
 
