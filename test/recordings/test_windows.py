@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from synthetic import START, Push, moved, pose_stream, rows, stamps, translating_push, wrench_rows
 
 from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.recordings.windows.contact import ContactSample
 from push_predictor.recordings.windows.finder import WindowFinder, find_windows
+from push_predictor.recordings.windows.push_segmenter import TARE_SAMPLES, PushSegmenter
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 
 
@@ -170,6 +172,18 @@ def test_push_from_rest_in_contact_begins_with_its_motion(seed: int) -> None:
     assert first.velocity == pytest.approx(0.02, rel=0.5)  # the fit may include the start of the motion
     assert abs(first.angle) < 0.45
     assert first.displacement[0] > 0.9 * 0.004
+
+
+@pytest.mark.parametrize("gap", [0.0005, 0.1])  # at rest in contact, moving freely
+def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> None:
+    segmenter = PushSegmenter(WindowOptions())
+    rest = ContactSample(0, 0.0, gap, 0.0, 0.0, np.zeros(2), 0.0, False, False, False, False)
+    for k, force in enumerate([*np.full(20, 1.0), *np.linspace(1.0, 2.0, TARE_SAMPLES)]):
+        segmenter.step(replace(rest, stamp=4_000_000 * k, time=0.004 * k, force=np.array([force, 0.0])))
+    pushing = replace(rest, gap=0.0005, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
+    segmenter.step(replace(pushing, stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
+    assert segmenter.push is not None and segmenter.push.tare is not None
+    np.testing.assert_allclose(segmenter.push.tare, [1.5, 0.0])
 
 
 def test_two_contacts_are_two_pushes() -> None:
