@@ -109,10 +109,11 @@ def outcomes(bench: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -
 def _late_alarms(node: Node, alarms: list[PushAlarm], fired: bool) -> list[PushAlarm]:
     """What a new subscriber receives, once the earlier one has received its alarm too."""
     late: list[PushAlarm] = []
-    node.create_subscription(PushAlarm, "push_alarm", late.append, LATCHED)
+    subscription = node.create_subscription(PushAlarm, "push_alarm", late.append, LATCHED)
     acquaint(node, "push_validator")  # so that half a second without an alarm means that there is none
     wait_until(lambda: bool(alarms and late), 30.0 if fired else 0.5)
-    return late
+    node.destroy_subscription(subscription)
+    return list(late)
 
 
 @pytest.fixture(scope="module")
