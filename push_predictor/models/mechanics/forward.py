@@ -8,7 +8,7 @@ world (loaded_surface).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,13 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
 from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
-from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, SameSurface, row_surfaces
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
+    PushSurfaces,
+    RowSurfaces,
+    SameSurface,
+    row_surfaces,
+    same_surface,
+)
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.contact_solution import Driven, Touch, driven, driven_on_ellipsoid
 from push_predictor.models.mechanics.motion.fine_sweep import swept_finely
@@ -96,9 +102,15 @@ class PushMechanics:
 
     def surfaces(self, values: RowValues) -> PushSurfaces:
         """Limit surfaces of pushes with these values; tabulates what is not tabulated yet."""
+        found = self._unspread(values)
+        if not values.active("pressure_spread"):
+            return found
+        return replace(found, of_rows=found.of_rows.spread(np.exp(values.of("pressure_spread"))))
+
+    def _unspread(self, values: RowValues) -> RowSurfaces | SameSurface:
         n = values.n
         if isinstance(self.support, PowerSurface):
-            return SameSurface(self.support, n)
+            return same_surface(self.support, n)
         known = [] if self.support is None else [self._known("support", self.support)]
         number = np.where(np.full(n, bool(known)), 0, -1)
         if self.supports and "recording" in values.covariates:

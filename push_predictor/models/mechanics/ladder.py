@@ -68,13 +68,14 @@ def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> l
 
 
 def candidates(mechanics: PushMechanics, rows: FitRows) -> list[str]:
-    """Names of the parameters that these rows can show."""
+    """Names of the parameters that these rows can show; the rim exponent is the one of the pressure's spread."""
     on_patch = mechanics.support is None and not _all_known(mechanics, rows)
     return [
         parameter.name
         for parameter in PARAMETERS
         if all(name in rows.covariates for name in parameter.needs)
         and (on_patch or parameter.name != "rim_exponent")
+        and parameter.name != "pressure_spread"
         and (len(np.unique(rows.inputs[:, 0])) > 1 or parameter.name not in ("clock_delay", "inertia"))
     ]
 

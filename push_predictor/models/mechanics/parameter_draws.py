@@ -23,8 +23,8 @@ MIRRORED = (
     "tip_offset_across",
 )
 # Through the speed: they matter beyond quasi-static pushing, and without them only the distance travelled counts. The
-# height of a push shifts the pressure, as centre_x and centre_y do.
-NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height")
+# height of a push shifts the pressure, as centre_x and centre_y do; the rim exponent spreads it.
+NOT_DRAWN = ("inertia", "friction_by_speed", "clock_delay", "pushing_height", "pressure_spread")
 ROWS_AT_ONCE = 20_000
 
 

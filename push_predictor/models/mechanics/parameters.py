@@ -55,6 +55,9 @@ PARAMETERS: tuple[MechanicsParameter, ...] = (
         "rim_exponent", "1", 0.0, -4.0, 12.0, 1.5, "pressure", "exponent of the pressure's growth towards the rim"
     ),
     MechanicsParameter(
+        "pressure_spread", "1", 0.0, -1.5, 1.0, 0.1, "pressure", "logarithm of a factor on the pressure's spread"
+    ),
+    MechanicsParameter(
         "centre_x", "m", 0.0, -0.03, 0.03, 0.004, "pressure", "shift of the centre of pressure along the slider's x"
     ),
     MechanicsParameter(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +21,10 @@ class RowQuantities:
     length: Array
     square: Array
     reach: Array
+
+    def spread(self, factor: Array) -> RowQuantities:
+        """The same pressures, spread by factors (n,) about their centres: the surface keeps its shape."""
+        return replace(self, length=self.length * factor, square=self.square * (factor * factor)[:, None])
 
 
 class PushSurfaces(Protocol):
@@ -79,14 +83,7 @@ class SameSurface:
     """One approximate limit surface for n pushes."""
 
     surface: PowerSurface
-    n: int
-
-    @property
-    def of_rows(self) -> RowQuantities:
-        """See PushSurfaces."""
-        s = self.surface
-        centre, square, reach = (np.tile(values, (self.n, 1)) for values in (s.centre, s.square, s.reach))
-        return RowQuantities(centre, np.full(self.n, s.length), square, reach)
+    of_rows: RowQuantities
 
     def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
         """See PushSurfaces."""
@@ -95,6 +92,12 @@ class SameSurface:
     def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
         """See PushSurfaces."""
         return self.surface.gauge(x, y, moment)
+
+
+def same_surface(surface: PowerSurface, n: int) -> SameSurface:
+    """The surface for n pushes."""
+    centre, square, reach = (np.tile(values, (n, 1)) for values in (surface.centre, surface.square, surface.reach))
+    return SameSurface(surface, RowQuantities(centre, np.full(n, surface.length), square, reach))
 
 
 def row_surfaces(maps: Sequence[LoadMap], low: IntArray, high: IntArray, share: Array) -> RowSurfaces:

@@ -7,15 +7,14 @@ tolerance of the contact. Many pushes, and pushes with inertia, are computed as 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import atan2, cos, isfinite, log, sin, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
-from push_predictor.models.mechanics.fitted import RECORDING, FittedMechanics
-from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
+from push_predictor.models.mechanics.fitted import NO_CHANGES, RECORDING, FittedMechanics
 from push_predictor.models.mechanics.motion.fine_sweep import OF_TRAVEL_FINELY
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
 from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
@@ -26,11 +25,11 @@ from push_predictor.models.mechanics.scalar.surface import (
     Three,
     loaded,
     root_of_stretch,
-    scalar_power_surface,
     scalar_surface,
 )
 from push_predictor.types import Array
 
+MOST_SURFACES = 64  # that are kept prepared
 FEW = 16  # pushes: as fast as an array of them
 
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach.
@@ -46,8 +45,29 @@ class ScalarMechanics(FittedMechanics):
     contact_at: ContactAt = field(kw_only=True)
     _surfaces: dict[object, ScalarSurface] = field(default_factory=dict, kw_only=True)
 
-    def displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Array:
+    def displacement(
+        self,
+        inputs: Array,
+        duration: Array,
+        covariates: Mapping[str, Array] | None = None,
+        changes: Mapping[str, Array] = NO_CHANGES,
+    ) -> Array:
         """See FittedMechanics."""
+        if not changes:
+            return self._displacement(inputs, duration, covariates)
+        if len(inputs) > FEW:
+            return super().displacement(inputs, duration, covariates, changes)
+        return np.concatenate([self._changed(k, inputs, duration, covariates, changes) for k in range(len(inputs))])
+
+    def _changed(
+        self, k: int, inputs: Array, duration: Array, given: Mapping[str, Array] | None, changes: Mapping[str, Array]
+    ) -> Array:
+        """Displacement (1, 3) of push k."""
+        values = {**self.values, **{name: self.value(name) + float(change[k]) for name, change in changes.items()}}
+        covariates = {name: column[k : k + 1] for name, column in (given or {}).items()}
+        return replace(self, values=values)._displacement(inputs[k : k + 1], duration[k : k + 1], covariates)
+
+    def _displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Array:
         given = covariates or {}
         pushes = list(zip(*np.transpose(inputs).tolist(), np.asarray(duration).tolist(), strict=True))
         plain = 0 < len(pushes) <= FEW and all(isfinite(sum(push)) for push in pushes)
@@ -62,15 +82,13 @@ class ScalarMechanics(FittedMechanics):
         return np.array(moved)
 
     def _surface(self, recording: float) -> ScalarSurface:
-        if recording not in self._surfaces:
-            self._surfaces[recording] = self._prepared(recording)
-        return self._surfaces[recording]
-
-    def _prepared(self, recording: float) -> ScalarSurface:
-        if isinstance(self.mechanics.support, PowerSurface):
-            return scalar_power_surface(self.mechanics.support)
-        values = RowValues(self.values, 1, {RECORDING: np.array([recording])})
-        return scalar_surface(self.mechanics.surfaces(values))
+        key = recording, self.value("rim_exponent"), self.value("pressure_spread")
+        if key not in self._surfaces:
+            if len(self._surfaces) >= MOST_SURFACES:
+                self._surfaces.clear()
+            values = RowValues(self.values, 1, {RECORDING: np.array([recording])})
+            self._surfaces[key] = scalar_surface(self.mechanics.surfaces(values))
+        return self._surfaces[key]
 
 
 def scalar_mechanics(fitted: FittedMechanics) -> ScalarMechanics:

@@ -53,24 +53,18 @@ class Stretch(NamedTuple):
 
 def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
     """The surface of the first push."""
-    if isinstance(surfaces, SameSurface):
-        return scalar_power_surface(surfaces.surface)
-    if not isinstance(surfaces, RowSurfaces):
+    of_rows, tolerance = surfaces.of_rows, ROOT_TOLERANCE
+    if isinstance(surfaces, RowSurfaces):
+        twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
+    elif not isinstance(surfaces, SameSurface):
         raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
-    of_rows = surfaces.of_rows
+    elif surfaces.surface.power == 2.0:
+        twist, gauge, tolerance = _ellipsoid, _norm, EXACT
+    else:
+        twist, gauge = _of_arrays(surfaces.surface), _gauge_of_arrays(surfaces.surface)
     x, y = of_rows.centre[0].tolist()
     xx, xy, yy = of_rows.square[0].tolist()
-    twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
-    return ScalarSurface((x, y), float(of_rows.length[0]), (xx, xy, yy), of_rows.reach[0], twist, gauge)
-
-
-def scalar_power_surface(surface: PowerSurface) -> ScalarSurface:
-    """The surface of that power."""
-    (x, y), (xx, xy, yy) = surface.centre.tolist(), surface.square.tolist()
-    twist, gauge, tolerance = _of_arrays(surface), _gauge_of_arrays(surface), ROOT_TOLERANCE
-    if surface.power == 2.0:
-        twist, gauge, tolerance = _ellipsoid, _norm, EXACT
-    return ScalarSurface((x, y), surface.length, (xx, xy, yy), surface.reach, twist, gauge, tolerance)
+    return ScalarSurface((x, y), float(of_rows.length[0]), (xx, xy, yy), of_rows.reach[0], twist, gauge, tolerance)
 
 
 def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
