@@ -51,7 +51,7 @@ def train(
     n_train: int | None = None,
     seed: int = 0,
     fit: bool = False,
-    mean: MeanChoice = "zero",
+    mean: MeanChoice = "auto",
     watch: Watch | None = None,
 ) -> PushModel:
     """Train a model on recordings or push tables; a prior model needs none, but then a rig.

@@ -31,6 +31,7 @@ from benchmarks.blind.library import library_without
 from benchmarks.blind.oracle import oracle_gain
 from benchmarks.blind.recordings import MODEL, Size, make_one
 from benchmarks.blind.scores import markdown_of, score_of
+from push_predictor.models.train_learnt import MEANS
 
 CYCLE = (*["none"] * 6, *["wrench"] * 2, *["library"] * 7, *["outside"] * 2, *["measurement"] * 2, "variance")
 
@@ -45,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make(options: argparse.Namespace) -> None:
     """Simulate the recordings and train their models."""
-    size = Size(options.training, options.least, options.most, options.rows, options.model)
+    size = Size(options.training, options.least, options.most, options.rows, options.model, options.mean)
     apart(options.out, options.truth)
     options.truth.mkdir(parents=True, exist_ok=True)
     todo = [(k, size, options) for k in range(options.count) if not _is_made(options, k)]
@@ -168,6 +169,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(f"--{name}", type=int, default=default)
     command.add_argument("--rows", type=int, default=1000, help="training rows of the model (default %(default)s)")
     command.add_argument("--model", default="vhgp", choices=("vhgp", "gp", "analytical"))
+    command.add_argument("--mean", default="auto", choices=MEANS, help="of a learnt model (default %(default)s)")
     command.add_argument("--group", choices=("none", *GROUPS), help="only effects of this group")
     command = _command(commands, "run", run, data="recordings", out="verdicts")
     command.add_argument("--alpha", type=float, default=0.01)

@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks.blind.effects import GROUPS, HUMIDITY, SIZES, TEMPERATURE, Drawn, World, draw, undisturbed
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.recordings.write import write_recording
@@ -32,13 +33,14 @@ MODEL = "model.json"
 
 @dataclass(frozen=True)
 class Size:
-    """Pushes to train on, range of the number of new pushes, training rows, kind of model."""
+    """Pushes to train on, range of the number of new pushes, training rows, kind of model and of its mean."""
 
     training: int = 500
     least: int = 170
     most: int = 600
     rows: int = 1000
     kind: str = "vhgp"
+    mean: MeanChoice = "auto"
 
 
 def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: Path) -> Drawn:
@@ -56,7 +58,7 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     assert rig is not None  # the simulator knows its rig
     table = windows_to_table(find_windows(training, rig))
     rows = min(size.rows, len(table))
-    options = TrainingOptions(n_train=rows, seed=seed)
+    options = TrainingOptions(n_train=rows, seed=seed, mean=size.mean)
     save_model(train_model(table, rig, size.kind, name=f"{number:03d}", options=options), folder / MODEL)
     known = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
     effect = {key: value for key, value in asdict(replace(drawn, act=Changes())).items() if key != "act"}

@@ -65,8 +65,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--mean",
         choices=MEANS,
-        help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero, the default). "
-        "auto trains both and keeps the one that predicts held-out training pushes better",
+        help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero). auto, the "
+        "default, takes the one that predicts held-out training pushes better",
     )
     parser.add_argument(
         "--seed",
@@ -165,7 +165,7 @@ def _trained(
         fit=options.fit,
         inducing=options.inducing,
         supports=supports,
-        mean=options.mean or "zero",
+        mean=options.mean or "auto",
     )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
     with progress(f"train {kind}"):

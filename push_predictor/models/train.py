@@ -19,12 +19,13 @@ from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.predictors import (
     AnalyticalPredictor,
     GaussianProcessPredictor,
+    MechanicsMean,
     MechanicsPredictor,
     Predictor,
     PriorPredictor,
 )
 from push_predictor.models.push_model import KINDS, Provenance, PushModel
-from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_learnt
+from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_about, train_learnt
 from push_predictor.models.train_mechanics import predictor_about, train_mechanics
 from push_predictor.models.train_prior import prior_predictor, sharpened
 from push_predictor.models.watch import Watch, no_watch
@@ -50,7 +51,8 @@ class TrainingOptions:
     covariate `recording`, where recordings had others than the rig; used with fit. kernels: of a learnt model.
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
     that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about which the residual is
-    learnt, zero, or auto for the better of both by held-out pushes.
+    learnt, zero, or auto for the better of both by held-out pushes (what the command and the front door take). about:
+    mechanics to learn about, as they are; mean is then not used.
     """
 
     n_train: int | None = None
@@ -59,6 +61,7 @@ class TrainingOptions:
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
     mean: MeanChoice = "zero"
+    about: MechanicsMean | None = None
     supports: Mapping[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -122,6 +125,8 @@ def _predictor(
         return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
         learnt = LearntOptions(kind, options.kernels, inducing, options.mean)
+        if options.about is not None:
+            return train_about(options.about, rows, rig, learnt), []
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
     if options.fit:
         return _fitted(rows, rig, options, watch)
@@ -143,14 +148,14 @@ def _mechanics(rig: Rig, options: TrainingOptions) -> PushMechanics:
 def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """The model without effects, trained again on a table.
 
-    A learnt one is refitted with its kernels and kind of mean, on at most 1000 rows drawn evenly over the pushes. An
-    analytical one keeps its parameters, and its covariance is estimated again. The priors of a prior model are updated
-    by the table. Raises TrainingError for too few rows.
+    A learnt one is refitted with its kernels, on at most 1000 rows drawn evenly over the pushes. Mechanics keep their
+    parameters, alone and as the mean of a learnt model: a change of these is what a trace looks for. The covariance of
+    an analytical model is estimated again. The priors of a prior model are updated by the table. Raises TrainingError
+    for too few rows.
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
-        mean: MeanChoice = "zero" if predictor.mean is None else "mechanics"
-        options = TrainingOptions(seed=seed, kernels=predictor.kernels, mean=mean)
+        options = TrainingOptions(seed=seed, kernels=predictor.kernels, about=predictor.mean)
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor

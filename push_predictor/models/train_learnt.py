@@ -25,7 +25,7 @@ from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, Scaling
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
 from push_predictor.models.train_mechanics import fit_rows
-from push_predictor.models.watch import Watch
+from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
@@ -36,6 +36,7 @@ CONSTANT = 1e-9  # a feature whose range is below this fraction of its size coun
 # Lengthscale of a residual's mean, in standard deviations of the inputs. Windows of one push are close to each other
 # and deviate together: with shorter ones a regression learns the push.
 SHORTEST_OF_RESIDUAL = 0.7
+QUASI_STATIC = 0.06  # m/s: below, inertia moves a slider by less than 2 % of its path, and costs two thirds of the time
 EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by less
 
 
@@ -46,7 +47,7 @@ class LearntOptions:
     kind: str
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
-    mean: MeanChoice = "zero"
+    mean: MeanChoice = "auto"
 
 
 def train_learnt(
@@ -54,19 +55,39 @@ def train_learnt(
 ) -> GaussianProcessPredictor:
     """The predictor trained on the rows; of_mean: those of them that the mechanics are fitted to.
 
-    With the mean `auto`, the one of both whose held-out pushes are more likely. Raises TrainingError for outcomes that
-    do not vary, and for options that the kind does not have.
+    With the mean `auto`, the kind of which held-out pushes of these are more likely. Raises TrainingError for outcomes
+    that do not vary, and for options that the kind does not have.
     """
-    found = []
-    if options.mean != "mechanics":
-        found.append(_trained(rows, rig, options, None, _part_of(watch, 0.0, 0.4 if options.mean == "auto" else 0.9)))
+    about = None
     if options.mean != "zero":
-        begin = 0.4 if options.mean == "auto" else 0.0
-        watch(f"train {options.kind}: mechanics as mean", begin)
-        found.append(_trained(rows, rig, options, fitted_mean(of_mean, rig), _part_of(watch, begin + 0.1, 0.9)))
-    best = max(found, key=lambda trained: trained.score).predictor
+        watch(f"train {options.kind}: mechanics as mean", 0.0)
+        about = fitted_mean(of_mean, rig)
+    if options.mean == "auto" and not _better_about(about, of_mean, rig, options, watch):
+        about = None
+    begin = 0.4 if options.mean == "auto" else 0.1
+    trained = _trained(rows, rig, options, about, _part_of(watch, begin, 0.9))
+    return _correlated(trained.predictor, rows, options, watch)
+
+
+def _better_about(about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch) -> bool:
+    """Whether held-out pushes of the rows that the mean was fitted to are more likely about it than without it."""
+    plain = _trained(rows, rig, options, None, _part_of(watch, 0.1, 0.25), scored=True)
+    informed = _trained(rows, rig, options, about, _part_of(watch, 0.25, 0.4), scored=True)
+    return informed.score > plain.score
+
+
+def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
+    """The predictor of residuals about mechanics that were fitted to other rows. Raises as `train_learnt`."""
+    push = Push(rows.inputs, rows.duration, rows.covariates)
+    about = FittedMean(mean, mean.residuals(push, rows.outcomes))
+    return _correlated(_trained(rows, rig, options, about, no_watch).predictor, rows, options, no_watch)
+
+
+def _correlated(
+    predictor: GaussianProcessPredictor, rows: PushTable, options: LearntOptions, watch: Watch
+) -> GaussianProcessPredictor:
     watch(f"train {options.kind}: correlation of the outputs", 0.9)
-    return replace(best, correlation=fit_correlation(best, rows.push_id))
+    return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
 
 
 def _part_of(watch: Watch, begin: float, end: float) -> Watch:
@@ -85,11 +106,14 @@ class FittedMean:
 def fitted_mean(rows: PushTable, rig: Rig) -> FittedMean:
     """All parameters of the mechanics that velocity, contact and angle show, fitted jointly under their priors.
 
-    Those that need a covariate stay at their textbook values, so that a push needs nothing else than before.
+    Those that need a covariate stay at their textbook values, so that a push needs nothing else than before. So does
+    inertia where all pushes are slow.
     """
     support = None if rig.support_points is None else supported_at(rig.support_points)
     mechanics, known = PushMechanics(rig.outline, rig.pusher_radius, support), fit_rows(rows)
     names = [name for name in candidates(mechanics, known) if not BY_NAME[name].needs]
+    if float(rows.inputs[:, 0].max()) < QUASI_STATIC:
+        names = [name for name in names if name != "inertia"]
     fit = fit_jointly(mechanics, known, names)
     mean = MechanicsMean(FittedMechanics(mechanics, fit.values, fit.covariance), _mean_travel(rows))
     push = Push(rows.inputs, rows.duration, rows.covariates)
@@ -102,13 +126,15 @@ def _mean_travel(rows: PushTable) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Trained:
-    """A predictor and its score: log density of held-out training pushes (SI) less the number of hyperparameters."""
+    """A predictor and, where asked for, the log density of held-out training pushes (SI) less the hyperparameters."""
 
     predictor: GaussianProcessPredictor
     score: float
 
 
-def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch) -> _Trained:
+def _trained(
+    rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMean | None, watch: Watch, *, scored: bool = False
+) -> _Trained:
     push, mean = Push(rows.inputs, rows.duration, rows.covariates), None if about is None else about.mean
     targets = rows.outcomes if mean is None else mean.residuals(push, rows.outcomes)
     # With more rows than the mechanics are fitted to, these are as good as held out.
@@ -123,7 +149,7 @@ def _trained(rows: PushTable, rig: Rig, options: LearntOptions, about: FittedMea
         if mean is not None:
             constant = fit_constant(features, column, heavy_tails=options.kind != "gp", observed=seen)
             regression = best_held_out([constant, regression], block, seen)
-        if options.mean == "auto":
+        if scored:
             score += held_out_score(regression, block, seen) - len(rows) * float(np.log(scaling.outcome_sd[k]))
         regressions.append(regression)
     return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), score)

@@ -78,6 +78,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
         "other slider": [*simulate[:2], "ellip1", *simulate[3:], "--pushes", "2", "--out", str(folder / "round")],
         "gp": ["train", str(folder / "train"), "--kind", "gp", "--out", str(folder / "gp.pushmodel")],
         "vhgp": ["train", str(folder / "train"), "--kind", "vhgp", "--n-train", "15", "--name", "hetero"]
+        + ["--mean", "zero"]
         + ["--out", str(folder / "vhgp.pushmodel"), "--json", "-"],
         "analytical": ["train", str(folder / "train"), "--kind", "analytical", "--fit"]
         + ["--out", str(folder / "analytical.pushmodel"), "--json", str(folder / "train.json")],

@@ -178,8 +178,13 @@ def test_it_needs_no_covariate_that_requests_lack() -> None:
     assert fitted_mean(headed, RIG).mean.fitted.needs == ()
 
 
-def test_retrained_it_keeps_its_kind_of_mean(informed: PushModel) -> None:
-    assert learnt(retrain_model(informed, pushes(30, 10))).mean is not None
+def test_retrained_it_keeps_its_mean_and_learns_the_residual_again(informed: PushModel) -> None:
+    table = pushes(30, 10)
+    table = replace(table, outcomes=table.outcomes + [1e-3, 0.0, 0.0])
+    again, mean = learnt(retrain_model(informed, table)), learnt(informed).mean
+    assert again.mean is mean and mean is not None
+    push = Push(table.inputs, table.duration, {})
+    np.testing.assert_allclose(again.targets, mean.residuals(push, table.outcomes), rtol=1e-9, atol=1e-12)
 
 
 def test_held_out_moments_move_with_the_mean_and_widen(with_function: PushModel) -> None:
