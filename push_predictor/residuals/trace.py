@@ -21,6 +21,7 @@ from push_predictor.models.store.model_file import load_model
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
 from push_predictor.residuals.channels.motion import MotionFinding, motion_effects
@@ -29,7 +30,6 @@ from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again, load_evidence, previous_residual
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.extension.coefficients import estimated_effects
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import compared, gain

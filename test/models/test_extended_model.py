@@ -22,6 +22,8 @@ from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.effects.covariate_range import range_of
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
+from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor
@@ -132,7 +134,7 @@ def test_tabulated_model_predicts_single_push_as_in_a_batch(bases: dict[str, Pus
     assert np.max(np.abs(among.mean - predicted(model, table).mean) / sd) < 1e-3
 
 
-def joint(model: PushModel, table: PushTable) -> np.ndarray:
+def joint_covariance(model: PushModel, table: PushTable) -> np.ndarray:
     """Covariance (n, 3, 3) of the effects' sum, from the covariance of all coefficients at once."""
     predictor = model.predictor
     sizes = [len(effect.coefficients) for effect in predictor.effects]
@@ -144,7 +146,8 @@ def joint(model: PushModel, table: PushTable) -> np.ndarray:
         whole[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = shared
         whole[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = shared.T
     push = Push(table.inputs, table.duration, table.covariates)
-    design = np.concatenate([effect.design(physics(), push) for effect in predictor.effects], axis=2)
+    on = Mechanics(predictor.physics, predictor.mechanics)
+    design = np.concatenate(joint(on, predictor.effects, push).designs, axis=2)
     return design @ whole @ design.transpose(0, 2, 1)
 
 
@@ -160,8 +163,8 @@ def test_shared_covariance_of_effects_counts(bases: dict[str, PushModel]) -> Non
     one = with_effects(refit_base(bases["analytical"], table), table, terms[:1])
     push = Push(table.inputs, table.duration, table.covariates)
     uncertainty, alone = both.predictor.shift(push)[1], one.predictor.shift(push)[1]
-    np.testing.assert_allclose(uncertainty, joint(both, table), rtol=1e-9, atol=1e-18)
-    apart = sum(effect.shift(physics(), push)[1] for effect in both.predictor.effects)
+    np.testing.assert_allclose(uncertainty, joint_covariance(both, table), rtol=1e-9, atol=1e-18)
+    apart = replace(both.predictor, cross={}).shift(push)[1]
     assert np.trace(uncertainty.sum(axis=0)) < 3.0 * np.trace(alone.sum(axis=0)) < 0.5 * np.trace(apart.sum(axis=0))
 
 
@@ -180,7 +183,7 @@ def test_added_effects_keep_shared_covariance_of_earlier_ones(bases: dict[str, P
     loaded, probe = load_model(tmp_path / "m"), pushes(10, 3)
     assert_same(predicted(loaded, probe), predicted(second, probe), rtol=1e-9, atol=1e-15)
     uncertainty = second.predictor.shift(Push(probe.inputs, probe.duration, probe.covariates))[1]
-    np.testing.assert_allclose(uncertainty, joint(second, probe), rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(uncertainty, joint_covariance(second, probe), rtol=1e-9, atol=1e-18)
 
 
 # --- the range of its covariates -----------------------------------------------------------------------------------
@@ -394,7 +397,7 @@ def test_correlated_effects_share_explained_variance(bases: dict[str, PushModel]
     predictor = with_effects(refit_base(bases["analytical"], table), table, terms).predictor
     push = Push(table.inputs, table.duration, table.covariates)
     shift, _ = predictor.shift(push)
-    planted, _ = slippery(0.2).shift(physics(), push)
+    planted = joint_shift(Mechanics(physics(), mechanics_of(physics())), [replace(slippery(0.2), exact=True)], push)
     assert np.sum((shift - planted) ** 2) < 0.2 * np.sum(planted**2)
 
 

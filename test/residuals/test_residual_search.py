@@ -11,7 +11,9 @@ import pytest
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import design_of
+from push_predictor.models.effects.exact import Mechanics
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import LIBRARY
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
@@ -31,6 +33,7 @@ SIDE = 0.09
 SQUARE = Outline(0.5 * SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]))
 RIG = Rig("square", SQUARE, 0.00475, "made up", 0.8)
 PHYSICS = AnalyticalPush(SQUARE, 0.00475, 0.25)
+MECHANICS = Mechanics(PHYSICS, mechanics_of(PHYSICS))
 NOISE = np.array([0.0001, 0.00015, 0.004])  # m, m, rad
 SIX = (
     "contact_friction", "pressure_spread", "centre_of_friction", "anisotropic_friction", "tilted_surface", "inertia"
@@ -88,7 +91,7 @@ def a_library_of_six(monkeypatch) -> None:
 @cache
 def baseline(model: PushModel) -> Baseline:
     """The model's errors on its own training data: the same in every search."""
-    return baseline_of(model, PHYSICS)
+    return baseline_of(model, MECHANICS)
 
 
 def searched(model, table, alpha=0.01, mechanisms=None, drivers=DRIVERS) -> SearchResult:

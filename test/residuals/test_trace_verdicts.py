@@ -11,6 +11,7 @@ import pytest
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
@@ -34,13 +35,12 @@ def spec(seed: int, pushes: int = 90) -> SimulationSpec:
 
 
 @cache
-def learnt() -> PushModel:
+def learnt(mean: MeanChoice = "zero") -> PushModel:
     recording = simulate(spec(1, 120))
     assert recording.rig is not None
     table = windows_to_table(find_windows(recording, recording.rig))
-    return train_model(
-        table, recording.rig, "gp", name="deployed", options=TrainingOptions(n_train=min(250, len(table)))
-    )
+    options = TrainingOptions(n_train=min(250, len(table)), mean=mean)
+    return train_model(table, recording.rig, "gp", name="deployed", options=options)
 
 
 def loaded(changes: Changes, faults: Faults) -> LoadedData:
@@ -103,3 +103,13 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
     refit, before = (sum(result[model]["nlpd"].values()) for model in ("refit", "before"))
     assert refit < before
     assert "Retraining on the new pushes fixes this." in worth_sentence(found)
+
+
+def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
+    """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
+    slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
+    found = trace(learnt("mechanics"), loaded(slippery, Faults()))
+    (effect,) = found.effects
+    assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "model_inputs")
+    assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1
+    assert found.terms[0].exact and found.gain_nlpd.value < 0.0

@@ -9,7 +9,9 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import Mechanics, has_exact_effects, joint_shift
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
@@ -38,7 +40,9 @@ def pushes(count: int = 100, seed: int = 0, *effects: Effect) -> PushTable:
         "topic:/warmth": np.repeat(rng.standard_normal(count), 3),
         "slider_heading": rng.uniform(-np.pi, np.pi, n),
     }
-    shift = sum((e.shift(physics(), Push(inputs, duration, covariates))[0] for e in effects), np.zeros((n, 3)))
+    acting = [replace(effect, exact=has_exact_effects(effect.mechanism)) for effect in effects]
+    on = Mechanics(physics(), mechanics_of(physics()))
+    shift = joint_shift(on, acting, Push(inputs, duration, covariates))
     push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 

@@ -11,7 +11,9 @@ from synthetic import square_rig
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import Mechanics, has_exact_effects, joint_shift
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
@@ -72,7 +74,7 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
     shared = np.repeat(rng.standard_normal((count, 3)), 3, axis=0)
     outcomes = physics().displacement(inputs, duration) + NOISE * (0.5 * shared + rng.standard_normal((n, 3)))
     push = Push(inputs, duration, covariates)
-    shift = sum((effect.shift(physics(), push)[0] for effect in effects), np.zeros((n, 3)))
+    shift = joint_shift(Mechanics(physics(), mechanics_of(physics())), effects, push)
     push_id = np.array([f"{seed}-{k // 3}" for k in range(n)])
     return PushTable(inputs, duration, outcomes + shift, push_id, covariates)
 
@@ -80,7 +82,8 @@ def pushes(count: int, seed: int, *effects: Effect) -> PushTable:
 def planted(mechanism: str | None, covariate: str, basis: DriverBasis, *coefficients: float) -> Effect:
     """An effect of exactly this size."""
     size = np.array(coefficients)
-    return Effect(mechanism, covariate, basis, size, np.zeros((len(size), len(size))), np.ones(3))
+    exact = has_exact_effects(mechanism)
+    return Effect(mechanism, covariate, basis, size, np.zeros((len(size), len(size))), np.ones(3), exact)
 
 
 def slippery(size: float) -> Effect:

@@ -20,7 +20,9 @@ class Effect:
     """Shift of the mean: sum over parameters p and columns m of the basis, response_p x basis_m x coefficient_pm.
 
     mechanism: a name of LIBRARY, or None for the generic one. coefficients (p * m,), p first; covariance of them
-    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path).
+    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path). exact:
+    the sum over the columns changes parameters of the mechanics, and the shift is what that changes (see exact.py);
+    otherwise the shift is linear in the coefficients, as effects of older model files are.
     """
 
     mechanism: str | None
@@ -29,6 +31,7 @@ class Effect:
     coefficients: Array
     covariance: Array
     outcome_scale: Array
+    exact: bool = False
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -37,11 +40,11 @@ class Effect:
         return tuple(dict.fromkeys([*self.basis.drivers, *own]))
 
     def design(self, physics: AnalyticalPush, push: Push) -> Array:
-        """The design matrices (n, 3, p * m): shift = design @ coefficients."""
+        """The design matrices (n, 3, p * m) of a linear effect: shift = design @ coefficients."""
         return design_of(self.mechanism, self.basis, physics, push, self.outcome_scale)
 
     def shift(self, physics: AnalyticalPush, push: Push) -> tuple[Array, Array]:
-        """Shift of the mean (n, 3) and its covariance (n, 3, 3)."""
+        """Shift of the mean (n, 3) by a linear effect, and its covariance (n, 3, 3)."""
         design = self.design(physics, push)
         return design @ self.coefficients, design @ self.covariance @ np.transpose(design, (0, 2, 1))
 

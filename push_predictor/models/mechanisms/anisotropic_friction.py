@@ -37,4 +37,5 @@ ANISOTROPIC_FRICTION = Mechanism(
     (Parameter("anisotropy along the world's x", "1", 0.8), Parameter("anisotropy along the diagonal", "1", 0.8)),
     response,
     needs=("slider_heading",),
+    quantities=("grain_x", "grain_diagonal"),
 )

@@ -31,4 +31,5 @@ BODY_ANISOTROPY = Mechanism(
     "body_anisotropy",
     (Parameter("anisotropy along the body's x", "1", 0.8), Parameter("anisotropy along its diagonal", "1", 0.8)),
     response,
+    quantities=("body_anisotropy", "body_anisotropy_diagonal"),
 )

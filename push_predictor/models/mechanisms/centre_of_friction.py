@@ -29,4 +29,5 @@ CENTRE_OF_FRICTION = Mechanism(
     "centre_of_friction",
     (Parameter("shift along the body's x", "m", 0.05), Parameter("shift along the body's y", "m", 0.05)),
     response,
+    quantities=("centre_x", "centre_y"),
 )

@@ -24,5 +24,8 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 
 CONTACT_ASYMMETRY = Mechanism(
-    "contact_asymmetry", (Parameter("contact friction in slip to the left less the mean", "1", 1.0),), response
+    "contact_asymmetry",
+    (Parameter("contact friction in slip to the left less the mean", "1", 1.0),),
+    response,
+    quantities=("friction_difference",),
 )

@@ -19,4 +19,9 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
     return ((more - less) / (high - low))[:, :, None]
 
 
-CONTACT_FRICTION = Mechanism("contact_friction", (Parameter("change of the contact friction", "1", 1.0),), response)
+CONTACT_FRICTION = Mechanism(
+    "contact_friction",
+    (Parameter("change of the contact friction", "1", 1.0),),
+    response,
+    quantities=("contact_friction",),
+)

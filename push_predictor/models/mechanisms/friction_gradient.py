@@ -44,4 +44,5 @@ FRICTION_GRADIENT = Mechanism(
     ),
     response,
     needs=("slider_heading",),
+    quantities=("gradient_x", "gradient_y"),
 )

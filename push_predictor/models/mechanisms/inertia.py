@@ -34,4 +34,9 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
     return response_to([change], STEP, physics, push)
 
 
-INERTIA = Mechanism("inertia", (Parameter("inverse of surface friction times gravity", "s^2/m", 3.0),), response)
+INERTIA = Mechanism(
+    "inertia",
+    (Parameter("inverse of surface friction times gravity", "s^2/m", 3.0),),
+    response,
+    quantities=("inertia",),
+)

@@ -38,13 +38,15 @@ class Mechanism:
 
     response(physics, push) -> (n, 3, p): derivative of the outcome (dx, dy in m, dtheta in rad, push frame) with
     respect to each of the p parameters, at the physics given. needs: covariates that the response itself depends on, in
-    addition to those of its basis.
+    addition to those of its basis. quantities: parameters of the forward model (models/mechanics/parameters.py) that
+    the p parameters change, so that its effects are exact; none if the forward model lacks them.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     response: Callable[[AnalyticalPush, Push], Array]
     needs: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()
 
     def plausible(self, values: Array) -> bool:
         """Whether a rig could have these values (n, p) of the parameters."""

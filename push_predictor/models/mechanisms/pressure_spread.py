@@ -24,5 +24,8 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 
 PRESSURE_SPREAD = Mechanism(
-    "pressure_spread", (Parameter("relative change of the pressure's spread", "1", 1.0),), response
+    "pressure_spread",
+    (Parameter("relative change of the pressure's spread", "1", 1.0),),
+    response,
+    quantities=("pressure_spread",),
 )

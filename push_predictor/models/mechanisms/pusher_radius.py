@@ -18,4 +18,6 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
     return ((more - less) / (high - low))[:, :, None]
 
 
-PUSHER_RADIUS = Mechanism("pusher_radius", (Parameter("change of the pusher's radius", "m", 0.005),), response)
+PUSHER_RADIUS = Mechanism(
+    "pusher_radius", (Parameter("change of the pusher's radius", "m", 0.005),), response, quantities=("radius_error",)
+)

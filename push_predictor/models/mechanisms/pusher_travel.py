@@ -16,5 +16,8 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 
 PUSHER_TRAVEL = Mechanism(
-    "pusher_travel", (Parameter("relative change of the pusher's path length", "1", 0.5),), response
+    "pusher_travel",
+    (Parameter("relative change of the pusher's path length", "1", 0.5),),
+    response,
+    quantities=("travel_share",),
 )

@@ -26,5 +26,8 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 
 PUSHING_HEIGHT = Mechanism(
-    "pushing_height", (Parameter("height of the push times surface friction", "m", 0.05),), response
+    "pushing_height",
+    (Parameter("height of the push times surface friction", "m", 0.05),),
+    response,
+    quantities=("pushing_height",),
 )

@@ -35,4 +35,5 @@ TILTED_SURFACE = Mechanism(
     (Parameter("pull along the world's x, share of friction", "1", 0.7), Parameter("the same along y", "1", 0.7)),
     response,
     needs=("slider_heading",),
+    quantities=("slope_x", "slope_y"),
 )

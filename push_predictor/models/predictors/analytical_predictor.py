@@ -8,6 +8,7 @@ import numpy as np
 
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
+from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.of_mechanics import OfMechanics
 from push_predictor.models.predictors.predictor import Moments
@@ -20,6 +21,11 @@ class AnalyticalPredictor(OfMechanics):
 
     physics: AnalyticalPush
     covariance: Array
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return mechanics_of(self.physics)
 
     def moments(self, push: Push) -> Moments:
         """See Predictor."""

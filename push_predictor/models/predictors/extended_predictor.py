@@ -8,8 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import Mechanics, joint
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
 from push_predictor.recordings.table import INPUTS
@@ -23,9 +26,11 @@ GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so th
 class ExtendedPredictor:
     """A base with effects: each shifts the mean and adds its own uncertainty to the covariance.
 
-    physics: the analytical model from which the effects' responses are computed. scale (3,): factor on the base's
-    standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see Predictor; pairs that it lacks are
-    independent. Without it, two effects with correlated covariates would seem far less certain than their sum is.
+    physics: the analytical model from which the responses of linear effects are computed. scale (3,): factor on the
+    base's standard deviations of dx, dy, dtheta, estimated with the effects in. cross: see Predictor; pairs that it
+    lacks are independent. Without it, two effects with correlated covariates would seem far less certain than their sum
+    is.
+    of_effects: the mechanics whose parameters exact effects change; None for those of the base.
     """
 
     base: BasePredictor
@@ -33,6 +38,12 @@ class ExtendedPredictor:
     effects: tuple[Effect, ...]
     scale: Array
     cross: Cross = field(default_factory=dict)
+    of_effects: FittedMechanics | None = None
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return self.of_effects or self.base.mechanics
 
     @property
     def learnt(self) -> bool:
@@ -84,11 +95,10 @@ class ExtendedPredictor:
 
     def shift(self, push: Push) -> Shift:
         """See Predictor."""
-        shift, uncertainty = np.zeros((len(push.inputs), 3)), np.zeros((len(push.inputs), 3, 3))
-        push = self.completed(push)
-        designs = [effect.design(self.physics, push) for effect in self.effects]
+        uncertainty, push = np.zeros((len(push.inputs), 3, 3)), self.completed(push)
+        together = joint(Mechanics(self.physics, self.mechanics), self.effects, push)
+        shift, designs = together.shift, together.designs
         for effect, design in zip(self.effects, designs, strict=True):
-            shift = shift + design @ effect.coefficients
             uncertainty = uncertainty + design @ effect.covariance @ design.transpose(0, 2, 1)
         for (i, j), covariance in self.cross.items():
             shared = designs[i] @ covariance @ designs[j].transpose(0, 2, 1)
@@ -111,4 +121,9 @@ class ExtendedPredictor:
 
     def with_scalar_mechanics(self) -> Predictor:
         """See Predictor."""
-        return replace(self, physics=scalar_analytical(self.physics), base=self.base.with_scalar_mechanics())
+        return replace(
+            self,
+            physics=scalar_analytical(self.physics),
+            base=self.base.with_scalar_mechanics(),
+            of_effects=scalar_mechanics(self.mechanics),
+        )

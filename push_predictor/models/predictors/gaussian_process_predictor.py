@@ -14,6 +14,7 @@ from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.quadrature import exact_log_density
 from push_predictor.models.gaussian_process.regression import Regression
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.correlation import Correlation, covariances
@@ -61,6 +62,11 @@ class GaussianProcessPredictor(WithoutEffects):
         if self.mean is not None:
             return self.mean.fitted.ellipsoid()
         return AnalyticalPush(self.rig.outline, self.rig.pusher_radius)
+
+    @cached_property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor: the mean, or the textbook's analytical model."""
+        return self.mean.fitted if self.mean is not None else mechanics_of(self.physics)
 
     @property
     def needs(self) -> tuple[str, ...]:

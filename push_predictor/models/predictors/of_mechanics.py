@@ -67,6 +67,11 @@ class OfFittedMechanics(OfMechanics):
         return self.fitted.ellipsoid()
 
     @property
+    def mechanics(self) -> FittedMechanics:
+        """See Predictor."""
+        return self.fitted
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """See Predictor."""
         return self.fitted.needs

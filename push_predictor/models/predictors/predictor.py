@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -46,6 +47,10 @@ class Predictor(Protocol):
     @property
     def physics(self) -> AnalyticalPush:
         """Mechanics from which the responses of effects are computed: its own, or the textbook's if learnt."""
+
+    @property
+    def mechanics(self) -> FittedMechanics:
+        """Mechanics whose parameters exact effects change: its own, or the textbook's if it has none."""
 
     @property
     def learnt(self) -> bool:

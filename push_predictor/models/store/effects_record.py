@@ -77,6 +77,7 @@ def _record(effect: Effect) -> dict[str, Any]:
         "form": {key: list(value) if isinstance(value, tuple) else value for key, value in vars(effect.basis).items()},
         "coefficients": effect.coefficients.tolist(),
         "outcome_scale": effect.outcome_scale.tolist(),
+        **({"exact": True} if effect.exact else {}),
     }
 
 
@@ -91,9 +92,11 @@ def _effect(record: dict[str, Any], covariance: Array) -> Effect:
         raise ValueError(f"covariance of shape {covariance.shape}, {size} x {size} finite numbers are needed")
     if np.linalg.eigvalsh(covariance)[0] < -1e-9 * np.trace(covariance):
         raise ValueError("covariance is not positive semidefinite")
-    return Effect(
-        mechanism, str(record["covariate"]), basis, coefficients, covariance, _numbers(record, "outcome_scale", 3)
-    )
+    exact = bool(record.get("exact", False))
+    if exact and (mechanism is None or not mechanism_named(mechanism).quantities):
+        raise ValueError(f"mechanism {mechanism!r} has no exact effects")
+    scale = _numbers(record, "outcome_scale", 3)
+    return Effect(mechanism, str(record["covariate"]), basis, coefficients, covariance, scale, exact)
 
 
 def _basis(record: dict[str, Any]) -> DriverBasis:

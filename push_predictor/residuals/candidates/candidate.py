@@ -38,11 +38,7 @@ class Candidate:
     @cached_property
     def columns(self) -> Array:
         """Standardised columns (n, 3, p * m), p first, projected off the nuisance."""
-        plain = self.plain
-        if self.nuisance is None:
-            return plain
-        flat = plain.reshape(len(self.nuisance), -1)
-        return np.asarray(flat - self.nuisance @ (self.nuisance.T @ flat)).reshape(plain.shape)
+        return projected(self.plain, self.nuisance)
 
     @property
     def plain(self) -> Array:
@@ -68,6 +64,14 @@ class Candidate:
     def label(self) -> tuple[str | None, str]:
         """Mechanism and covariate, whatever the basis."""
         return self.mechanism, self.covariate
+
+
+def projected(values: Array, nuisance: Array | None) -> Array:
+    """Values (n, 3, ...) projected off orthonormal columns (3 n, q)."""
+    if nuisance is None:
+        return values
+    flat = values.reshape(len(nuisance), -1)
+    return np.asarray(flat - nuisance @ (nuisance.T @ flat)).reshape(values.shape)
 
 
 def candidate(evidence: Evidence, mechanism: str | None, covariate: str, basis: DriverBasis) -> Candidate:

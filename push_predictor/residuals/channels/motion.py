@@ -58,7 +58,7 @@ def motion_effects(
     model: PushModel, evidence: Evidence, alpha: float, names: Sequence[str] | None = None, seed: int = 0
 ) -> MotionFinding:
     """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None."""
-    inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.physics)
+    inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
     share = (1.0 - VARIANCE_SHARE) * alpha
     found = search(evidence, candidates_of(evidence, names, inputs), inputs, share, seed, baseline=baseline)
     spread = variance_effects(

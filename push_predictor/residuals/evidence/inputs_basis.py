@@ -26,7 +26,8 @@ class InputsBasis:
     """The basis at n windows, the constant included.
 
     columns (n, m): contact, angle and speed. without_speed (n, k): contact and angle alone. learnt: the base model was
-    fitted to its inputs. folds: it folds the outline's sides onto one. knows_speed: it was trained at several speeds.
+    fitted to its inputs. absorbs: a refit of it learns effects in its own inputs; one about mechanics keeps these as
+    they are. folds: it folds the outline's sides onto one. knows_speed: it was trained at several speeds.
     """
 
     columns: Array
@@ -34,6 +35,7 @@ class InputsBasis:
     learnt: bool = True
     folds: bool = False
     knows_speed: bool = False
+    absorbs: bool = True
 
 
 def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
@@ -50,6 +52,7 @@ def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
         learnt,
         learnt and outline.rotational_symmetry != 1,
         learnt and float(speed.std()) > VARIES,
+        learnt and not base.predictor.integrates,
     )
 
 

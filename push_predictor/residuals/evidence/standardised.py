@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from push_predictor.models.effects.effect import generic_responses, mechanism_named
+from push_predictor.models.effects.exact import Mechanics
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray, IntArray
 
 BLOCK = 4  # neighbouring pushes may share disturbances that no covariate records
+ACCURACY_OF_FITS = 3e-3  # relative, of displacements
 FEWEST_BLOCKS = 100  # with fewer, blocks are smaller: a bootstrap over few blocks has little power
 
 
@@ -22,14 +25,18 @@ FEWEST_BLOCKS = 100  # with fewer, blocks are smaller: a bootstrap over few bloc
 class Evidence:
     """n windows with covariates and their residuals under one model.
 
-    residual (n, 3): m, m, rad. whitener (n, 3, 3): L^-1, L L' the predicted covariance. physics: the analytical model
-    of the slider, from which mechanisms' responses are computed.
+    residual (n, 3): m, m, rad. whitener (n, 3, 3): L^-1, L L' the predicted covariance. mechanics: what effects act on.
     """
 
     table: PushTable
     residual: Array
     whitener: Array
-    physics: AnalyticalPush
+    mechanics: Mechanics
+
+    @property
+    def physics(self) -> AnalyticalPush:
+        """The analytical model of the slider, from which mechanisms' responses are computed."""
+        return self.mechanics.physics
 
     @property
     def z(self) -> Array:
@@ -48,24 +55,31 @@ class Evidence:
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""
-        return Evidence(self.table.take(rows), self.residual[rows], self.whitener[rows], self.physics)
+        return Evidence(self.table.take(rows), self.residual[rows], self.whitener[rows], self.mechanics)
 
 
 def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | None = None) -> Evidence:
     """Residuals of a table under a model that was not trained on it.
 
-    physics: the analytical model of the slider, physics_of(model) if None. A learnt model's outputs are standardised
-    one by one. A strong correlation of the outputs would give the largest weight to small parts of the residual: in one
-    recording, the second order of an effect was found before the effect itself.
+    physics: the analytical model of the slider in place of the model's own mechanics. A learnt model's outputs are
+    standardised one by one. A strong correlation of the outputs would give the largest weight to small parts of the
+    residual: in one recording, the second order of an effect was found before the effect itself.
     """
     predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
-    return Evidence(table, table.outcomes - mean, whitener_of(covariance), physics or physics_of(model))
+    mechanics = mechanics_under(model) if physics is None else Mechanics(physics, mechanics_of(physics))
+    return Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
 
 
-def physics_of(model: PushModel) -> AnalyticalPush:
-    """The analytical model of a push model's slider: its own, or the textbook's for a learnt one."""
-    return model.predictor.physics
+def mechanics_under(model: PushModel) -> Mechanics:
+    """What effects of a push model act on: its own mechanics, or the textbook's for a learnt one without.
+
+    Shifts are differences, and their fits take many: less accuracy than that of a prediction is enough.
+    """
+    fitted = model.predictor.base.mechanics
+    return Mechanics(
+        model.predictor.physics, replace(fitted, mechanics=replace(fitted.mechanics, accuracy=ACCURACY_OF_FITS))
+    )
 
 
 def push_order(table: PushTable) -> IntArray:

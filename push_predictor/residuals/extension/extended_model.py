@@ -14,9 +14,9 @@ from push_predictor.models.predictors import Cross, ExtendedPredictor, Predictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model
 from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.extension.coefficients import estimated_effects
 from push_predictor.residuals.extension.refit import with_predictor
 
 
@@ -27,8 +27,9 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     part of the effects, so its own residuals would make them too small. Raises TrainingError for too few rows.
     """
     learnt = base.predictor.learnt
-    own_inputs = inputs_basis(base, evidence.table).columns if learnt else None
-    effects, cross = estimated_effects(evidence, candidates, own_inputs)
+    # About mechanics, a learnt base expresses little in its own inputs, and a refit keeps the mechanics.
+    own_inputs = inputs_basis(base, evidence.table).columns if learnt and not base.predictor.base.integrates else None
+    effects, cross = estimated_effects(evidence, candidates, own_inputs, base.predictor.effects)
     predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
     table, push = evidence.table, Push(evidence.table.inputs, evidence.table.duration, evidence.table.covariates)
     shift, _ = predictor.shift(push)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.effects.exact import Mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
@@ -82,11 +82,11 @@ class Baseline:
         return {}
 
 
-def baseline_of(model: PushModel, physics: AnalyticalPush) -> Baseline:
+def baseline_of(model: PushModel, mechanics: Mechanics) -> Baseline:
     """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps."""
     table, predictor = with_inputs(model.training), model.predictor.with_independent_outputs()
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
-    evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), physics)
+    evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
     return Baseline(evidence, inputs_basis(model, table))
 
 

@@ -5,6 +5,7 @@ Tried are linear, logarithmic, a step with its place, quadratic, a map over the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,17 +19,38 @@ from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.selection.cross_validation import Judged, gains_of
 from push_predictor.types import Array, IntArray
 
+MOST_PLACES = 60  # that are tried near the best of these
 STEPS = 9  # places of a step that are tried, at quantiles of the covariate
 SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "periodic", "periodic, twice around",
                   "quadratic", "map")  # fmt: skip
 
 
 def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: Array, block: IntArray) -> Judged:
-    """The candidate in the simplest basis whose gain is within one standard error of the best."""
+    """The candidate in the simplest basis whose gain is within one standard error of the best.
+
+    A step is then moved to the place between two pushes, near the one that was tried, where it gains most.
+    """
     residualizer = Residualizer(controls)
     residual = residualizer(z)
-    tried = [_with_basis(candidate, basis, table) for basis in bases_for(candidate, table)]
-    return simplest([Judged(c, gains_of(residual, residualizer(c.columns), block)) for c in tried])
+
+    def judged(basis: DriverBasis) -> Judged:
+        tried = _with_basis(candidate, basis, table)
+        return Judged(tried, gains_of(residual, residualizer(tried.columns), block))
+
+    chosen = simplest([judged(basis) for basis in bases_for(candidate, table)])
+    return _moved(chosen, table.covariates[candidate.covariate], judged) if _is_step(chosen) else chosen
+
+
+def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Candidate:
+    """The candidate as a step of its covariate, at the place between two pushes where it gains most."""
+    values = table.covariates[candidate.covariate]
+
+    def judged(basis: DriverBasis) -> Judged:
+        tried = _with_basis(candidate, basis, table)
+        return Judged(tried, gains_of(z, tried.columns, block))
+
+    tried = [judged(DriverBasis("step", (candidate.covariate,), place=place)) for place in _places(values)]
+    return _moved(max(tried, key=_gain), values, judged).candidate
 
 
 def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:
@@ -67,6 +89,30 @@ def _places(values: Array) -> list[float]:
     marks = np.quantile(values, np.arange(1, STEPS + 1) / (STEPS + 1.0))
     index = np.unique(np.clip(np.searchsorted(ordered, marks), 1, len(ordered) - 1))
     return [float(0.5 * (ordered[k - 1] + ordered[k])) for k in index]
+
+
+def _is_step(judged: Judged) -> bool:
+    return judged.candidate.basis.name == "step"
+
+
+def _moved(step: Judged, values: Array, judged: Callable[[DriverBasis], Judged]) -> Judged:
+    """The step at the place near its own where it gains most."""
+    near = _places_near(values, step.candidate.basis.place)
+    return max([step, *(judged(replace(step.candidate.basis, place=place)) for place in near)], key=_gain)
+
+
+def _places_near(values: Array, place: float) -> list[float]:
+    """Midpoints between neighbouring values, from the next place that was tried below to the next above."""
+    ordered, tried = np.unique(values), _places(values)
+    low = max((other for other in tried if other < place), default=-np.inf)
+    high = min((other for other in tried if other > place), default=np.inf)
+    middle = 0.5 * (ordered[1:] + ordered[:-1])
+    inside = middle[(middle > low) & (middle < high)]
+    return [float(middle) for middle in inside[:: max(1, len(inside) // MOST_PLACES)]]
+
+
+def _gain(judged: Judged) -> float:
+    return judged.gain
 
 
 def _error(differences: Array) -> float:

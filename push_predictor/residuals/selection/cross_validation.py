@@ -13,20 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.coefficients import ExactFit
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.selection.screening import TINY
 from push_predictor.types import Array, BoolArray, IntArray
 
 FOLDS = 5
-RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate with its cross-validated gain (blocks,) in nats."""
+    """A candidate with its gain (blocks,) in nats, cross-validated.
+
+    exact: None, or the exact fit whose gain it is, with the responses there as those of the candidate.
+    """
 
     candidate: Candidate
     gains: Array
+    exact: ExactFit | None = None
 
     @property
     def gain(self) -> float:
@@ -58,6 +62,14 @@ def fit(flat: Array, residual: Array, block: IntArray | None = None) -> Array:
     each = scores @ root
     estimate = each.sum(axis=0)
     return np.asarray(root @ (estimate * (1.0 if block is None else _james_stein(estimate, each))))
+
+
+def judged_exactly(exact: ExactFit, z: Array, residualizer: Residualizer, block: IntArray) -> Judged:
+    """An exact fit with its gain on residuals z (n, 3), a nat less for each of its coefficients."""
+    before, after = residualizer(z), residualizer(z - exact.shift)
+    old, new = (np.mean(r**2, axis=0) for r in (before, after))
+    gains = sums_by(block, (_log_density(after, new) - _log_density(before, old))[:, None])[:, 0]
+    return Judged(exact.candidate, gains - exact.candidate.plain.shape[2] / len(gains), exact)
 
 
 def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:

@@ -111,9 +111,9 @@ class ForwardSelection:
 
     def subtracted(self, term: SelectedTerm, z: Array) -> Array:
         """The residuals minus a term; for a learnt base also minus its constant part, which a refit learns."""
-        residual = z - term.best.plain @ term.coefficients
+        residual = z - term.shift
         own = any(c.label == (term.best.mechanism, CONSTANT) for c in self.choice.candidates)
-        if not self.choice.inputs.learnt or term.best.kind == "constant" or not own:
+        if not self.choice.inputs.absorbs or term.best.kind == "constant" or not own:
             return residual
         constant = term.best.response
         return residual - constant @ fit(constant, residual)
@@ -144,4 +144,4 @@ class ForwardSelection:
     def _rank(self, candidate: Candidate) -> int:
         if candidate.covariate in LOCAL:
             return 1
-        return OWN if self.choice.own(candidate) else 0
+        return OWN if self.choice.inputs.absorbs and self.choice.own(candidate) else 0

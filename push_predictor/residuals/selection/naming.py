@@ -7,7 +7,7 @@ is named only if the generic polynomial along the same covariate explains little
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from push_predictor.residuals.selection.screening import raw_scores, screen, uni
 from push_predictor.types import Array, IntArray
 
 REJECTED = 0.01  # p below which a rival is rejected
+SURELY = 2.33  # the same in standard errors
 UNEXPLAINED = 0.05  # p below which a mechanism fails to explain something along its covariate
 MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain: it is linear
 
@@ -55,8 +56,9 @@ def open_rivals(best: Judged, others: Sequence[Judged], case: Case, seed: int = 
     return [best, *(other for other in others if not _rejected(best, other, case, seed))]
 
 
-def plausible(candidate: Candidate, case: Case) -> bool:
+def plausible(judged: Judged, case: Case) -> bool:
     """Whether the fitted size is one that a rig can have; with a larger one a mechanism only mimics another."""
+    candidate, case = judged.candidate, _seen_by(judged, case)
     if candidate.mechanism is None:
         return True
     residualizer = Residualizer(case.controls)
@@ -67,8 +69,15 @@ def plausible(candidate: Candidate, case: Case) -> bool:
     return mechanism_named(candidate.mechanism).plausible(np.quantile(np.abs(strength), 0.9, axis=0)[None])
 
 
+def surely_larger(one: Judged, other: Judged) -> bool:
+    """Whether a gain is larger by more than chance from block to block."""
+    more = one.gains - other.gains
+    return bool(more.sum() > SURELY * np.sqrt(len(more)) * more.std())
+
+
 def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:
     """Share of the gain along the covariate that only the generic polynomial achieves; 0 if that may be chance."""
+    case = _seen_by(mechanism, case)
     blocks, columns = _given(mechanism.candidate, generic, case)
     if _p_value(blocks, columns, seed) > UNEXPLAINED:
         return 0.0
@@ -77,9 +86,19 @@ def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: i
 
 
 def _rejected(best: Judged, other: Judged, case: Case, seed: int) -> bool:
-    """Whether the best still explains something once the other is regressed out."""
-    blocks, columns = _given(other.candidate, best.candidate, case)
+    """Whether the best still explains something once the other is regressed out.
+
+    Of exact fits, whether the best one's gain is larger by more than chance from block to block.
+    """
+    if best.exact and other.exact:
+        return surely_larger(best, other)
+    blocks, columns = _given(other.candidate, best.candidate, _seen_by(other, case))
     return _p_value(blocks, columns, seed) <= REJECTED and best.gain > other.gain
+
+
+def _seen_by(judged: Judged, case: Case) -> Case:
+    """The case with the target of an exact fit in place of the residuals."""
+    return case if judged.exact is None else replace(case, z=judged.exact.target)
 
 
 def _given(first: Candidate, second: Candidate, case: Case) -> tuple[ResidualBlocks, Array]:

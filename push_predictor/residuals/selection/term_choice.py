@@ -13,18 +13,20 @@ from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.evidence.drivers import LOCAL
+from push_predictor.residuals.candidates.coefficients import exact_fit
+from push_predictor.residuals.evidence.drivers import CONSTANT, COURSE, LOCAL
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.basis_choice import simplest_basis
-from push_predictor.residuals.selection.cross_validation import Judged, fit, judge
+from push_predictor.residuals.selection.basis_choice import best_step, simplest_basis
+from push_predictor.residuals.selection.cross_validation import Judged, fit, judge, judged_exactly
 from push_predictor.residuals.selection.naming import (
     MOST_UNEXPLAINED,
     Case,
     Naming,
     open_rivals,
     plausible,
+    surely_larger,
     unexplained_share,
 )
 from push_predictor.residuals.selection.screening import Screened
@@ -33,7 +35,7 @@ from push_predictor.types import Array
 NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that is fixed to body or world does not grow with these
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_REFINED = 12  # of the labels, those that are tried in every basis
-MOST_NAMED = 5  # mechanisms along the covariate, best first, that are tried as its name
+MOST_NAMED = 6  # candidates along the covariate, best first, that are tried as its name
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
 
@@ -41,7 +43,8 @@ FELT = 0.15  # an output is named if its standardised shift is at least this sha
 class SelectedTerm:
     """A selected candidate with its fit and its rivals.
 
-    rivals: all that these data do not reject, the best first. p_value: family-wise. share: of the sum of squares of the
+    rivals: all that these data do not reject, the best first. p_value: family-wise. coefficients: of the candidate's
+    columns. shift (n, 3): what the term explains of the standardised residuals. share: of the sum of squares of the
     standardised residual that the term explains. own: whether the term lies in the inputs of a learnt base, so that a
     refit learns it.
     """
@@ -50,6 +53,7 @@ class SelectedTerm:
     rivals: tuple[Judged, ...]
     p_value: float
     coefficients: Array
+    shift: Array
     share: float
     naming: Naming
     own: bool
@@ -89,14 +93,15 @@ class TermChoice:
         """The best of the candidates found, named; covariates of earlier terms, used, are preferred if they fit."""
         chosen = self._not_constant(sorted(found, key=lambda k: -screened.statistic[k])[:MOST_JUDGED])
         growing = self._growing(found)
-        judged = self._refined([_if_growing(self.candidates[k], growing) for k in chosen], z)
+        judged = self._with_onset(self._refined([_if_growing(self.candidates[k], growing) for k in chosen], z), z)
         rivals = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
         driver = next((j for j in rivals if j.candidate.covariate in used), judged[0]).candidate.covariate
         best, naming = self._named(judged, driver, z, growing)
         drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in rivals)]))
         labels = {j.candidate.label for j in judged}
-        along = [k for k in chosen if self.candidates[k].label in labels and self.candidates[k].covariate == driver]
-        p_value = min(float(screened.p_value[k]) for k in along)
+        tested = [k for k in chosen if self.candidates[k].label in labels]
+        along = [k for k in tested if self.candidates[k].covariate == driver]
+        p_value = min(float(screened.p_value[k]) for k in along or tested)
         return self._fitted(best, rivals, p_value, replace(naming, drivers=drivers), z)
 
     def _growing(self, found: Sequence[int]) -> set[str]:
@@ -120,6 +125,27 @@ class TermChoice:
         first = _one_each(sorted(judged, key=lambda j: -j.gain), None, "label")[:MOST_REFINED]
         return sorted((self._with_simplest_basis(j.candidate, z) for j in first), key=lambda j: -j.gain)
 
+    def _with_onset(self, judged: list[Judged], z: Array) -> list[Judged]:
+        """With steps in front, if a constant effect surely sets in during the recording.
+
+        Where a base absorbs no constant effect, a step is compared with it as a whole.
+        """
+        best = judged[0]
+        if self.inputs.absorbs or best.candidate.mechanism is None or best.candidate.covariate != CONSTANT:
+            return judged
+        always = self._exact(best, z)
+        same = {c.covariate: c for c in reversed(self.candidates) if c.mechanism == best.candidate.mechanism}
+        later = [self._setting_in(same[name], z) for name in COURSE if name in same]
+        surely = [j for j in later if surely_larger(j, always)]
+        return [*sorted(surely, key=lambda j: -j.gain), *judged]
+
+    def _setting_in(self, candidate: Candidate, z: Array) -> Judged:
+        """The whole effect of the candidate's mechanism from some value of its covariate on."""
+        whole, block = replace(candidate, nuisance=None, nuisance_growing=None), self.evidence.block
+        stepped = best_step(whole, self.evidence.table, z, block)
+        nothing = np.empty((len(z), 0))
+        return judged_exactly(exact_fit(self.evidence, stepped, z, nothing), z, Residualizer(nothing), block)
+
     def _judge(self, candidates: Sequence[Candidate], kind: Kind, z: Array) -> list[Judged]:
         return judge(candidates, z, controls_for(kind, self.inputs), self.evidence.block)
 
@@ -131,9 +157,7 @@ class TermChoice:
         """The best mechanism along a covariate, if any fits; else the generic polynomial."""
         by_gain = self._along(judged, driver, z, growing)
         known = [
-            j
-            for j in by_gain
-            if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j.candidate, self._case(j, z))
+            j for j in by_gain if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j, self._case(j, z))
         ]
         generics = self._generics(driver, known[0].candidate.basis if known else None, z)
         unexplained = {id(j): self._unexplained(j, generics, z) for j in known[:MOST_NAMED]}
@@ -148,12 +172,21 @@ class TermChoice:
         return best, Naming((driver,), mechanisms, True, unexplained.get(id(best), 0.0))
 
     def _along(self, judged: Sequence[Judged], driver: str, z: Array, growing: set[str]) -> list[Judged]:
-        """Every candidate of a covariate in its simplest adequate basis, by gain."""
+        """Every candidate of a covariate in its simplest adequate basis, fitted exactly, by gain."""
         first = {c.label: c for c in reversed(self.candidates)}
         along = [_if_growing(c, growing) for c in first.values() if c.covariate == driver]
         refined = {j.candidate.label: j for j in judged}
-        each = (refined.get(c.label) or self._with_simplest_basis(c, z) for c in along)
-        return sorted(each, key=lambda j: -j.gain)
+        linear = sorted((refined.get(c.label) or self._with_simplest_basis(c, z) for c in along), key=lambda j: -j.gain)
+        exact = (self._exact(j, z) if j.gain > 0.0 and not j.exact else j for j in linear[:MOST_NAMED])
+        return sorted(exact, key=lambda j: -j.gain)
+
+    def _exact(self, judged: Judged, z: Array) -> Judged:
+        """The mechanism fitted exactly; the generic polynomial as it is."""
+        candidate = judged.candidate
+        if candidate.mechanism is None:
+            return judged
+        found = exact_fit(self.evidence, candidate, z, controls_for(candidate.kind, self.inputs))
+        return judged_exactly(found, z, self.residualizers[candidate.kind], self.evidence.block)
 
     def _unexplained(self, mechanism: Judged, generics: Sequence[Candidate], z: Array) -> float:
         case = self._case(mechanism, z)
@@ -168,12 +201,14 @@ class TermChoice:
 
     def _fitted(self, best: Judged, rivals: Sequence[Judged], p_value: float, naming: Naming, z: Array) -> SelectedTerm:
         chosen, residualizer = best.candidate, self.residualizers[best.candidate.kind]
-        residual, columns = residualizer(z), residualizer(chosen.columns)
-        coefficients = fit(columns, residual)
-        share = 1.0 - float(np.sum((residual - columns @ coefficients) ** 2) / np.sum(residual**2))
+        target, columns = best.exact.target if best.exact else z, residualizer(chosen.columns)
+        coefficients = fit(columns, residualizer(target))
+        shift = best.exact.shift if best.exact else chosen.plain @ coefficients
+        left = z - (shift if best.exact else chosen.columns @ coefficients)
+        share = 1.0 - float(np.sum(residualizer(left) ** 2) / np.sum(residualizer(z) ** 2))
         others = tuple(j for j in rivals if j.candidate.label != chosen.label)
-        own = self.inputs.learnt and self.own(chosen)
-        return SelectedTerm(chosen, (best, *others), p_value, coefficients, share, naming, own)
+        own = self.inputs.absorbs and self.own(chosen)
+        return SelectedTerm(chosen, (best, *others), p_value, coefficients, shift, share, naming, own)
 
 
 def _is_constant(candidate: Candidate) -> bool:

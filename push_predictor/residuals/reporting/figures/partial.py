@@ -10,9 +10,10 @@ import numpy as np
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, design_of, mechanism_named
+from push_predictor.models.effects.exact import joint, joint_shift
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.evidence.standardised import evidence_of, physics_of
+from push_predictor.residuals.evidence.standardised import evidence_of, mechanics_under
 from push_predictor.residuals.outcome import Trace
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -83,7 +84,7 @@ def held_out_rows(trace: Trace) -> Rows:
 
 def shift_of(trace: Trace, effect: Effect, table: PushTable) -> Array:
     """Shift of the mean (n, 3) by an effect."""
-    return effect.shift(physics_of(trace.model), _push(table))[0]
+    return joint_shift(mechanics_under(trace.model), [effect], _push(table))
 
 
 def strength_of(effect: Effect, table: PushTable) -> Strength:
@@ -111,9 +112,11 @@ def strength_of(effect: Effect, table: PushTable) -> Strength:
 def responses(trace: Trace, strength: Strength, rows: Rows) -> Array:
     """Standardised outcome (n, 3, q) per unit of each of the q parameters."""
     effect = strength.effect
-    bare = design_of(
-        effect.mechanism, DriverBasis("constant"), physics_of(trace.model), _push(rows.table), effect.outcome_scale
-    )
+    on, push = mechanics_under(trace.model), _push(rows.table)
+    if effect.exact:
+        bare = joint(on, [effect], push).responses(effect)
+    else:
+        bare = design_of(effect.mechanism, DriverBasis("constant"), on.physics, push, effect.outcome_scale)
     return np.asarray(np.einsum("nij,njp,pq->niq", rows.whitener, bare, strength.pattern))
 
 

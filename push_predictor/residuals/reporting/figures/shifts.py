@@ -11,12 +11,13 @@ import numpy as np
 from push_predictor.evaluation.report.maps import arc_length, commonest_condition, sector_length
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import joint
 from push_predictor.models.mechanisms import Push
 from push_predictor.reporting.canvas import COLOURS, PREDICTED, SYMBOLS, UNIT_NAMES, UNITS, grid
-from push_predictor.residuals.evidence.standardised import physics_of
+from push_predictor.residuals.evidence.standardised import mechanics_under
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows
+from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows, shift_of
 from push_predictor.types import Array, BoolArray
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def binned_means(
 ) -> Means:
     """Means of an output's shift (shown units) in bins of x (n,) with equal counts of the group's windows."""
     design = _design(trace, effect, rows)[:, output] * UNITS[output]
-    fitted = design @ effect.coefficients
+    fitted = shift_of(trace, effect, rows.table)[:, output] * UNITS[output]
     found = fitted + _residual(rows)[:, output] * UNITS[output]
     edges = np.unique(np.quantile(x[group], np.linspace(0.0, 1.0, bins + 1)[1:-1])) if group.any() else np.empty(0)
     number = np.where(group, np.searchsorted(edges, x, side="right"), -1)
@@ -121,7 +122,7 @@ def _paint_shift(ax: Axes, trace: Trace, effect: Effect, parts: Sequence[Rows | 
     for rows, (colour, marker, name) in zip(parts, looks, strict=True):
         if rows is None:
             continue
-        fitted = _design(trace, effect, rows)[:, k] @ effect.coefficients * UNITS[k]
+        fitted = shift_of(trace, effect, rows.table)[:, k] * UNITS[k]
         everything = np.ones(len(fitted), dtype=np.bool_)
         means = binned_means(trace, effect, rows, fitted, everything, k, SHIFT_BINS)
         _bars(ax, means, colour, marker, name)
@@ -141,7 +142,7 @@ def _bars(ax: Axes, means: Means, colour: str, marker: str, name: str | None = N
 
 def _design(trace: Trace, effect: Effect, rows: Rows) -> Array:
     push = Push(rows.table.inputs, rows.table.duration, rows.table.covariates)
-    return design_of(effect.mechanism, effect.basis, physics_of(trace.model), push, effect.outcome_scale)
+    return joint(mechanics_under(trace.model), [effect], push).designs[0]
 
 
 def _residual(rows: Rows) -> Array:

@@ -1,0 +1,122 @@
+"""Effects as changes of parameters of the mechanics: exact for large changes, and together, since changes add up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanisms import Push
+from push_predictor.types import Array
+
+# Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
+DIFFERENCE = 0.5
+
+Changes = dict[str, Array]  # by name of a parameter: its change (n,) at each push
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanics:
+    """What effects act on: the analytical model, for linear effects, and the base's own mechanics, for exact ones."""
+
+    physics: AnalyticalPush
+    fitted: FittedMechanics
+
+
+@dataclass(frozen=True, eq=False)
+class JointShift:
+    """Shift (n, 3) of the mean; per effect, its derivatives (n, 3, p * m) by the coefficients.
+
+    of_parameter: those (n, 3) by each parameter of the mechanics that exact effects change.
+    """
+
+    shift: Array
+    designs: list[Array]
+    of_parameter: Changes
+
+    def responses(self, effect: Effect) -> Array:
+        """Derivatives (n, 3, p) by the parameters that an exact effect changes."""
+        return np.stack([self.of_parameter[name] for name in _quantities(effect)], axis=2)
+
+
+def has_exact_effects(mechanism: str | None) -> bool:
+    """Whether the forward model has the parameters of a mechanism."""
+    return mechanism is not None and bool(mechanism_named(mechanism).quantities)
+
+
+def joint_shift(mechanics: Mechanics, effects: Sequence[Effect], push: Push) -> Array:
+    """Shift of the mean (n, 3) by all effects together."""
+    return joint(mechanics, effects, push, derivatives=False).shift
+
+
+def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
+    """The shift by all effects together, and where they act its derivatives by their coefficients."""
+    exact, fitted = [effect for effect in effects if effect.exact], mechanics.fitted
+    changes, n = changes_of(fitted, exact, push), len(push.inputs)
+    ends = {name: _ends(fitted, name, change) for name, change in changes.items()} if derivatives else {}
+    tried = [{**changes, name: end} for name, both in ends.items() for end in both]
+    moved = displaced(fitted, [changes, {}, *tried], push) if exact else np.zeros((2, n, 3))
+    of_parameter = {
+        name: (moved[2 * k + 3] - moved[2 * k + 2]) / (high - low)[:, None]
+        for k, (name, (low, high)) in enumerate(ends.items())
+    }
+    shift, designs = moved[0] - moved[1], []
+    for effect in effects:
+        if not effect.exact:
+            design = effect.design(mechanics.physics, push)
+            shift = shift + design @ effect.coefficients
+            designs.append(design)
+        elif derivatives:
+            values = effect.basis.values(push.covariates, n)
+            responses = np.stack([of_parameter[name] for name in _quantities(effect)], axis=2)
+            designs.append((responses[:, :, :, None] * values[:, None, None, :]).reshape(n, 3, -1))
+    return JointShift(shift, designs, of_parameter)
+
+
+def changes_of(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push) -> Changes:
+    """The sum of all effects' changes of each parameter, within the parameter's plausible range."""
+    n, total = len(push.inputs), Changes()
+    for effect in effects:
+        values = effect.basis.values(push.covariates, n)
+        strengths = effect.coefficients.reshape(-1, values.shape[1]) @ values.T
+        for name, strength in zip(_quantities(effect), strengths, strict=True):
+            total[name] = total.get(name, 0.0) + strength
+    return {name: np.clip(change, *_range(mechanics, name)) for name, change in total.items()}
+
+
+def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) -> Array:
+    """Displacements (k, n, 3) with each of k sets of changes, computed as one set of pushes.
+
+    The heading of a push follows from that of the slider.
+    """
+    n, k, given = len(push.inputs), len(tried), dict(push.covariates)
+    names = {name for changes in tried for name in changes}
+    if any(BY_NAME[name].needs for name in (*names, *mechanics.values)) and "slider_heading" in given:
+        normal = mechanics.mechanics.outline.inward_normal(push.inputs[:, 1])
+        given["push_heading"] = given["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + push.inputs[:, 2]
+    covariates = {name: np.tile(column, k) for name, column in given.items()}
+    columns = {name: np.concatenate([changes.get(name, np.zeros(n)) for changes in tried]) for name in sorted(names)}
+    inputs, duration = np.tile(push.inputs, (k, 1)), np.tile(push.duration, k)
+    return mechanics.displacement(inputs, duration, covariates, columns).reshape(k, n, 3)
+
+
+def _ends(mechanics: FittedMechanics, name: str, change: Array) -> tuple[Array, Array]:
+    """Changes (n,) below and above, between which a derivative is taken, within the parameter's range."""
+    step, (low, high) = DIFFERENCE * BY_NAME[name].spread, _range(mechanics, name)
+    return np.maximum(change - step, low), np.minimum(change + step, high)
+
+
+def _range(mechanics: FittedMechanics, name: str) -> tuple[float, float]:
+    """The range of a plausible change. A sum of terms is what must not fall below zero of contact friction."""
+    parameter, value = BY_NAME[name], mechanics.value(name)
+    low = -parameter.high if name == "contact_friction" else parameter.low
+    return low - value, parameter.high - value
+
+
+def _quantities(effect: Effect) -> tuple[str, ...]:
+    return mechanism_named(str(effect.mechanism)).quantities

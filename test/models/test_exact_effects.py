@@ -1,0 +1,226 @@
+"""Effects as changes of parameters of the mechanics: exact for large changes, and together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drifting_models import DRIFT, extended, physics, pushes, slippery
+from synthetic import square_rig
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
+from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.selection.basis_choice import simplest_basis
+
+EXACT = [mechanism.name for mechanism in LIBRARY if mechanism.quantities]
+ALWAYS = DriverBasis("constant")
+IN_METRES = np.array([1.0, 1.0, 0.04])  # a turn counts as the path of a point 4 cm from the centre
+
+
+def made(n: int, seed: int = 0, duration: float = 0.2) -> Push:
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
+    covariates = {"slider_heading": rng.uniform(-3.0, 3.0, n), "elapsed_time": np.linspace(0.0, 1000.0, n)}
+    return Push(inputs, np.full(n, duration), covariates)
+
+
+def square(friction: float = 0.25) -> Mechanics:
+    model = AnalyticalPush(square_rig().outline, square_rig().pusher_radius, friction)
+    return Mechanics(model, mechanics_of(model))
+
+
+def effect(mechanism: str, *size: float, basis: DriverBasis = ALWAYS) -> Effect:
+    covariance = 1e-4 * np.eye(len(size))
+    return Effect(mechanism, "model_inputs", basis, np.array(size), covariance, np.ones(3), exact=True)
+
+
+def size_of(shift: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((shift * IN_METRES) ** 2)))
+
+
+# --- the shift -----------------------------------------------------------------------------------------------------
+
+
+def test_a_large_change_of_friction_shifts_as_a_model_with_that_friction() -> None:
+    push = made(100)
+    slick, rough = (square(mu).physics.displacement(push.inputs, push.duration) for mu in (0.25, 0.75))
+    shift = joint_shift(square(0.25), [effect("contact_friction", 0.5)], push)
+    assert size_of(shift - (rough - slick)) < 5e-3 * size_of(rough - slick)
+
+
+def test_two_effects_together_are_both_changes_at_once() -> None:
+    push, on = made(100), square()
+    both = effect("contact_friction", 0.4), effect("centre_of_friction", 0.01, -0.005)
+    support = replace(on.physics.support, centre=(0.01, -0.005))
+    changed = replace(on.physics, contact_friction=0.65, support=support)
+    expected = changed.displacement(push.inputs, push.duration) - on.physics.displacement(push.inputs, push.duration)
+    together, apart = joint_shift(on, both, push), sum(joint_shift(on, [one], push) for one in both)
+    assert size_of(together - expected) < 5e-3 * size_of(expected)
+    assert size_of(apart - expected) > 0.05 * size_of(expected)
+
+
+def test_two_effects_on_one_parameter_add_up() -> None:
+    push, on = made(50), square()
+    two = [effect("contact_friction", 0.1), effect("contact_friction", 0.25)]
+    expected = joint_shift(on, [effect("contact_friction", 0.35)], push)
+    np.testing.assert_allclose(joint_shift(on, two, push), expected, atol=1e-12)
+
+
+def test_an_effect_follows_its_covariate() -> None:
+    push, on = made(60), square()
+    later = effect("contact_friction", 0.5, basis=DriverBasis("step", ("elapsed_time",), place=500.0))
+    shift, always = (joint_shift(on, [one], push) for one in (later, effect("contact_friction", 0.5)))
+    after = push.covariates["elapsed_time"] >= 500.0
+    assert not shift[~after].any()
+    np.testing.assert_allclose(shift[after], always[after], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_small_effect_is_the_response_of_its_mechanism(name: str) -> None:
+    push, on = made(120, 1), square()
+    parameters = mechanism_named(name).parameters
+    responses = mechanism_named(name).response(on.physics, push)
+    designs = joint(on, [effect(name, *np.zeros(len(parameters)))], push).designs[0]
+    for k in range(len(parameters)):
+        linear, exact = responses[:, :, k] * IN_METRES, designs[:, :, k] * IN_METRES
+        # Pushes at the edge of slip see a kink at different places; the mass moment of inertia is the outline's.
+        assert np.sum(linear * exact) == pytest.approx(np.sum(linear**2), rel=0.1)
+        assert np.linalg.norm(linear - exact) < 0.25 * np.linalg.norm(linear)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_designs_are_derivatives_where_the_effects_act(name: str) -> None:
+    push, on = made(80, 2), square()
+    spread = np.array([BY_NAME[quantity].spread for quantity in mechanism_named(name).quantities])
+    acting = effect(name, *(2.0 * spread))
+    design = joint(on, [acting], push).designs[0]
+    for k, step in enumerate(0.3 * spread * np.eye(len(spread))):
+        more, less = (
+            joint_shift(on, [replace(acting, coefficients=acting.coefficients + side * step)], push)
+            for side in (1.0, -1.0)
+        )
+        difference = (more - less) / (0.6 * spread[k])
+        assert size_of(design[:, :, k] - difference) < 0.15 * size_of(difference)
+
+
+def test_a_parameter_stays_within_its_plausible_range() -> None:
+    push, on = made(40), square(0.25)
+    far, end = (joint_shift(on, [effect("contact_friction", size)], push) for size in (9.0, 1.25))
+    np.testing.assert_array_equal(far, end)
+    below, none = (joint_shift(on, [effect("contact_friction", size)], push) for size in (-9.0, -0.25))
+    np.testing.assert_array_equal(below, none)
+    far, end = (joint_shift(on, [effect("pusher_travel", size)], push) for size in (-9.0, -0.5))
+    np.testing.assert_array_equal(far, end)
+
+
+def test_a_spread_pressure_is_a_larger_surface() -> None:
+    push, on = made(60), square()
+    length = on.physics.support.length * np.exp(0.3)
+    spread = replace(on.physics, support=replace(on.physics.support, length=length))
+    expected = spread.displacement(push.inputs, push.duration) - on.physics.displacement(push.inputs, push.duration)
+    assert size_of(joint_shift(on, [effect("pressure_spread", 0.3)], push) - expected) < 5e-3 * size_of(expected)
+    rougher = [effect("friction_gradient", 8.0, 0.0)]  # shifts the centre by the mean square of the pressure
+    wide, slope = Mechanics(spread, mechanics_of(spread)), joint_shift(on, rougher, push)
+    both = joint_shift(on, [*rougher, effect("pressure_spread", 0.3)], push)
+    assert size_of(both - expected - joint_shift(wide, rougher, push)) < 0.02 * size_of(slope)
+
+
+def test_the_heading_of_the_slider_turns_effects_of_the_table() -> None:
+    """A grain along world x under a slider that is turned by a quarter is a grain along y under one that is not."""
+    push, on = made(60, duration=0.004), square()  # so short that the slider hardly turns
+    ahead, aside = (replace(push, covariates={"slider_heading": np.full(60, turn)}) for turn in (0.0, 0.5 * np.pi))
+    one = joint_shift(on, [effect("anisotropic_friction", 0.4, 0.0)], ahead)
+    other = joint_shift(on, [effect("anisotropic_friction", -0.4, 0.0)], aside)
+    np.testing.assert_allclose(one, other, atol=1e-9)
+    body = joint_shift(on, [effect("body_anisotropy", 0.4, 0.0)], ahead)
+    assert size_of(one - body) < 0.02 * size_of(body)
+
+
+# --- in a model ----------------------------------------------------------------------------------------------------
+
+
+def patched(values: dict[str, float] | None = None) -> FittedMechanics:
+    return FittedMechanics(PushMechanics(square_rig().outline, square_rig().pusher_radius), values or {})
+
+
+@pytest.mark.parametrize(("name", "size"), [("contact_friction", [0.3]), ("pressure_spread", [0.2]),
+                                            ("tilted_surface", [0.1, -0.1])])  # fmt: skip
+def test_a_push_alone_gets_the_same_shift_as_among_others(name: str, size: list[float]) -> None:
+    model = extended(train_model(pushes(20), square_rig(), "analytical", name="m"), effect(name, *size))
+    table = pushes(6, 3)
+    push = Push(table.inputs, table.duration, table.covariates)
+    among = model.predictor.moments(push)
+    scalar = tabulate(model)
+    for k in range(len(table)):
+        covariates = {key: column[k : k + 1] for key, column in table.covariates.items()}
+        alone = scalar.predict_rows(table.inputs[k : k + 1], table.duration[k : k + 1], covariates)
+        np.testing.assert_allclose(alone.mean[0], among.mean[k], atol=2e-7)
+        np.testing.assert_allclose(alone.covariance[0], among.covariance[k], rtol=0.02, atol=1e-9)
+
+
+def test_exact_effects_survive_saving_in_format_7(tmp_path: Path) -> None:
+    base = train_model(pushes(20), square_rig(), "analytical", name="m")
+    for exact in (True, False):
+        model = extended(base, replace(slippery(0.4, 0.05), exact=exact))
+        save_model(model, tmp_path / "m")
+        loaded, table = load_model(tmp_path / "m"), pushes(5, 2)
+        assert loaded.predictor.effects[0].exact is exact
+        push = Push(table.inputs, table.duration, table.covariates)
+        np.testing.assert_allclose(loaded.predictor.shift(push)[0], model.predictor.shift(push)[0], rtol=1e-12)
+
+
+# --- estimation ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def deployed() -> PushModel:
+    return train_model(pushes(60), square_rig(), "analytical", name="deployed")
+
+
+def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis) -> Effect:
+    evidence = evidence_of(deployed, table, physics())
+    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)])[0][0]
+
+
+def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
+    """Friction grows from 0.3 to 0.9: by its first derivative alone it would come out a fifth too small."""
+    table = pushes(100, 5, slippery(0.4))
+    estimate = found(deployed, table, "contact_friction", DRIFT)
+    sd = float(np.sqrt(estimate.covariance[0, 0]))
+    assert estimate.exact and abs(float(estimate.coefficients[0]) - 0.4) < 3.0 * sd < 0.1
+
+
+def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:
+    table, quiet = pushes(100, 5, slippery(0.4)), pushes(100, 5)
+    estimate = found(deployed, table, "contact_friction", DRIFT)
+    on, push = Mechanics(physics(), mechanics_of(physics())), Push(table.inputs, table.duration, table.covariates)
+    left = table.outcomes - joint_shift(on, [estimate], push) - quiet.outcomes
+    whole = table.outcomes - quiet.outcomes
+    assert size_of(left) < 0.1 * size_of(whole)
+
+
+def test_a_step_is_placed_between_the_two_pushes_where_it_sets_in(deployed: PushModel) -> None:
+    sets_in = DriverBasis("step", ("elapsed_time",), place=337.0)
+    change = Effect("contact_friction", "elapsed_time", sets_in, np.array([0.5]), np.zeros((1, 1)), np.ones(3))
+    table = pushes(100, 6, change)
+    evidence = evidence_of(deployed, table, physics())
+    tried = candidate(evidence, "contact_friction", "elapsed_time", replace(sets_in, place=500.0))
+    chosen = simplest_basis(tried, table, evidence.z, np.empty((len(table), 0)), evidence.block)
+    assert chosen.candidate.basis.name == "step"
+    assert abs(chosen.candidate.basis.place - 337.0) < 25.0  # two pushes and a half
