@@ -217,7 +217,7 @@ def test_mechanism_is_removed_only_inside_the_context() -> None:
 def test_all_steps_on_small_recordings_write_a_table(tmp_path: Path) -> None:
     """No effect, an effect of the library and a change of the wrench, each on 60 pushes."""
     data, hidden, results = (tmp_path / name for name in ("data", "truth", "results"))
-    small = ["--training", "60", "--least", "60", "--most", "60", "--rows", "100", "--model", "gp"]
+    small = ["--training", "60", "--least", "60", "--most", "60", "--rows", "100", "--model", "gp", "--mean", "zero"]
     main(["make", "--out", str(data), "--truth", str(hidden), "--seed", "177", "--count", "3", "--cores", "1", *small])
     main(["run", "--data", str(data), "--out", str(results), "--cores", "1"])
     main(["oracle", "--data", str(data), "--truth", str(hidden), "--cores", "1"])
