@@ -21,9 +21,9 @@ unexport PYTHONPATH AMENT_PREFIX_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 demo: $(VENV)/.installed
 	$(BIN)/python -m examples.demo
 
-# Three workers on two cores: tests of nodes wait for each other's messages half of their time.
+# Four workers on two cores: tests of nodes wait for each other's messages half of their time.
 test: $(VENV)/.installed lint
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .

@@ -262,8 +262,10 @@ def test_no_window_spans_a_dropout_of_any_stream(which: str, name: str, share: f
     gone = (stream.stamp > begin) & (stream.stamp < begin + length * SECOND)
     windows, counts = found_in(changed(truth.recording, {name: taken(stream, ~gone)}))
     after = stream.stamp[~gone & (stream.stamp > begin)]
-    if len(after):
+    if len(after) > 1:
         assert counts[f"{name} dropouts"] >= 1
+    elif len(after):  # a single sample may as well have a wrong stamp
+        assert counts.get(f"{name} dropouts", 0) + counts.get(f"{name} ahead", 0) >= 1
     inside = (int(begin) + 1, int(after[0]) - 1 if len(after) else int(stream.stamp[-1]) + DAY)
     assert_true(windows, truth, [inside])
 
