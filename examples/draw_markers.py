@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] = ()) -> int:
     picture, model = (Path(text) for text in (*arguments, *map(str, (PICTURE, MODEL)[len(arguments) :])))
     LOGS.mkdir(parents=True, exist_ok=True)
     if not model.exists():
-        command = ["train", str(TRAINING), "--kind", "vhgp", "--out", str(model)]
+        command = ["train", str(TRAINING), "--kind", "vhgp", "--mean", "zero", "--out", str(model)]
         subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
     with _subscribed() as (received, spin), ExitStack() as running:
         running.enter_context(node("predict_server", {"models": [str(model)]}))

@@ -74,7 +74,7 @@ def _trained() -> Path:
     """The model file, trained unless an earlier run has written it."""
     path = OUT / "vhgp.pushmodel"
     if not path.exists():
-        command = ["train", str(TRAINING), "--kind", "vhgp", "--n-train", "500", "--out", str(path)]
+        command = ["train", str(TRAINING), "--kind", "vhgp", "--mean", "zero", "--n-train", "500", "--out", str(path)]
         subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
     return path
 

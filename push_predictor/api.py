@@ -59,8 +59,8 @@ def train(
     kind: vhgp, gp, analytical or prior. rig: a Rig or a rig file, needed only where the data name none. name: of the
     model in the services; the first file's stem unless given. n_train: that many windows at random by the seed; by
     default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
-    an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero, the
-    default; or auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
+    an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
+    auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
     and the share of the work done; by default stages are printed to stderr.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """

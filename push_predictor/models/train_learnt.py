@@ -58,6 +58,7 @@ def train_learnt(
     With the mean `auto`, the kind of which held-out pushes of these are more likely. Raises TrainingError for outcomes
     that do not vary, and for options that the kind does not have.
     """
+    _check_rows(rows, rig)
     about = None
     if options.mean != "zero":
         watch(f"train {options.kind}: mechanics as mean", 0.0)
@@ -78,6 +79,7 @@ def _better_about(about: FittedMean | None, rows: PushTable, rig: Rig, options: 
 
 def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
     """The predictor of residuals about mechanics that were fitted to other rows. Raises as `train_learnt`."""
+    _check_rows(rows, rig)
     push = Push(rows.inputs, rows.duration, rows.covariates)
     about = FittedMean(mean, mean.residuals(push, rows.outcomes))
     return _correlated(_trained(rows, rig, options, about, no_watch).predictor, rows, options, no_watch)
@@ -173,20 +175,27 @@ def _learnt(features: Array, column: Array, options: LearntOptions, shortest: fl
 def _scaling(rows: PushTable, rig: Rig, targets: Array, *, centred: bool) -> Scaling:
     """centred: whether the mean of the targets (n, 3) is subtracted; a residual has mean zero."""
     features = push_features(rig.outline, rows.inputs)
-    spread = np.ptp(features, axis=0)
-    columns = np.flatnonzero(spread > CONSTANT * (1.0 + np.abs(features).max(axis=0)))
-    for name, sd in zip(OUTPUTS, rows.outcomes.std(axis=0), strict=True):
-        if not sd > 0.0:
-            raise TrainingError(
-                f"{name}: does not vary over the {len(rows)} training windows: there is nothing to learn"
-            )
-    if not columns.size:
-        raise TrainingError(
-            "velocity, contact and angle are the same in all training windows: there is nothing to learn"
-        )
+    columns = _varying(features)
     used = features[:, columns]
     if centred:
         mean, sd = targets.mean(axis=0), targets.std(axis=0)
     else:
         mean, sd = np.zeros(len(OUTPUTS)), np.sqrt(np.mean(targets**2, axis=0)) + EXACT * rows.outcomes.std(axis=0)
     return Scaling(tuple(int(c) for c in columns), used.mean(axis=0), used.std(axis=0), mean, sd)
+
+
+def _check_rows(rows: PushTable, rig: Rig) -> None:
+    for name, sd in zip(OUTPUTS, rows.outcomes.std(axis=0), strict=True):
+        if not sd > 0.0:
+            raise TrainingError(
+                f"{name}: does not vary over the {len(rows)} training windows: there is nothing to learn"
+            )
+    if not _varying(push_features(rig.outline, rows.inputs)).size:
+        raise TrainingError(
+            "velocity, contact and angle are the same in all training windows: there is nothing to learn"
+        )
+
+
+def _varying(features: Array) -> IntArray:
+    """Columns of the features (n, m) that are not the same in all rows."""
+    return np.flatnonzero(np.ptp(features, axis=0) > CONSTANT * (1.0 + np.abs(features).max(axis=0)))

@@ -10,11 +10,12 @@ import pytest
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import design_of
-from push_predictor.models.effects.exact import Mechanics
+from push_predictor.models.effects.effect import Effect, design_of
+from push_predictor.models.effects.exact import Mechanics, joint_shift
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import mechanics_of
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.predictors import AnalyticalPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
@@ -257,6 +258,22 @@ class TestBasis:
         basis = searched(learnt, table).terms[0].best.basis
         assert basis.name == "step"
         assert basis.place == pytest.approx(place, abs=150.0)
+
+    @pytest.mark.slow
+    def test_large_effect_that_sets_in_early_is_one_step_of_every_covariate_that_has_it(self) -> None:
+        """On mechanics, which absorb no constant effect, most of it looks constant: its onset must be looked for."""
+        plain = pushes(200, 302)
+        late = DriverBasis("step", ("elapsed_time",), place=305.0)
+        after = late.values(plain.covariates, len(plain))[:, 0]
+        plain = replace(plain, covariates={**plain.covariates, "topic:/valve": 20.0 + 5.0 * after})
+        effect = Effect("contact_friction", "elapsed_time", late, np.array([0.35]), np.zeros((1, 1)), np.ones(3), True)
+        push = Push(plain.inputs, plain.duration, plain.covariates)
+        table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
+        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        (term,) = searched(base, table, drivers=[*DRIVERS, "topic:/valve"]).terms
+        assert (term.best.mechanism, term.best.basis.name) == ("contact_friction", "step")
+        assert set(term.naming.drivers) == {"elapsed_time", "topic:/valve"}
+        assert not term.own and term.share > 0.5
 
     @pytest.mark.slow
     def test_linear_dependence_stays_linear(self, learnt) -> None:

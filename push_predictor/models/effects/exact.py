@@ -11,11 +11,18 @@ from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array
 
 # Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
 DIFFERENCE = 0.5
+
+LARGEST = {
+    name: parameter.largest
+    for mechanism in LIBRARY
+    if mechanism.quantities
+    for name, parameter in zip(mechanism.quantities, mechanism.parameters, strict=True)
+}
 
 Changes = dict[str, Array]  # by name of a parameter: its change (n,) at each push
 
@@ -57,8 +64,8 @@ def joint_shift(mechanics: Mechanics, effects: Sequence[Effect], push: Push) -> 
 def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
     """The shift by all effects together, and where they act its derivatives by their coefficients."""
     exact, fitted = [effect for effect in effects if effect.exact], mechanics.fitted
-    changes, n = changes_of(fitted, exact, push), len(push.inputs)
-    ends = {name: _ends(fitted, name, change) for name, change in changes.items()} if derivatives else {}
+    changes, n = changes_of(exact, push), len(push.inputs)
+    ends = {name: _ends(name, change) for name, change in changes.items()} if derivatives else {}
     tried = [{**changes, name: end} for name, both in ends.items() for end in both]
     moved = displaced(fitted, [changes, {}, *tried], push) if exact else np.zeros((2, n, 3))
     of_parameter = {
@@ -78,15 +85,15 @@ def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, deriva
     return JointShift(shift, designs, of_parameter)
 
 
-def changes_of(mechanics: FittedMechanics, effects: Sequence[Effect], push: Push) -> Changes:
-    """The sum of all effects' changes of each parameter, within the parameter's plausible range."""
+def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
+    """The sum of all effects' changes of each parameter, at most the largest that a rig can have."""
     n, total = len(push.inputs), Changes()
     for effect in effects:
         values = effect.basis.values(push.covariates, n)
         strengths = effect.coefficients.reshape(-1, values.shape[1]) @ values.T
         for name, strength in zip(_quantities(effect), strengths, strict=True):
             total[name] = total.get(name, 0.0) + strength
-    return {name: np.clip(change, *_range(mechanics, name)) for name, change in total.items()}
+    return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in total.items()}
 
 
 def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) -> Array:
@@ -105,17 +112,10 @@ def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) 
     return mechanics.displacement(inputs, duration, covariates, columns).reshape(k, n, 3)
 
 
-def _ends(mechanics: FittedMechanics, name: str, change: Array) -> tuple[Array, Array]:
-    """Changes (n,) below and above, between which a derivative is taken, within the parameter's range."""
-    step, (low, high) = DIFFERENCE * BY_NAME[name].spread, _range(mechanics, name)
-    return np.maximum(change - step, low), np.minimum(change + step, high)
-
-
-def _range(mechanics: FittedMechanics, name: str) -> tuple[float, float]:
-    """The range of a plausible change. A sum of terms is what must not fall below zero of contact friction."""
-    parameter, value = BY_NAME[name], mechanics.value(name)
-    low = -parameter.high if name == "contact_friction" else parameter.low
-    return low - value, parameter.high - value
+def _ends(name: str, change: Array) -> tuple[Array, Array]:
+    """Changes (n,) below and above, between which a derivative is taken, within the largest change."""
+    step, largest = DIFFERENCE * BY_NAME[name].spread, LARGEST[name]
+    return np.maximum(change - step, -largest), np.minimum(change + step, largest)
 
 
 def _quantities(effect: Effect) -> tuple[str, ...]:

@@ -166,7 +166,7 @@ class Motion:
         turning = self.mechanics.outline.polar_moment / self.length[rows] * bend[:, 2]
         load = np.column_stack([force, turning])
         share = self.values.of("inertia")[rows] * self.push.speed[rows] ** 2
-        size = np.maximum(1.0, np.linalg.norm(load, axis=1) * share / MOST_INERTIA)
+        size = np.maximum(1.0, np.linalg.norm(load, axis=1) * np.abs(share) / MOST_INERTIA)
         return np.asarray(-(share / size)[:, None] * load)
 
     def _quasi_static(

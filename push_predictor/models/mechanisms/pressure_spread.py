@@ -25,7 +25,7 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 PRESSURE_SPREAD = Mechanism(
     "pressure_spread",
-    (Parameter("relative change of the pressure's spread", "1", 1.0),),
+    (Parameter("logarithm of the factor on the pressure's spread", "1", 1.0),),
     response,
     quantities=("pressure_spread",),
 )

@@ -19,5 +19,5 @@ def response(physics: AnalyticalPush, push: Push) -> Array:
 
 
 PUSHER_RADIUS = Mechanism(
-    "pusher_radius", (Parameter("change of the pusher's radius", "m", 0.005),), response, quantities=("radius_error",)
+    "pusher_radius", (Parameter("change of the pusher's radius", "m", 0.004),), response, quantities=("radius_error",)
 )

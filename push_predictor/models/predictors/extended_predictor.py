@@ -51,6 +51,11 @@ class ExtendedPredictor:
         return self.base.learnt
 
     @property
+    def absorbs(self) -> bool:
+        """See Predictor."""
+        return self.base.absorbs
+
+    @property
     def integrates(self) -> bool:
         """See Predictor: responses of effects are derivatives of integrated mechanics."""
         return True

@@ -52,6 +52,11 @@ class GaussianProcessPredictor(WithoutEffects):
         return all(regression.gaussian for regression in self.regressions)
 
     @property
+    def absorbs(self) -> bool:
+        """See Predictor: without a mean."""
+        return self.mean is None
+
+    @property
     def integrates(self) -> bool:
         """See Predictor."""
         return self.mean is not None

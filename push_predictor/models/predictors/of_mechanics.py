@@ -25,6 +25,11 @@ class OfMechanics(WithoutEffects):
         return False
 
     @property
+    def absorbs(self) -> bool:
+        """See Predictor: its parameters are kept."""
+        return False
+
+    @property
     def gaussian(self) -> bool:
         """See BasePredictor."""
         return True

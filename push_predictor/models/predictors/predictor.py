@@ -57,6 +57,10 @@ class Predictor(Protocol):
         """Whether the base was fitted as a function of its inputs, so that its training data bound its domain."""
 
     @property
+    def absorbs(self) -> bool:
+        """Whether a refit learns a constant change of the mechanics, because it keeps no parameters of theirs."""
+
+    @property
     def integrates(self) -> bool:
         """Whether predicting integrates mechanics, which takes longer the further the push."""
 

@@ -37,6 +37,11 @@ class PriorPredictor(OfFittedMechanics):
         """See Predictor: pushes all around the slider, at the speeds and angles for which the priors are meant."""
         return np.asarray((inputs[:, 0] <= FASTEST) & (np.abs(inputs[:, 2]) <= STEEPEST))
 
+    @property
+    def absorbs(self) -> bool:
+        """See Predictor: a refit updates the priors of its parameters."""
+        return True
+
     def moments(self, push: Push) -> Moments:
         """See Predictor. The covariance is that of the draws plus the process noise."""
         rows = np.concatenate([self._around, self.draws])

@@ -33,13 +33,12 @@ def estimated_effects(
     evidence: Evidence,
     candidates: Sequence[Candidate],
     own_inputs: Array | None = None,
-    before: Sequence[Effect] = (),
 ) -> tuple[tuple[Effect, ...], Cross]:
     """The effects of these candidates, and the covariances between their coefficients (see ExtendedPredictor).
 
-    own_inputs (n, m): controls to regress out of residuals and responses. before: effects that the model has already.
+    own_inputs (n, m): controls to regress out of residuals and responses.
     """
-    problem = _Problem.of(evidence, candidates, own_inputs, before)
+    problem = _Problem.of(evidence, candidates, own_inputs)
     found, n = problem.solved(), len(evidence.table)
     covariance = _jackknife(found.columns, found.residual, evidence.block, found.ridge)
     covariance *= n / max(n - problem.residualizer.q.shape[1], 1)
@@ -66,7 +65,7 @@ class ExactFit:
 
 def exact_fit(evidence: Evidence, candidate: Candidate, z: Array, controls: Array) -> ExactFit:
     """The candidate fitted alone to residuals z (n, 3), the controls (n, m) regressed out."""
-    problem = _Problem.of(evidence, [candidate], controls, (), z)
+    problem = _Problem.of(evidence, [candidate], controls, z)
     found = problem.solved()
     (effect,), there = problem.effects(found.coefficients), candidate
     if effect.exact:
@@ -86,7 +85,6 @@ class _Problem:
     evidence: Evidence
     z: Array
     start: tuple[Effect, ...]
-    before: tuple[Effect, ...]
     residualizer: Residualizer
     nuisance: Array | None
 
@@ -95,7 +93,6 @@ class _Problem:
         evidence: Evidence,
         candidates: Sequence[Candidate],
         controls: Array | None,
-        before: Sequence[Effect],
         z: Array | None = None,
     ) -> _Problem:
         scale, start = evidence_scale(evidence), []
@@ -108,7 +105,7 @@ class _Problem:
         residualizer = Residualizer(np.empty((len(evidence.table), 0)) if controls is None else controls)
         nuisance = None if z is None else candidates[0].nuisance
         z = evidence.z if z is None else z
-        return _Problem(evidence, z, tuple(start), tuple(before), residualizer, nuisance)
+        return _Problem(evidence, z, tuple(start), residualizer, nuisance)
 
     @property
     def parts(self) -> list[slice]:
@@ -124,8 +121,10 @@ class _Problem:
 
     def linearised(self, coefficients: Array) -> _Linearised:
         """The problem about these coefficients."""
-        together = joint(self.evidence.mechanics, (*self.before, *self.effects(coefficients)), self.evidence.push)
-        whitener, count = self.evidence.whitener, len(self.before)
+        together = joint(
+            self.evidence.mechanics, (*self.evidence.effects, *self.effects(coefficients)), self.evidence.push
+        )
+        whitener, count = self.evidence.whitener, len(self.evidence.effects)
         shift = np.einsum("nij,nj->ni", whitener, together.shift - self._before)
         columns = np.einsum("nij,njp->nip", whitener, np.concatenate(together.designs[count:], axis=2))
         ridge = RIDGE * np.sum(columns**2, axis=(0, 1)) + 1e-12
@@ -134,7 +133,7 @@ class _Problem:
     @cached_property
     def _before(self) -> Array:
         """Shift (n, 3) by the effects that the model has already."""
-        return joint_shift(self.evidence.mechanics, self.before, self.evidence.push)
+        return joint_shift(self.evidence.mechanics, self.evidence.effects, self.evidence.push)
 
     def _cleared(self, values: Array) -> Array:
         """Values (n, 3, ...) without the nuisance, and without what the inputs express."""

@@ -10,14 +10,13 @@ import numpy as np
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, variance_effects
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
-from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import baseline_of
-from push_predictor.residuals.selection.cross_validation import fit
 from push_predictor.residuals.selection.experiment import separating_pushes
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
@@ -119,6 +118,5 @@ def _experiment(first: SelectedTerm | None, evidence: Evidence, inputs: InputsBa
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
-    residualizer = Residualizer(inputs.columns)
-    residual = residualizer(evidence.z)
-    return separating_pushes(evidence, [(c, fit(residualizer(c.columns), residual)) for c in rivals.values()])
+    controls = inputs.columns if inputs.absorbs else None
+    return separating_pushes(evidence, [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()])

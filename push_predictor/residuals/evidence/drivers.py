@@ -17,7 +17,6 @@ OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: o
 # They share noise with the residual, or vary along a push: judged against their relation in the training data.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
 RIG_PROPERTIES = ("edge", *HEADINGS, *PLACE, "velocity")  # their effects count only if they differ from training
-COURSE = ("elapsed_time", "push_index", "slid_distance")  # grow in the course of a recording
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
 CONSTANT = "model_inputs"
 MOST_LEVELS = 12

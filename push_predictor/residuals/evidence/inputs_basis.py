@@ -52,7 +52,7 @@ def inputs_basis(model: PushModel, table: PushTable) -> InputsBasis:
         learnt,
         learnt and outline.rotational_symmetry != 1,
         learnt and float(speed.std()) > VARIES,
-        learnt and not base.predictor.integrates,
+        base.predictor.absorbs,
     )
 
 

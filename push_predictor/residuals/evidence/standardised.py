@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from push_predictor.models.effects.effect import generic_responses, mechanism_named
+from push_predictor.models.effects.effect import Effect, generic_responses, mechanism_named
 from push_predictor.models.effects.exact import Mechanics
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import mechanics_of
@@ -26,12 +26,14 @@ class Evidence:
     """n windows with covariates and their residuals under one model.
 
     residual (n, 3): m, m, rad. whitener (n, 3, 3): L^-1, L L' the predicted covariance. mechanics: what effects act on.
+    effects: those that the model has already.
     """
 
     table: PushTable
     residual: Array
     whitener: Array
     mechanics: Mechanics
+    effects: tuple[Effect, ...] = ()
 
     @property
     def physics(self) -> AnalyticalPush:
@@ -55,7 +57,7 @@ class Evidence:
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""
-        return Evidence(self.table.take(rows), self.residual[rows], self.whitener[rows], self.mechanics)
+        return Evidence(self.table.take(rows), self.residual[rows], self.whitener[rows], self.mechanics, self.effects)
 
 
 def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | None = None) -> Evidence:
@@ -68,7 +70,7 @@ def evidence_of(model: PushModel, table: PushTable, physics: AnalyticalPush | No
     predictor = model.predictor.with_independent_outputs()
     mean, covariance, _ = predictor.moments(Push(table.inputs, table.duration, table.covariates))
     mechanics = mechanics_under(model) if physics is None else Mechanics(physics, mechanics_of(physics))
-    return Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
+    return Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics, model.predictor.effects)
 
 
 def mechanics_under(model: PushModel) -> Mechanics:

@@ -26,14 +26,14 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     evidence: of the deployed model, which was not trained on these pushes. A base that was trained on them has absorbed
     part of the effects, so its own residuals would make them too small. Raises TrainingError for too few rows.
     """
-    learnt = base.predictor.learnt
+    learnt, absorbs = base.predictor.learnt, base.predictor.absorbs
     # About mechanics, a learnt base expresses little in its own inputs, and a refit keeps the mechanics.
-    own_inputs = inputs_basis(base, evidence.table).columns if learnt and not base.predictor.base.integrates else None
-    effects, cross = estimated_effects(evidence, candidates, own_inputs, base.predictor.effects)
+    own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else None
+    effects, cross = estimated_effects(evidence, candidates, own_inputs)
     predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
     table, push = evidence.table, Push(evidence.table.inputs, evidence.table.duration, evidence.table.covariates)
     shift, _ = predictor.shift(push)
-    if learnt:
+    if learnt or absorbs:
         trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
         return with_predictor(trained, table, predictor.with_base(trained.predictor.base))
     mean, covariance, _ = predictor.base.moments(push)

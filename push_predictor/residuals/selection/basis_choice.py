@@ -41,7 +41,7 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
     return _moved(chosen, table.covariates[candidate.covariate], judged) if _is_step(chosen) else chosen
 
 
-def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Candidate:
+def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Judged:
     """The candidate as a step of its covariate, at the place between two pushes where it gains most."""
     values = table.covariates[candidate.covariate]
 
@@ -50,7 +50,7 @@ def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray)
         return Judged(tried, gains_of(z, tried.columns, block))
 
     tried = [judged(DriverBasis("step", (candidate.covariate,), place=place)) for place in _places(values)]
-    return _moved(max(tried, key=_gain), values, judged).candidate
+    return _moved(max(tried, key=_gain), values, judged)
 
 
 def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:

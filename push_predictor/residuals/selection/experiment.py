@@ -7,18 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanisms import Push
-from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_scale
+from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.types import Array
 
 PUSHES = 4
 OWN = ("velocity", "contact", "angle")  # inputs of a push, which the operator sets anyway
 
-FittedRival = tuple[Candidate, Array]  # a candidate and its coefficients (p,)
 
-
-def separating_pushes(evidence: Evidence, rivals: Sequence[FittedRival]) -> tuple[Mapping[str, float], ...]:
+def separating_pushes(evidence: Evidence, rivals: Sequence[Effect]) -> tuple[Mapping[str, float], ...]:
     """Pushes (velocity, contact, angle and the rivals' covariates) that would separate the first rival from the others.
 
     Each was already made at other values of the covariates: now one rival's covariate is at the low end of its range
@@ -32,38 +30,33 @@ def separating_pushes(evidence: Evidence, rivals: Sequence[FittedRival]) -> tupl
     return tuple(chosen[:PUSHES])
 
 
-def _separating(evidence: Evidence, first: FittedRival, second: FittedRival) -> list[Mapping[str, float]]:
+def _separating(evidence: Evidence, first: Effect, second: Effect) -> list[Mapping[str, float]]:
     """The pushes at which two rivals differ most, one rival's covariate low and the other's high, and vice versa."""
     table, pushes = evidence.table, []
     for low, high in ((first, second), (second, first)):
         covariates = dict(table.covariates)
-        for (candidate, _), share in ((low, 0.05), (high, 0.95)):
-            for driver in candidate.basis.drivers:
+        for rival, share in ((low, 0.05), (high, 0.95)):
+            for driver in rival.basis.drivers:
                 if driver not in OWN:
                     covariates[driver] = np.full(len(table), np.quantile(table.covariates[driver], share))
         shifts = [_shift(evidence, covariates, rival) for rival in (first, second)]
         best = int(np.argmax(np.sum((shifts[0] - shifts[1]) ** 2, axis=1)))
-        pushes.append(_push(evidence, covariates, best, (first[0], second[0])))
+        pushes.append(_push(evidence, covariates, best, (first, second)))
     return pushes
 
 
-def _shift(evidence: Evidence, covariates: Mapping[str, Array], rival: FittedRival) -> Array:
+def _shift(evidence: Evidence, covariates: Mapping[str, Array], rival: Effect) -> Array:
     """Standardised shift of the outcome (n, 3) by a rival."""
-    candidate, coefficients = rival
-    unknown = np.zeros((len(coefficients), len(coefficients)))
-    scale = evidence_scale(evidence)
-    effect = Effect(candidate.mechanism, candidate.covariate, candidate.basis, coefficients, unknown, scale)
     push = Push(evidence.table.inputs, evidence.table.duration, covariates)
-    shift, _ = effect.shift(evidence.physics, push)
-    return np.asarray(np.einsum("nij,nj->ni", evidence.whitener, shift))
+    return np.asarray(np.einsum("nij,nj->ni", evidence.whitener, joint_shift(evidence.mechanics, [rival], push)))
 
 
 def _push(
-    evidence: Evidence, covariates: Mapping[str, Array], row: int, candidates: Sequence[Candidate]
+    evidence: Evidence, covariates: Mapping[str, Array], row: int, rivals: Sequence[Effect]
 ) -> Mapping[str, float]:
     """One push by name: its inputs, then the covariates of the rivals and the slider's heading."""
     velocity, contact, angle = (float(value) for value in evidence.table.inputs[row])
-    drivers = dict.fromkeys(name for c in candidates for name in c.basis.drivers if name not in OWN)
+    drivers = dict.fromkeys(name for rival in rivals for name in rival.basis.drivers if name not in OWN)
     if "slider_heading" in covariates:
         drivers["slider_heading"] = None
     inputs = {"velocity": velocity, "contact": contact, "angle": angle}

@@ -21,7 +21,7 @@ from push_predictor.types import Array, IntArray
 REJECTED = 0.01  # p below which a rival is rejected
 SURELY = 2.33  # the same in standard errors
 UNEXPLAINED = 0.05  # p below which a mechanism fails to explain something along its covariate
-MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain: it is linear
+MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain
 
 
 @dataclass(frozen=True, eq=False)

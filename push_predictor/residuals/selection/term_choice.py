@@ -12,9 +12,9 @@ import numpy as np
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
-from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.candidates.coefficients import exact_fit
-from push_predictor.residuals.evidence.drivers import CONSTANT, COURSE, LOCAL
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -35,6 +35,7 @@ from push_predictor.types import Array
 NOT_GROWING = ("edge", *HEADINGS, *LOCAL)  # an effect that is fixed to body or world does not grow with these
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_REFINED = 12  # of the labels, those that are tried in every basis
+MOST_RIVALS = 3  # mechanisms of a whole effect that are fitted exactly
 MOST_NAMED = 6  # candidates along the covariate, best first, that are tried as its name
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
@@ -61,7 +62,7 @@ class SelectedTerm:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs that the term shifts."""
-        shift = self.best.columns @ self.coefficients
+        shift = projected(self.shift, self.best.nuisance)
         size = np.sqrt(np.mean((shift - shift.mean(axis=0) * (self.best.kind != "constant")) ** 2, axis=0))
         return tuple(name for name, felt in zip(OUTPUTS, size >= FELT * size.max(), strict=True) if felt)
 
@@ -126,25 +127,34 @@ class TermChoice:
         return sorted((self._with_simplest_basis(j.candidate, z) for j in first), key=lambda j: -j.gain)
 
     def _with_onset(self, judged: list[Judged], z: Array) -> list[Judged]:
-        """With steps in front, if a constant effect surely sets in during the recording.
+        """With steps in front, if a constant effect surely sets in at some value of a covariate.
 
         Where a base absorbs no constant effect, a step is compared with it as a whole.
         """
-        best = judged[0]
-        if self.inputs.absorbs or best.candidate.mechanism is None or best.candidate.covariate != CONSTANT:
+        constant = [j for j in judged if j.candidate.covariate == CONSTANT and j.candidate.mechanism is not None]
+        if self.inputs.absorbs or judged[0].candidate.covariate != CONSTANT or not constant:
             return judged
-        always = self._exact(best, z)
-        same = {c.covariate: c for c in reversed(self.candidates) if c.mechanism == best.candidate.mechanism}
-        later = [self._setting_in(same[name], z) for name in COURSE if name in same]
-        surely = [j for j in later if surely_larger(j, always)]
-        return [*sorted(surely, key=lambda j: -j.gain), *judged]
+        always = max((self._exact(j, z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain)
+        surely = [j for j in self._steps(str(always.candidate.mechanism), z) if surely_larger(j, always)]
+        return [*surely, *judged]
 
-    def _setting_in(self, candidate: Candidate, z: Array) -> Judged:
-        """The whole effect of the candidate's mechanism from some value of its covariate on."""
-        whole, block = replace(candidate, nuisance=None, nuisance_growing=None), self.evidence.block
-        stepped = best_step(whole, self.evidence.table, z, block)
+    def _steps(self, mechanism: str, z: Array) -> list[Judged]:
+        """The whole effect of a mechanism as a step of each covariate, the best covariates fitted exactly, by gain."""
+        each = {c.covariate: c for c in reversed(self.candidates) if c.mechanism == mechanism}
+        stepped = [self._stepped(c, z) for c in each.values() if c.basis.name == "linear"]
+        best = sorted(stepped, key=lambda j: -j.gain)[:MOST_NAMED]
+        return sorted((self._whole(j.candidate, z) for j in best), key=lambda j: -j.gain)
+
+    def _stepped(self, candidate: Candidate, z: Array) -> Judged:
+        """The candidate's whole effect from some value of its covariate on."""
+        whole = replace(candidate, nuisance=None, nuisance_growing=None)
+        return best_step(whole, self.evidence.table, z, self.evidence.block)
+
+    def _whole(self, candidate: Candidate, z: Array) -> Judged:
+        """The candidate fitted exactly, and judged by its whole effect."""
         nothing = np.empty((len(z), 0))
-        return judged_exactly(exact_fit(self.evidence, stepped, z, nothing), z, Residualizer(nothing), block)
+        fitted = exact_fit(self.evidence, candidate, z, nothing)
+        return judged_exactly(fitted, z, Residualizer(nothing), self.evidence.block)
 
     def _judge(self, candidates: Sequence[Candidate], kind: Kind, z: Array) -> list[Judged]:
         return judge(candidates, z, controls_for(kind, self.inputs), self.evidence.block)
@@ -160,8 +170,8 @@ class TermChoice:
             j for j in by_gain if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j, self._case(j, z))
         ]
         generics = self._generics(driver, known[0].candidate.basis if known else None, z)
-        unexplained = {id(j): self._unexplained(j, generics, z) for j in known[:MOST_NAMED]}
-        fitting = [j for j in known[:MOST_NAMED] if unexplained[id(j)] <= MOST_UNEXPLAINED]
+        unexplained = {id(j): self._unexplained(j, generics, z) for j in known}
+        fitting = [j for j in known if unexplained[id(j)] <= MOST_UNEXPLAINED]
         if not fitting and generics:
             best = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
             return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0))
@@ -175,7 +185,11 @@ class TermChoice:
         """Every candidate of a covariate in its simplest adequate basis, fitted exactly, by gain."""
         first = {c.label: c for c in reversed(self.candidates)}
         along = [_if_growing(c, growing) for c in first.values() if c.covariate == driver]
-        refined = {j.candidate.label: j for j in judged}
+        refined = {j.candidate.label: j for j in reversed(judged)}
+        if judged[0].exact:  # a whole effect: the others are compared with it as such
+            others = [self._stepped(c, z) for c in along if c.mechanism is not None and c.label not in refined]
+            best = sorted(others, key=lambda j: -j.gain)[:MOST_RIVALS]
+            return sorted([judged[0], *(self._whole(j.candidate, z) for j in best)], key=lambda j: -j.gain)
         linear = sorted((refined.get(c.label) or self._with_simplest_basis(c, z) for c in along), key=lambda j: -j.gain)
         exact = (self._exact(j, z) if j.gain > 0.0 and not j.exact else j for j in linear[:MOST_NAMED])
         return sorted(exact, key=lambda j: -j.gain)
