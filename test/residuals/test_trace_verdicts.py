@@ -108,7 +108,7 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
-    found = trace(learnt("mechanics"), loaded(slippery, Faults()))
+    found = trace(learnt("mechanics"), loaded(slippery, Faults()), covariates=["elapsed_time"])
     (effect,) = found.effects
     assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "model_inputs")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1

@@ -25,6 +25,7 @@ from push_predictor.types import Array, IntArray
 
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
+LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
 ENOUGH = 0.2  # nats: a step that gains less is the last
 
@@ -145,16 +146,18 @@ class _Problem:
         for _ in range(MOST_STEPS):
             square = np.einsum("nkp,nkq->pq", now.columns, now.columns) + np.diag(now.ridge)
             slope = np.einsum("nkp,nk->p", now.columns, now.residual) - now.ridge * now.coefficients
-            later, fall = self._stepped(now, np.linalg.solve(square, slope))
+            step = np.linalg.solve(square, slope)
+            later, fall = self._stepped(now, step, float(step @ slope))
             now = later
             if fall < ENOUGH or not any(effect.exact for effect in self.start):
                 break
         return now
 
-    def _stepped(self, now: _Linearised, step: Array) -> tuple[_Linearised, float]:
+    def _stepped(self, now: _Linearised, step: Array, promised: float) -> tuple[_Linearised, float]:
         """The problem after a step, lengthened or shortened, and the fall of its objective.
 
-        Where pushes begin to stick, a step is far too short: the derivatives of the rest of the data change there.
+        promised: twice the fall of a quadratic objective. Where pushes begin to stick, a step is far too short: the
+        derivatives of the rest of the data change there, and the objective falls by more.
         """
         before, best, most = now.objective(now.ridge), now, 0.0
         factor, length = 2.0, 1.0
@@ -163,7 +166,7 @@ class _Problem:
             fall = before - tried.objective(now.ridge)
             if fall > most:
                 best, most = tried, fall
-                if factor < 1.0:
+                if factor < 1.0 or fall < LENGTHENED * length * promised:
                     break
             elif length == 1.0:
                 factor = 0.5

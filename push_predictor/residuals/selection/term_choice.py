@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -75,6 +75,7 @@ class TermChoice:
     candidates: tuple[Candidate, ...]
     inputs: InputsBasis
     seed: int
+    _known: dict[object, tuple[Array, Judged]] = field(default_factory=dict)  # exact fits to residuals z, with these
 
     @cached_property
     def residualizers(self) -> dict[Kind, Residualizer]:
@@ -199,6 +200,13 @@ class TermChoice:
         candidate = judged.candidate
         if candidate.mechanism is None:
             return judged
+        key = (candidate.label, candidate.basis, candidate.grows)
+        known = self._known.get(key)
+        if known is None or known[0] is not z:
+            known = self._known[key] = z, self._exactly(candidate, z)
+        return known[1]
+
+    def _exactly(self, candidate: Candidate, z: Array) -> Judged:
         found = exact_fit(self.evidence, candidate, z, controls_for(candidate.kind, self.inputs))
         return judged_exactly(found, z, self.residualizers[candidate.kind], self.evidence.block)
 
