@@ -75,6 +75,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
             paused = {"play.start_paused": True}  # until it has discovered the subscribers here
             stack.enter_context(replaying(domain, "-r", f"__ns:={cell}", recording=recording, rate=10.0, **paused))
         for cell in CELLS:
+            acquaint(node, f"{cell}/push_validator")  # whose first residuals would else be lost
             acquaint(node, f"{cell}/push_replay")
             call(node.create_client(Resume, f"{cell}/push_replay/resume"), Resume.Request())
         for k in range(40):
@@ -82,9 +83,9 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
                 found.answers[cell].append(call(client, _request(k)))
         for process in processes:
             process.wait_for_text(WRITTEN, 120.0)
-        assert wait_until(lambda: len(found.diagnostics) >= 6 and all(_counted(found, cell) for cell in CELLS)), (
-            found.diagnostics
-        )
+        assert wait_until(lambda: len(found.diagnostics) >= 6 and all(_counted(found, cell) for cell in CELLS)), {
+            cell: (_windows(found, cell), _served(found, cell), len(found.received[cell].residuals)) for cell in CELLS
+        }
     return found
 
 
