@@ -63,18 +63,23 @@ def train_learnt(
     if options.mean != "zero":
         watch(f"train {options.kind}: mechanics as mean", 0.0)
         about = fitted_mean(of_mean, rig)
-    if options.mean == "auto" and not _better_about(about, of_mean, rig, options, watch):
-        about = None
+    if options.mean == "auto":
+        better = _better(about, of_mean, rig, options, watch)
+        if len(of_mean) == len(rows):
+            return _correlated(better, rows, options, watch)
+        about = None if better.mean is None else about
     begin = 0.4 if options.mean == "auto" else 0.1
     trained = _trained(rows, rig, options, about, _part_of(watch, begin, 0.9))
     return _correlated(trained.predictor, rows, options, watch)
 
 
-def _better_about(about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch) -> bool:
-    """Whether held-out pushes of the rows that the mean was fitted to are more likely about it than without it."""
+def _better(
+    about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch
+) -> GaussianProcessPredictor:
+    """The predictor with or without the mean, trained on the rows that it was fitted to: by their held-out pushes."""
     plain = _trained(rows, rig, options, None, _part_of(watch, 0.1, 0.25), scored=True)
     informed = _trained(rows, rig, options, about, _part_of(watch, 0.25, 0.4), scored=True)
-    return informed.score > plain.score
+    return max(plain, informed, key=lambda trained: trained.score).predictor
 
 
 def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
