@@ -47,7 +47,7 @@ class LearntOptions:
     kind: str
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
-    mean: MeanChoice = "auto"
+    mean: MeanChoice = "zero"
 
 
 def train_learnt(

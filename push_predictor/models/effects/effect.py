@@ -59,8 +59,12 @@ def design_of(
         if mechanism is None
         else mechanism_named(mechanism).response(physics, push)
     )
-    values = basis.values(push.covariates, n)
-    return (responses[:, :, :, None] * values[:, None, None, :]).reshape(n, 3, -1)
+    return products(responses, basis.values(push.covariates, n))
+
+
+def products(responses: Array, values: Array) -> Array:
+    """Products (n, 3, p * m), p first, of responses (n, 3, p) and columns (n, m) of a basis."""
+    return np.asarray((responses[:, :, :, None] * values[:, None, None, :]).reshape(len(responses), 3, -1))
 
 
 def generic_responses(physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:

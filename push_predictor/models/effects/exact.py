@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.effects.effect import Effect, mechanism_named, products
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
@@ -48,7 +48,7 @@ class JointShift:
 
     def responses(self, effect: Effect) -> Array:
         """Derivatives (n, 3, p) by the parameters that an exact effect changes."""
-        return np.stack([self.of_parameter[name] for name in _quantities(effect)], axis=2)
+        return _stacked(self.of_parameter, effect)
 
 
 def has_exact_effects(mechanism: str | None) -> bool:
@@ -79,9 +79,7 @@ def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, deriva
             shift = shift + design @ effect.coefficients
             designs.append(design)
         elif derivatives:
-            values = effect.basis.values(push.covariates, n)
-            responses = np.stack([of_parameter[name] for name in _quantities(effect)], axis=2)
-            designs.append((responses[:, :, :, None] * values[:, None, None, :]).reshape(n, 3, -1))
+            designs.append(products(_stacked(of_parameter, effect), effect.basis.values(push.covariates, n)))
     return JointShift(shift, designs, of_parameter)
 
 
@@ -116,6 +114,11 @@ def _ends(name: str, change: Array) -> tuple[Array, Array]:
     """Changes (n,) below and above, between which a derivative is taken, within the largest change."""
     step, largest = DIFFERENCE * BY_NAME[name].spread, LARGEST[name]
     return np.maximum(change - step, -largest), np.minimum(change + step, largest)
+
+
+def _stacked(of_parameter: Changes, effect: Effect) -> Array:
+    """Derivatives (n, 3, p) by the parameters of an effect, from those by name."""
+    return np.stack([of_parameter[name] for name in _quantities(effect)], axis=2)
 
 
 def _quantities(effect: Effect) -> tuple[str, ...]:

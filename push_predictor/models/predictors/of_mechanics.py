@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -16,7 +17,7 @@ from push_predictor.types import Array, IntArray
 Self = TypeVar("Self")
 
 
-class OfMechanics(WithoutEffects):
+class OfMechanics(WithoutEffects, ABC):
     """A predictor without a learnt function of its inputs, whose predictive is taken for a Gaussian."""
 
     @property
@@ -39,9 +40,9 @@ class OfMechanics(WithoutEffects):
         """See Predictor."""
         return True
 
+    @abstractmethod
     def moments(self, push: Push) -> Moments:
         """See Predictor."""
-        raise NotImplementedError
 
     def held_out_moments(self, rows: Push, block: IntArray) -> Moments:
         """See Predictor: the same as `moments`, since no function of the inputs was fitted to the rows."""

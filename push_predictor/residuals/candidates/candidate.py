@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import products
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import Kind
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
@@ -45,8 +46,7 @@ class Candidate:
         """Standardised columns (n, 3, p * m), p first: the effect itself."""
         if self.values is None:
             return self.response
-        n = len(self.response)
-        return (self.response[:, :, :, None] * self.values[:, None, None, :]).reshape(n, 3, -1)
+        return products(self.response, self.values)
 
     @property
     def kind(self) -> Kind:

@@ -147,8 +147,7 @@ class _Problem:
             square = np.einsum("nkp,nkq->pq", now.columns, now.columns) + np.diag(now.ridge)
             slope = np.einsum("nkp,nk->p", now.columns, now.residual) - now.ridge * now.coefficients
             step = np.linalg.solve(square, slope)
-            later, fall = self._stepped(now, step, float(step @ slope))
-            now = later
+            now, fall = self._stepped(now, step, float(step @ slope))
             if fall < ENOUGH or not any(effect.exact for effect in self.start):
                 break
         return now

@@ -28,7 +28,7 @@ SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "peri
 def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: Array, block: IntArray) -> Judged:
     """The candidate in the simplest basis whose gain is within one standard error of the best.
 
-    A step is then moved to the place between two pushes, near the one that was tried, where it gains most.
+    A step is then moved to the place between two windows, near the one that was tried, where it gains most.
     """
     residualizer = Residualizer(controls)
     residual = residualizer(z)
@@ -42,7 +42,7 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
 
 
 def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Judged:
-    """The candidate as a step of its covariate, at the place between two pushes where it gains most."""
+    """The candidate as a step of its covariate, at the place between two windows where it gains most."""
     values = table.covariates[candidate.covariate]
 
     def judged(basis: DriverBasis) -> Judged:
