@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,28 +53,38 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(options: argparse.Namespace) -> None:
-    """Trace, write the files asked for, print the verdict."""
+    """Trace, write JSON and model, print the verdict, then draw the report: what can fail late comes last."""
     from push_predictor.recordings.rig import load_rig
-    from push_predictor.residuals.reporting.trace_json import trace_json
     from push_predictor.residuals.trace import trace_data
+
+    _check(options)
+    names = None if options.covariates is None else _names(options.covariates)
+    rig = load_rig(options.rig) if options.rig else None
+    with progress("trace"):
+        found = trace_data(
+            options.data, options.model, alpha=options.alpha, covariates=names, rig=rig, seed=options.seed
+        )
+    saved = False
+    try:
+        saved = _write_results(options, found)
+    finally:
+        if options.json != "-":
+            _print(found, options.save_model if saved else None)
+    _write_report(options, found)
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raise for all that would fail at the end and can be known before the work."""
+    from push_predictor.reporting.packages import check_report_packages
 
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
     check_seed(options.seed)
     check_output("--report", options.report)
     check_output("--save-model", options.save_model)
-    names = None if options.covariates is None else _names(options.covariates)
+    if options.report is not None:
+        check_report_packages("--report")
     check_data(options.data)
-    rig = load_rig(options.rig) if options.rig else None
-    with progress("trace"):
-        found = trace_data(
-            options.data, options.model, alpha=options.alpha, covariates=names, rig=rig, seed=options.seed
-        )
-        if options.report is not None:
-            _write_report(options.report, found)
-    saved = _save(options.save_model, found)
-    if not write_json(options, trace_json(found)):
-        _print(found, options, saved)
 
 
 def _names(text: str) -> list[str]:
@@ -83,16 +94,13 @@ def _names(text: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _write_report(path: Path, found: Trace) -> None:
-    from push_predictor.residuals.reporting.page import write_trace_report
-
-    write_trace_report(path, found)
-
-
-def _save(path: Path | None, found: Trace) -> bool:
-    """Save the extended model; warn if there is none."""
+def _write_results(options: argparse.Namespace, found: Trace) -> bool:
+    """Write JSON and extended model; warn, and return False, if no model was written."""
     from push_predictor.models.store.model_file import save_model
+    from push_predictor.residuals.reporting.trace_json import trace_json
 
+    write_json(options, trace_json(found))
+    path = options.save_model
     if path is None:
         return False
     if found.extended is None:
@@ -103,12 +111,23 @@ def _save(path: Path | None, found: Trace) -> bool:
     return True
 
 
-def _print(found: Trace, options: argparse.Namespace, saved: bool) -> None:
+def _write_report(options: argparse.Namespace, found: Trace) -> None:
+    from push_predictor.residuals.reporting.page import write_trace_report
+
+    if options.report is None:
+        return
+    with progress("trace report"):
+        write_trace_report(options.report, found)
+    if options.json != "-":
+        print(f"report: {options.report}")
+
+
+def _print(found: Trace, saved: Path | None) -> None:
+    """Print the verdict, and where the extended model is."""
     from push_predictor.residuals.reporting.summary import summary_lines
 
     print("\n".join(summary_lines(found)))
-    if options.report is not None:
-        print(f"report: {options.report}")
-    if saved and found.extended is not None:
+    if saved is not None and found.extended is not None:
         needs = ", ".join(found.extended.needs) or "no further covariates"
-        print(f"extended model: {options.save_model}; requests need {needs}")
+        print(f"extended model: {saved}; requests need {needs}")
+    sys.stdout.flush()  # the verdict is out before the pictures are drawn

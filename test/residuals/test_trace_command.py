@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table_file import write_table
 from push_predictor.residuals.outcome import Trace
+from push_predictor.residuals.reporting import page
 
 SECTION_5 = {
     "verdict", "effect_present", "channel", "kind", "covariates", "equivalent", "undecided", "motion_model_changed",
@@ -169,6 +171,58 @@ def test_rejects_output_folder_without_write_permission_by_name(
     assert run(place, "--report", str(tmp_path / "new" / "out.html")) == 1
     assert f"a path in a folder with write permission: {tmp_path} has none" in capsys.readouterr().err
     assert asked == {}
+
+
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
+def test_rejects_report_without_its_packages_before_the_work(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, package: str, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    asked = found(extended)
+    monkeypatch.setitem(sys.modules, package, None)
+    assert run(place, "--report", str(tmp_path / "out.html")) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"push_predictor trace: --report: a report needs {package}") and error.count("\n") == 1
+    assert "pip install 'push_predictor[report]'" in error and asked == {}
+    assert run(place) == 0  # without --report neither is needed
+
+
+def test_files_and_verdict_come_before_the_report(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    found(extended)
+    out, model = tmp_path / "new" / "out.json", tmp_path / "new" / "extended.pushmodel"
+    seen: dict[str, Any] = {}
+
+    def fail(path: Path, trace: Trace) -> list[str]:
+        seen.update(out=out.exists(), model=model.exists(), printed=capsys.readouterr().out)
+        raise ZeroDivisionError("a picture\nfailed")
+
+    monkeypatch.setattr(page, "_parts", fail)
+    report = tmp_path / "new" / "out.html"
+    assert run(place, "--json", str(out), "--save-model", str(model), "--report", str(report)) == 1
+    assert seen["out"] and seen["model"]
+    assert seen["printed"].startswith("Contact friction changes with") and f"extended model: {model}" in seen["printed"]
+    error = capsys.readouterr().err
+    assert error.startswith(f"push_predictor trace: {report}: the report could not be drawn (ZeroDivisionError: a ")
+    assert error.count("\n") == 1 and not report.exists()
+
+
+def test_prints_the_verdict_when_the_model_cannot_be_written(
+    place: Path, tmp_path: Path, found: Any, extended: Trace, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    found(extended)
+
+    def fail(*_: Any) -> None:
+        raise OSError(28, "No space left on device", "extended.pushmodel")
+
+    monkeypatch.setattr("push_predictor.models.store.model_file.save_model", fail)
+    assert run(place, "--save-model", str(tmp_path / "extended.pushmodel")) == 1
+    printed = capsys.readouterr()
+    assert printed.out.startswith("Contact friction changes with") and "extended model:" not in printed.out
+    assert printed.err == "push_predictor trace: extended.pushmodel: No space left on device\n"
 
 
 def test_rejects_missing_data_by_name(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

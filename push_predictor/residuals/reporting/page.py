@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.residuals.evidence.split import RULE
@@ -49,10 +50,15 @@ EXPERIMENT = (
 
 
 def write_trace_report(path: Path, trace: Trace) -> Path:
-    """Write the page with its pictures; return its path. Raises OSError, or PushPredictorError without matplotlib."""
+    """Write the page with its pictures; return its path. Raises OSError, or PushPredictorError for a failed picture."""
     path = Path(path)
-    with TemporaryDirectory() as folder:
-        parts = _parts(Path(folder), trace)
+    try:
+        with TemporaryDirectory() as folder:
+            parts = _parts(Path(folder), trace)
+    except (OSError, PushPredictorError):
+        raise
+    except Exception as error:  # a picture must not cost the caller the verdict
+        raise PushPredictorError(f"{path}: the report could not be drawn ({type(error).__name__}: {error})") from error
     write_whole(path, html.page(f"What the model `{trace.model.name}` fails to explain", parts).encode())
     return path
 
