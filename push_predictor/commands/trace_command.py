@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _check(options: argparse.Namespace) -> None:
     """Raise for all that would fail at the end and can be known before the work."""
-    from push_predictor.reporting.packages import check_report_packages
+    from push_predictor.reporting import html
 
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
@@ -83,7 +83,7 @@ def _check(options: argparse.Namespace) -> None:
     check_output("--report", options.report)
     check_output("--save-model", options.save_model)
     if options.report is not None:
-        check_report_packages("--report")
+        html.check_installed("--report")
     check_data(options.data)
 
 

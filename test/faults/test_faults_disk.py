@@ -116,7 +116,7 @@ def test_the_old_file_stays_and_the_error_names_the_path(
     name: str, earlier: bool, model: PushModel, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, write = tmp_path / "out" / name, WRITERS[name]
-    monkeypatch.setattr(trace_report, "_parts", lambda folder, trace: ["<p>a page</p>" * 100])  # figures take seconds
+    monkeypatch.setattr(trace_report, "_parts", lambda trace: ["<p>a page</p>" * 100])  # figures take seconds
     path.parent.mkdir()
     if earlier:
         write(path, 0, model, recording)

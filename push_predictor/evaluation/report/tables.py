@@ -106,7 +106,7 @@ def _difference_table(comparisons: Sequence[Comparison]) -> str:
     main, *others = comparisons
     rows = [[c.model, *(_cell(v, (low, high)) for v, low, high in paired_difference(main, c))] for c in others]
     caption = (
-        f"Each model minus `{main.model}`, on the same windows. Above zero, `{main.model}` is better. "
+        f"Each model minus {main.model}, on the same windows. Above zero, {main.model} is better. "
         f"An interval that contains zero shows no significant difference."
     )
     return html.table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from push_predictor.errors import PushPredictorError
 from push_predictor.recordings.atomic import write_whole
@@ -11,24 +10,23 @@ from push_predictor.reporting import html
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.advice import separating_words
-from push_predictor.residuals.reporting.figures.gallery import (
-    calibration_picture,
-    channel_picture,
-    effect_pictures,
-    tested_picture,
-)
-from push_predictor.residuals.reporting.figures.map_pictures import map_pictures
-from push_predictor.residuals.reporting.phrases import effect_phrase
+from push_predictor.residuals.reporting.answer import answer
+from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
+from push_predictor.residuals.reporting.figures.key import key_figure
+from push_predictor.residuals.reporting.figures.map_pictures import map_figures
+from push_predictor.residuals.reporting.input_shift import input_shifts, share_clause, shift_clause
+from push_predictor.residuals.reporting.phrases import capitalised, effect_phrase
 from push_predictor.residuals.reporting.quantities import count
 from push_predictor.residuals.reporting.tables import (
     detectable_table,
     effects_table,
     experiment_table,
-    held_out_tables,
+    held_out_table,
+    metric_tables,
     shifts_table,
     tested_tables,
 )
-from push_predictor.residuals.reporting.wording import evidence_sentence, headline, worth_sentence
+from push_predictor.residuals.reporting.wording import evidence_sentence, rivals_sentence, worth_sentence
 
 VERDICTS = {
     "none": "no change found",
@@ -38,10 +36,12 @@ VERDICTS = {
     "wrench_only": "force only",
     "measurement": "measurement error",
     "variance": "noise only",
+    "input_shift": "inputs shifted",
 }
+KINDS = {"vhgp": "variational heteroscedastic GP", "gp": "standard GP", "analytical": "analytical model"}
 UNNAMED = (
     "A mechanism is named only if it explains nearly as much as a general pattern over contact point and push angle. "
-    "None does. A tested mechanism can be significant because it resembles the pattern."
+    "Here no mechanism does. A tested mechanism can be significant because it resembles the pattern."
 )
 EXPERIMENT = (
     "Make the pushes below, with the covariates set as the table shows. There the predictions of the rivals differ "
@@ -50,28 +50,28 @@ EXPERIMENT = (
 
 
 def write_trace_report(path: Path, trace: Trace) -> Path:
-    """Write the page with its pictures; return its path. Raises OSError, or PushPredictorError for a failed picture."""
+    """Write the page; return its path. Raises OSError, or PushPredictorError if a part of it fails."""
     path = Path(path)
     try:
-        with TemporaryDirectory() as folder:
-            parts = _parts(Path(folder), trace)
+        page = html.page(f"Trace of the model {trace.model.name}", _parts(trace))
     except (OSError, PushPredictorError):
         raise
     except Exception as error:  # a picture must not cost the caller the verdict
         raise PushPredictorError(f"{path}: the report could not be drawn ({type(error).__name__}: {error})") from error
-    write_whole(path, html.page(f"What the model `{trace.model.name}` fails to explain", parts).encode())
+    write_whole(path, page.encode())
     return path
 
 
-def _parts(out: Path, trace: Trace) -> list[str]:
+def _parts(trace: Trace) -> list[str]:
     return [
-        html.finding(f"{headline(trace)}.", VERDICTS[trace.verdict], evidence_sentence(trace)),
-        html.paragraph(worth_sentence(trace), "lead"),
-        *_effects(out, trace),
+        html.answer(answer(trace), VERDICTS[trace.verdict]),
+        *key_figure(trace),
+        *_shifted_inputs(trace),
+        *_held_out(trace),
         *_rivals(trace),
-        *_held_out(out, trace),
-        *_residuals(out, trace),
-        *_tested(out, trace),
+        *_effects(trace),
+        *_residuals(trace),
+        *_tested(trace),
         *_remaining(trace),
         *([html.heading("Notes"), html.bullets(trace.notes)] if trace.notes else []),
         html.heading("Data and method"),
@@ -84,8 +84,9 @@ def _facts(trace: Trace) -> dict[str, str]:
     trained = count(model.provenance.pushes, "training push", "training pushes")
     analysis = count(len(trace.analysis.pushes), "push", "pushes")
     held_out = count(len(held.table.pushes), "push", "pushes")
+    kind = KINDS.get(model.kind, model.kind)
     return {
-        "model": f"{model.name} ({model.kind}; {model.rig.shape} on {model.rig.surface}), {trained}",
+        "model": f"{model.name}: {kind}, slider {model.rig.shape} on {model.rig.surface}, {trained}",
         "analysis": f"{analysis}, {len(trace.analysis)} windows",
         "held out": f"{held_out}, {len(held.table)} windows, opened once, after every choice was made",
         "split": f"by push: {RULE}",
@@ -95,13 +96,19 @@ def _facts(trace: Trace) -> dict[str, str]:
     }
 
 
-def _effects(out: Path, trace: Trace) -> list[str]:
+def _shifted_inputs(trace: Trace) -> list[str]:
+    """Inputs outside the range of training, where they are not the verdict itself."""
+    shifts = () if str(trace.verdict) == "input_shift" else input_shifts(trace)
+    texts = [f"{capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in shifts]
+    return [html.paragraph(text, "warning") for text in texts]
+
+
+def _effects(trace: Trace) -> list[str]:
     if not trace.effects:
         return []
-    parts = [html.heading("The effect" if len(trace.effects) == 1 else "The effects"), effects_table(trace)]
-    if trace.terms:
-        parts.append(shifts_table(trace))
-    return [*parts, *map(html.figure, [*effect_pictures(out, trace), *channel_picture(out, trace)])]
+    heading = html.heading("The effect" if len(trace.effects) == 1 else "The effects")
+    parts = [heading, html.paragraph(evidence_sentence(trace)), effects_table(trace)]
+    return [*parts, shifts_table(trace), *effect_figures(trace)] if trace.terms else parts
 
 
 def _rivals(trace: Trace) -> list[str]:
@@ -120,19 +127,23 @@ def _rivals(trace: Trace) -> list[str]:
 def _rivals_sentence(trace: Trace) -> str:
     if not trace.equivalent and not trace.mechanisms:
         return "No other candidate explains these pushes as well."
-    if trace.undecided:
-        return "These data do not decide between the explanations above."
-    return "The explanation above fits best, but these data do not exclude the others."
+    decided = (
+        "These data do not decide"
+        if trace.undecided
+        else "The first fits best, but these data do not exclude the others"
+    )
+    return f"{rivals_sentence(trace).strip()} {decided}."
 
 
-def _held_out(out: Path, trace: Trace) -> list[str]:
-    intro = (
+def _held_out(trace: Trace) -> list[str]:
+    method = (
         f"{_after(trace)} All figures are of pushes that took no part in the search. Before: the deployed model. "
         "Refit: the same model retrained on the analysis pushes, without the effect. Of an analytical model only the "
         "covariance is estimated again."
     )
-    parts = [html.heading("Before, refit, after"), html.paragraph(intro), *held_out_tables(trace)]
-    return [*parts, html.heading("Calibration"), *map(html.figure, calibration_picture(out, trace))]
+    every = [html.paragraph(method), *metric_tables(trace), *calibration_figures(trace)]
+    parts = [html.heading("Before, refit, after"), html.paragraph(worth_sentence(trace)), held_out_table(trace)]
+    return [*parts, *error_figure(trace), html.details("All metrics, and the calibration", html.joined(every))]
 
 
 def _after(trace: Trace) -> str:
@@ -143,15 +154,17 @@ def _after(trace: Trace) -> str:
     return "Nothing was added, so there is no model after the refit."
 
 
-def _residuals(out: Path, trace: Trace) -> list[str]:
-    return [html.heading("Residuals before and after"), *map(html.figure, map_pictures(out, trace))]
+def _residuals(trace: Trace) -> list[str]:
+    figures = map_figures(trace)
+    return [html.heading("Residuals before and after"), *figures] if figures else []
 
 
-def _tested(out: Path, trace: Trace) -> list[str]:
+def _tested(trace: Trace) -> list[str]:
     parts = [html.heading("What else was tested")]
     if not trace.tested:
         return [*parts, html.paragraph("Nothing could be tested: see the notes.", "warning")]
-    return [*parts, *map(html.figure, tested_picture(out, trace)), *tested_tables(trace)]
+    evidence = [] if trace.effects else [html.paragraph(evidence_sentence(trace))]
+    return [*parts, *evidence, *tested_tables(trace)]
 
 
 def _remaining(trace: Trace) -> list[str]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from push_predictor.models.request import UNITS
+from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.drivers import CONSTANT
 
 
@@ -67,6 +70,12 @@ COVARIATES: dict[str, str] = {
     CONSTANT: "nothing (constant)",
 }
 
+SHOWN = {
+    **dict.fromkeys(("slider_heading", "push_heading", "angle"), (float(np.degrees(1.0)), "deg")),
+    "velocity": (1e3, "mm/s"),
+    "contact_gap": (1e3, "mm"),
+}
+
 
 def mechanism_phrase(mechanism: str | None) -> str:
     """A mechanism as a noun phrase; "an unknown mechanism" for None."""
@@ -95,6 +104,29 @@ def effect_phrase(mechanism: str | None, covariate: str) -> str:
     return f"{mechanism_phrase(mechanism)} (depends on {covariate_phrase(covariate)})"
 
 
+def step_phrase(covariate: str, place: float) -> str:
+    """Where or when a step sets in, to follow a verb."""
+    if covariate == "elapsed_time":
+        return f"{place_of_step(covariate, place)} into the session"
+    if covariate == "push_index":
+        return f"after {place_of_step(covariate, place)}"
+    if covariate == "slid_distance":
+        return f"after {number(place, 3)} m of sliding"
+    return f"where {covariate_phrase(covariate)} exceeds {place_of_step(covariate, place)}"
+
+
+def place_of_step(covariate: str, place: float) -> str:
+    """The place of a step with its unit, to follow "before" or "after"."""
+    if covariate == "elapsed_time":
+        return f"{place:.0f} s"
+    if covariate == "push_index":
+        return f"push {np.floor(place):.0f}"
+    if covariate == "slid_distance":
+        return f"{number(place, 3)} m slid"
+    factor, unit = shown_unit_of(covariate)
+    return f"{number(factor * place, 3)} {unit}".rstrip()
+
+
 def listed(phrases: Sequence[str]) -> str:
     """Phrases as a list in a sentence."""
     *first, last = phrases
@@ -119,6 +151,11 @@ def capitalised(text: str) -> str:
 def unit_of(covariate: str) -> str:
     """The unit of a covariate, empty if none is known."""
     return UNITS.get(covariate, "")
+
+
+def shown_unit_of(covariate: str) -> tuple[float, str]:
+    """The factor to, and the name of, the unit in which pictures and sentences show a covariate."""
+    return SHOWN.get(covariate, (1.0, unit_of(covariate)))
 
 
 def with_unit(covariate: str) -> str:

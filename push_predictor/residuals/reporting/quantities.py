@@ -56,4 +56,5 @@ def _shown(value: float, interval: Gain) -> str:
         return number(value, 3)
     power = int(np.floor(np.log10(width)))
     decimals = -power + (width / 10.0**power <= 3.0)  # one digit of the width, two if it begins with 1 to 3
-    return f"{value:.{max(0, decimals)}f}".replace("-", "−")
+    shown = round(value, max(0, decimals)) + 0.0  # no minus zero
+    return f"{shown:.{max(0, decimals)}f}".replace("-", "−")

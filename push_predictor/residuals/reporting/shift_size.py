@@ -26,7 +26,9 @@ def shift_sizes(trace: Trace, effect: Effect, table: PushTable) -> tuple[Sized, 
     draws = rng.multivariate_normal(none, effect.covariance, DRAWS, method="svd")
     spread = np.array([_size(shift + design @ draw) for draw in draws])
     low, high = np.quantile(spread, [0.025, 0.975], axis=0)
-    ends = zip(OUTPUTS, _size(shift).tolist(), low.tolist(), high.tolist(), strict=True)
+    size = _size(shift)
+    low, high = np.minimum(low, size), np.maximum(high, size)  # draws of a small effect are all larger than it
+    ends = zip(OUTPUTS, size.tolist(), low.tolist(), high.tolist(), strict=True)
     return tuple(Sized(f"root mean square shift of {o}", v, a, b, OUTPUT_UNITS[o]) for o, v, a, b in ends)
 
 

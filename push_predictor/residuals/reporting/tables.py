@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from push_predictor.evaluation.report.tables import metrics_tables
-from push_predictor.evaluation.validation import metrics_json
+from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
-from push_predictor.residuals.outcome import FoundEffect, Tested, Trace
-from push_predictor.residuals.reporting.figures.tested import best_of, role_of
+from push_predictor.residuals.outcome import FoundEffect, Gain, Tested, Trace
 from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, effect_phrase, mechanism_phrase, unit_of
-from push_predictor.residuals.reporting.quantities import in_shown_unit, interval_cell, p_text, shown_unit
+from push_predictor.residuals.reporting.quantities import count, in_shown_unit, interval_cell, p_text, shown_unit
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of
+from push_predictor.residuals.reporting.tested import best_of, role_of
 
 AT_ONCE = 15  # candidates shown before the reader opens the rest
 COUNTS = ("push_index", "edge", "recording")
@@ -52,24 +52,37 @@ def shifts_table(trace: Trace) -> str:
 
 
 def tested_tables(trace: Trace) -> list[str]:
-    """All candidates, smallest p first; the later ones are hidden until the reader opens them."""
+    """All candidates, smallest p first; all but fifteen are hidden until the reader opens them."""
     best = best_of(trace.tested)
-    rows = [
-        [bare(mechanism_phrase(t.mechanism)), bare(covariate_phrase(t.covariate)), p_text(t.p_value), _mark(trace, t)]
-        for t in best
-    ]
+    shown = _at_once(trace, best)
+    rest = [tested for tested in best if tested not in shown]
     head = ("mechanism", "depends on", "family-wise p", "")
-    open_rows = max(AT_ONCE, 1 + max((k for k, row in enumerate(rows) if row[3]), default=0))
-    caption = f"The {min(open_rows, len(rows))} pairs of mechanism and covariate with the smallest p, of {len(rows)}."
-    parts = [html.table(caption, head, rows[:open_rows])]
-    if rest := rows[open_rows:]:
-        table = html.table(f"The other {len(rest)} pairs.", head, rest)
-        parts.append(html.details(f"The other {len(rest)} pairs", table))
+    caption = (
+        f"{count(len(shown), 'pair', 'pairs')} of mechanism and covariate with the smallest p, of {len(best)}, each in "
+        "its best basis, before any effect is subtracted. Neighbours of a true effect are often significant too, "
+        "because covariates and responses correlate."
+    )
+    parts = [html.table(caption, head, [_tested_row(trace, tested) for tested in shown])]
+    if rest:
+        title = f"The other {count(len(rest), 'pair', 'pairs')}"
+        table = html.table(f"{title}.", head, [_tested_row(trace, tested) for tested in rest])
+        parts.append(html.details(title, table))
     return parts
 
 
-def held_out_tables(trace: Trace) -> list[str]:
-    """NMSE, NLPD, exact density and coverage before, after the refit and with the effects; and the gain."""
+def held_out_table(trace: Trace) -> str:
+    """Squared error, log density and coverage before, after the refit and with the effects."""
+    head = ("model", "squared error (NMSE)", "NLPD (nats per window)", *(f"90 % coverage of {o}" for o in OUTPUTS))
+    caption = (
+        "Held-out pushes. Squared error: 0 is perfect, 1 is no better than the training mean; summed over dx, dy and "
+        "dtheta. NLPD: negative log predictive density, lower is better. Coverage: should be 90 %. In brackets: 95 % "
+        "intervals."
+    )
+    return html.table(caption, head, [_held_out_row(comparison) for comparison in comparisons_of(trace)])
+
+
+def metric_tables(trace: Trace) -> list[str]:
+    """The gain, and all metrics for each output before, after the refit and with the effects."""
     shown = comparisons_of(trace)
     metrics = [metrics_json(comparison) for comparison in shown]
     alike = len({comparison.push_id.tobytes() for comparison in shown}) == 1
@@ -121,15 +134,44 @@ def experiment_table(trace: Trace) -> str:
 def _effect_row(effect: FoundEffect, noise: bool) -> list[str]:
     size, share = effect.parameter, effect.share_of_residual
     basis = "" if effect.basis == "constant" else f" ({effect.basis})"
+    depends = "position on the table" if effect.basis == "map" else bare(covariate_phrase(effect.covariate))
     return [
         "noise" if noise else bare(mechanism_phrase(effect.mechanism)),
-        f"{bare(covariate_phrase(effect.covariate))}{basis}",
-        html.NOTHING if size is None else size.name.partition(", ")[0],
+        f"{depends}{basis}",
+        html.NOTHING if size is None else size.name.partition(", ")[0].partition(" over ")[0],
         html.NOTHING if size is None else interval_cell(*in_shown_unit(size)),
         ", ".join(name for name in OUTPUTS if name in effect.outputs) or html.NOTHING,
-        f"{100.0 * share:.1f} %" if np.isfinite(share) and share > 0.0 else html.NOTHING,
+        f"{100.0 * share:.1f}\u00a0%" if np.isfinite(share) and share > 0.0 else html.NOTHING,
         p_text(effect.p_value),
     ]
+
+
+def _held_out_row(comparison: Comparison) -> list[str]:
+    metrics: dict[str, Any] = metrics_json(comparison)
+    coverage = metrics["coverage"]["0.9"] or {}
+    cells = [_with_interval(metrics, name) for name in ("nmse", "nlpd")]
+    shares = (coverage.get(name) for name in OUTPUTS)
+    return [comparison.model, *cells, *(html.NOTHING if s is None else f"{100.0 * s:.0f} %" for s in shares)]
+
+
+def _with_interval(metrics: Mapping[str, Any], name: str) -> str:
+    value, ends = metrics[name]["total"], metrics["interval"][name]
+    if value is None or ends is None:
+        return html.number(value, 3)
+    return interval_cell(Gain(value, ends["low"], ends["high"]))
+
+
+def _at_once(trace: Trace, best: Sequence[Tested]) -> list[Tested]:
+    """At most fifteen candidates: those that the answer names, then those with the smallest p."""
+    named = [tested for tested in best if role_of(trace, tested)]
+    others = [tested for tested in best if not role_of(trace, tested)]
+    chosen = [*named, *others][:AT_ONCE]
+    return [tested for tested in best if tested in chosen]
+
+
+def _tested_row(trace: Trace, tested: Tested) -> list[str]:
+    names = mechanism_phrase(tested.mechanism), covariate_phrase(tested.covariate)
+    return [*map(bare, names), p_text(tested.p_value), _mark(trace, tested)]
 
 
 def _size_cell(size: Mapping[str, Any]) -> str:

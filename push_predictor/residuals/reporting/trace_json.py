@@ -6,6 +6,7 @@ from typing import Any
 
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.residuals.outcome import CHANNELS, FoundEffect, Gain, Trace
+from push_predictor.residuals.reporting.input_shift import input_shift_json
 
 
 def trace_json(trace: Trace) -> dict[str, Any]:
@@ -13,6 +14,7 @@ def trace_json(trace: Trace) -> dict[str, Any]:
     held_out = trace.held_out
     return {
         "verdict": trace.verdict,
+        "input_shift": input_shift_json(trace),
         "effect_present": trace.verdict != "none",
         "channel": CHANNELS[trace.verdict],
         "kind": trace.kind,

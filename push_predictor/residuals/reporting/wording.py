@@ -11,7 +11,8 @@ from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.outcome import FoundEffect, Gain, Trace, Verdict
+from push_predictor.residuals.outcome import FoundEffect, Gain, Trace
+from push_predictor.residuals.reporting.input_shift import input_shifts, share_clause, shift_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import (
     MECHANISMS,
@@ -20,11 +21,12 @@ from push_predictor.residuals.reporting.phrases import (
     listed,
     mechanism_phrase,
     moved_noun,
-    unit_of,
+    step_phrase,
 )
 from push_predictor.residuals.reporting.quantities import count, estimate, in_shown_unit, p_text
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 
+SHIFTED = "input_shift"
 FURTHER = "In addition"
 FORCE = "surface_friction"  # its size is a share of the force
 UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
@@ -32,7 +34,7 @@ UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are f
 
 def verdict_sentence(trace: Trace, where: str = "below") -> str:
     """The verdict in a few sentences: answer, size, rivals; where: the place that lists pushes that would decide."""
-    return f"{_joined(headline(trace), EVIDENCE[trace.verdict](trace))}{_rivals(trace, where)}"
+    return f"{_joined(headline(trace), EVIDENCE[trace.verdict](trace))}{rivals_sentence(trace, where)}"
 
 
 def headline(trace: Trace) -> str:
@@ -41,15 +43,16 @@ def headline(trace: Trace) -> str:
         return "No change found"
     if trace.verdict == "measurement":
         return "The measurement is wrong, not the motion model"
+    if str(trace.verdict) == SHIFTED:
+        return capitalised(shift_clause(input_shifts(trace)[0]))
     return capitalised(_claim(trace, 0))
 
 
-def evidence_sentence(trace: Trace, where: str = "below") -> str:
-    """The sentences of the verdict after the headline."""
+def evidence_sentence(trace: Trace) -> str:
+    """The sentences of the verdict between the headline and the rivals."""
     evidence = EVIDENCE[trace.verdict](trace)
-    sized = trace.verdict not in ("none", "measurement") and not evidence.startswith("p = ")
-    first = f"Size: {evidence}" if sized else evidence if evidence.startswith("p = ") else capitalised(evidence)
-    return f"{first}{_rivals(trace, where)}"
+    sized = trace.verdict not in ("none", "measurement", SHIFTED) and not evidence.startswith("p = ")
+    return f"Size: {evidence}" if sized else evidence if evidence.startswith("p = ") else capitalised(evidence)
 
 
 def worth_sentence(trace: Trace) -> str:
@@ -57,6 +60,8 @@ def worth_sentence(trace: Trace) -> str:
     pushes = count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
     if trace.verdict == "measurement":
         return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
+    if str(trace.verdict) == SHIFTED:
+        return "The motion model stays unchanged. Train on pushes in the new range, then trace again."
     if not trace.terms:
         retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
         return f"The motion model stays unchanged: no effect on the mean motion was found.{retrain}"
@@ -132,28 +137,16 @@ def _moves(trace: Trace, index: int) -> str:
     """Subject and verb for a known mechanism, by the basis of its dependence."""
     effect = trace.effects[index]
     noun = moved_noun(effect.mechanism)
-    if effect.covariate == CONSTANT or (effect.basis == "constant" and effect.covariate in UNVARIED):
+    if effect.covariate in (CONSTANT, "session") or (effect.basis == "constant" and effect.covariate in UNVARIED):
         return f"{noun} differs from {'the model' if trace.model.kind == 'analytical' else 'training'}"
     if effect.basis == "step" and index < len(trace.terms):
         known = MECHANISMS.get(effect.mechanism)
         onset = known.onset if known and known.onset else f"{noun} changed"
-        return f"{onset} {_place(effect.covariate, trace.terms[index].basis.place)}"
+        return f"{onset} {step_phrase(effect.covariate, trace.terms[index].basis.place)}"
     if effect.basis == "category":
         return f"{noun} differs by {covariate_phrase(effect.covariate)}"
     along = "the position on the table" if effect.basis == "map" else covariate_phrase(effect.covariate)
     return f"{noun} changes with {along}"
-
-
-def _place(covariate: str, place: float) -> str:
-    """Where a step lies, in words."""
-    if covariate == "elapsed_time":
-        return f"{place:.0f} s into the session"
-    if covariate == "push_index":
-        return f"after push {np.floor(place):.0f}"
-    if covariate == "slid_distance":
-        return f"after {number(place, 3)} m of sliding"
-    unit = unit_of(covariate)
-    return f"where {covariate_phrase(covariate)} exceeds {number(place, 3)}{f' {unit}' if unit else ''}"
 
 
 # --- the evidence for each verdict ---------------------------------------------------------------------------------
@@ -162,7 +155,7 @@ def _place(covariate: str, place: float) -> str:
 def _none(trace: Trace) -> str:
     pushes = count(len(trace.analysis.pushes), "push", "pushes")
     tried = count(len(trace.tested), "candidate", "candidates")
-    text = f"none of {tried} explains the residual of {pushes} (family-wise level {number(trace.alpha)})."
+    text = f"not one of {tried} explains the residual of {pushes} (family-wise level {number(trace.alpha)})."
     closest = min(trace.tested, key=lambda tested: tested.p_value, default=None)
     if closest is None:
         return text
@@ -226,7 +219,14 @@ def _variance(trace: Trace) -> str:
     return " ".join([f"p = {p_text(trace.effects[0].p_value)}.", *sentences])
 
 
-EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
+def _shifted(trace: Trace) -> str:
+    """The share of windows outside the range of training, for each input."""
+    first, *others = input_shifts(trace)
+    further = [f" {capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in others]
+    return f"{share_clause(first)}.{''.join(further)}"
+
+
+EVIDENCE: dict[str, Callable[[Trace], str]] = {
     "none": _none,
     "effect": _effects,
     "driver_only": _effects,
@@ -234,10 +234,11 @@ EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
     "wrench_only": _effects,
     "measurement": _measurement,
     "variance": _variance,
+    SHIFTED: _shifted,
 }
 
 
-def _rivals(trace: Trace, where: str) -> str:
+def rivals_sentence(trace: Trace, where: str = "below") -> str:
     """The covariates and mechanisms that fit as well, and how many pushes would decide."""
     text = ""
     if trace.equivalent:

@@ -30,7 +30,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
     for row, comparison in zip(axes, comparisons, strict=True):
         _paint_coverage(row[0], comparison)
         values = pit(comparison)
-        tallest = max(_bars(values[:, k])[0].max() for k in range(3))
+        tallest = max(histogram(values[:, k])[0].max() for k in range(3))
         for k, ax in enumerate(row[1:]):
             _paint_pit(ax, values[:, k], k, tallest)
         row[0].set_ylabel(f"{comparison.model}\nobserved share")
@@ -54,6 +54,13 @@ def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Arra
     return hit.mean(axis=0), low, high
 
 
+def histogram(values: Array) -> tuple[Array, Array]:
+    """Counts (b,) and edges (b + 1,) of a histogram of probabilities, about ten windows a bar."""
+    count = int(np.clip(len(values) // WINDOWS_PER_BAR, FEWEST_BARS, MOST_BARS))
+    counts, edges = np.histogram(values, bins=count, range=(0.0, 1.0))
+    return counts.astype(np.float64), edges
+
+
 def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
     share, low, high = coverage_curve(comparison)
     grid(ax)
@@ -67,16 +74,10 @@ def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
 
 
 def _paint_pit(ax: Axes, values: Array, output: int, tallest: float) -> None:
-    counts, edges = _bars(values)
+    counts, edges = histogram(values)
     low, high = binom.ppf([0.025, 0.975], len(values), 1.0 / len(counts))
     look: dict[str, Any] = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
     ax.bar(edges[:-1], counts, np.diff(edges), align="edge", **look)
     ax.axhspan(low, high, color="0.2", alpha=0.18, linewidth=0.0)
     ax.axhline(len(values) / len(counts), color="0.2", linewidth=0.8, linestyle=":")
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.08 * max(tallest, high)), xticks=(0.0, 0.5, 1.0))
-
-
-def _bars(values: Array) -> tuple[Array, Array]:
-    count = int(np.clip(len(values) // WINDOWS_PER_BAR, FEWEST_BARS, MOST_BARS))
-    counts, edges = np.histogram(values, bins=count, range=(0.0, 1.0))
-    return counts.astype(np.float64), edges

@@ -1,116 +1,158 @@
-"""The data behind a finding that shifts no mean: the force, the gap at the contact, the noise."""
+"""The data behind a finding that shifts no mean: the force, the gap at the contact, the noise, the inputs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.geometry.frames import wrap_angle
-from push_predictor.recordings.table import PushTable
-from push_predictor.reporting.canvas import COLOURS, SYMBOLS, grid
-from push_predictor.residuals.evidence.standardised import push_order
-from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.partial import DRAWS, LEAST_PUSHES
-from push_predictor.residuals.reporting.phrases import with_unit
-from push_predictor.types import Array
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Columns, Dots, Line, Mark, limits_of
+from push_predictor.residuals.channels.measurement import gap_responses
+from push_predictor.residuals.channels.wrench import WRENCH_BIAS
+from push_predictor.residuals.evidence.drivers import SETTLED
+from push_predictor.residuals.outcome import Gain, Trace
+from push_predictor.residuals.reporting.figures.pushes import (
+    Axis,
+    Means,
+    axis_of,
+    means_along,
+    push_means,
+    titles,
+    values_of,
+)
+from push_predictor.residuals.reporting.quantities import estimate
+from push_predictor.types import Array, TextArray
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-BINS = 10
 NORMAL = "Direction of the contact normal in the world (deg)"
+SHARE = 0.02  # of the windows at either end that the limits may cut off
+HISTOGRAM = 16  # bars
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
-    """Values y (n, k) of windows against x (n,), with their names; spread: show the root mean square, not the mean."""
+class Values:
+    """Values y (n,) of windows of these pushes along an axis."""
 
-    x: Array
-    label: str
+    axis: Axis
+    push_id: TextArray
     y: Array
-    title: str
-    names: tuple[str, ...]
-    spread: bool = False
 
 
-def channel_of(trace: Trace) -> Channel | None:
-    """The data behind the verdict; None if these windows do not contain them."""
-    table, effect = trace.analysis, trace.effects[0]
-    covariates = table.covariates
-    if trace.verdict == "variance" and len(trace.residual) == len(table):
-        return Channel(
-            *_driver(table, effect.covariate),
-            trace.residual,
-            "RMS residual / predicted standard deviation",
-            SYMBOLS,
-            True,
+def force_chart(trace: Trace) -> Chart | None:
+    """The force now and in training, along what it depends on; None without a force."""
+    effect = trace.effects[0]
+    now, before = (
+        _force(table, effect.covariate, effect.mechanism) for table in (trace.analysis, trace.model.training)
+    )
+    return None if now is None else _compared("Normal force (N)", "N", now, before)
+
+
+def gap_chart(trace: Trace) -> Chart | None:
+    """The gap that a measurement error opens, and the gap as fitted; None if the windows do not contain it."""
+    effects, table = trace.effects, trace.analysis
+    if effects[0].mechanism == WRENCH_BIAS:
+        return force_chart(trace)
+    if not {"contact_gap", "slider_x", "slider_y", "slider_heading"} <= set(table.covariates):
+        return None
+    name = str(effects[0].mechanism)
+    sizes = np.array([e.parameter.value for e in effects if e.mechanism == name and e.parameter is not None])
+    settled = table.covariates.get("time_since_contact", np.full(len(table), np.inf)) >= SETTLED
+    shown = table.take(settled)
+    response = gap_responses(shown, trace.model.rig.outline)["frame_shift" if name == "tool_offset" else name]
+    fitted = 1e3 * response @ (-sizes if name == "tool_offset" else sizes)  # a tool offset is a shift of the other sign
+    gap = 1e3 * shown.covariates["contact_gap"]
+    x, label = fitted, "Gap that the error causes, as fitted (mm)"
+    if name == "clock_offset":
+        x, label = 1e3 * shown.inputs[:, 0] * np.cos(shown.inputs[:, 2]), "Speed into the contact (mm/s)"
+    chart = _compared("Measured gap at the contact (mm)", "mm", Values(Axis(x, label, {}), shown.push_id, gap), None)
+    ends = np.array([np.argmin(x), np.argmax(x)])
+    line = Line("fit", x[ends], fitted[ends], name="as the error predicts")
+    zero = Line("zero", np.array(chart.x), np.zeros(2))
+    return replace(chart, marks=(zero, *chart.marks, line), y=limits_of(np.array(chart.y), fitted, np.zeros(1)))
+
+
+def noise_chart(trace: Trace) -> Chart | None:
+    """The size of the errors along the covariate, in units of the predicted noise."""
+    outputs = [OUTPUTS.index(name) for name in trace.effects[0].outputs] if trace.effects else []
+    return size_chart(trace, trace.effects[0].covariate if trace.effects else "", outputs or [0, 1, 2])
+
+
+def size_chart(trace: Trace, covariate: str, outputs: list[int]) -> Chart | None:
+    """Root mean square error of each push over the predicted one, before and after; 1 is as predicted."""
+    table, shown = trace.analysis, [("before", trace.residual)]
+    if trace.terms and not np.array_equal(trace.residual, trace.unexplained):
+        shown.append(("after", trace.unexplained))
+    if any(len(z) != len(table) for _, z in shown):
+        return None
+    axis = axis_of(table, covariate)
+    place = push_means(table.push_id, axis.x)[1]
+    dots: list[Mark] = []
+    bars: list[Mark] = []
+    tops = [1.5]
+    one = "" if len(shown) > 1 else "one push"
+    for kind, z in shown:
+        size = np.sqrt(np.mean(z[:, outputs] ** 2, axis=1))
+        names, square = push_means(table.push_id, size**2)
+        bins = means_along(axis, table.push_id, size, square=True)
+        dots.append(
+            Dots("push" if len(shown) == 1 else kind, place, np.sqrt(square), titles(names, np.sqrt(square)), name=one)
         )
-    if trace.verdict == "wrench_only" and "normal_force" in covariates:
-        place = _driver(table, effect.covariate)
-        return Channel(*place, covariates["normal_force"][:, None], "Normal force (N)", ("normal force",))
-    if trace.verdict == "measurement" and {"contact_gap", "push_heading"} <= set(covariates):
-        gap = 1e3 * covariates["contact_gap"][:, None]
-        return Channel(*_opening(table, effect.mechanism), gap, "Gap between pusher and outline (mm)", ("gap",))
-    return None
+        bars.append(_bars(kind, bins, "", kind if len(shown) > 1 else "pushes, in bins"))
+        tops += [float(np.quantile(np.sqrt(square), 1.0 - SHARE)), float(bins.high.max(initial=0.0))]
+    label = "Error of a push / predicted standard deviation"
+    x, y = limits_of(axis.x, margin=0.02), (0.0, 1.1 * max(tops))
+    marks = (Line("held", np.array(x), np.ones(2), name="as predicted"), *dots, *bars)
+    return Chart(f"{label}.", axis.label, label, x, y, marks, names=axis.names)
 
 
-def paint_channel(figure: Figure, table: PushTable, channel: Channel) -> None:
-    """Paint bins of x with 95 % intervals from a bootstrap of pushes, and single windows where means are shown."""
-    ax = figure.subplots()
-    grid(ax)
-    for k, name in enumerate(channel.names):
-        y = channel.y[:, k]
-        if not channel.spread:
-            ax.plot(channel.x, y, ".", color="0.6", markersize=2.0, mew=0.0, zorder=1)
-            ax.set_ylim(*_room(y))
-        _paint_bins(ax, table, channel, y, COLOURS[k], name)
-    ax.set(xlabel=channel.label, ylabel=channel.title)
-    if len(channel.names) > 1:
-        ax.axhline(1.0, color="0.2", linewidth=0.8, linestyle=":")
-        ax.legend(loc="best")
+def input_chart(trace: Trace, covariate: str) -> Chart | None:
+    """Histograms of a covariate in training and now; None if either lacks it."""
+    both = [values_of(table, covariate) for table in (trace.model.training, trace.analysis)]
+    if both[0] is None or both[1] is None:
+        return None
+    axis, before = axis_of(trace.analysis, covariate), axis_of(trace.model.training, covariate)
+    edges = np.linspace(*limits_of(axis.x, before.x, margin=0.02), HISTOGRAM + 1)
+    shares = [100.0 * np.histogram(each, edges)[0] / max(len(each), 1) for each in (before.x, axis.x)]
+    marks = Columns("push", edges, shares[0], name="training"), Columns("before", edges, shares[1], name="now")
+    ends = (float(edges[0]), float(edges[-1])), (0.0, 1.1 * float(np.max(shares)))
+    return Chart(f"{axis.label} in training and now.", axis.label, "% of windows", *ends, marks, size=SMALL)
 
 
-def _paint_bins(ax: Axes, table: PushTable, channel: Channel, y: Array, colour: str, name: str) -> None:
-    edges = np.unique(np.quantile(channel.x, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
-    number = np.searchsorted(edges, channel.x, side="right")
-    found = []
-    for b in np.unique(number):
-        rows = number == b
-        if len(set(table.push_id[rows].tolist())) < LEAST_PUSHES:
-            continue
-        values = y[rows] ** 2 if channel.spread else y[rows]
-        weights = push_bootstrap(table.push_id[rows], draws=DRAWS)
-        low, high = np.quantile(weights @ values / weights.sum(axis=1), [0.025, 0.975])
-        found.append([channel.x[rows].mean(), *(_shown(v, channel) for v in (values.mean(), low, high))])
-    place, value, low, high = np.array(found).reshape(-1, 4).T
-    ends = np.abs(np.stack([value - low, high - value]))
-    ax.errorbar(place, value, ends, fmt="o-", color=colour, markersize=4.5, linewidth=1.0, capsize=2.0, label=name)
+def _force(table: PushTable, covariate: str, mechanism: str | None) -> Values | None:
+    force = table.covariates.get("normal_force")
+    if force is None or not len(table):
+        return None
+    axis = axis_of(table, covariate)
+    if mechanism == WRENCH_BIAS and "push_heading" in table.covariates:
+        axis = Axis(np.degrees(wrap_angle(table.covariates["push_heading"] - table.inputs[:, 2])), NORMAL, {})
+    return Values(axis, table.push_id, force)
 
 
-def _shown(value: float, channel: Channel) -> float:
-    return float(np.sqrt(value)) if channel.spread else float(value)
+def _compared(label: str, unit: str, now: Values, before: Values | None) -> Chart:
+    """Pushes and bins along the axis now, and in training: along the same axis, or its range if time is the axis."""
+    names, each = push_means(now.push_id, now.y)
+    place = push_means(now.push_id, now.axis.x)[1]
+    bins = means_along(now.axis, now.push_id, now.y)
+    x = limits_of(now.axis.x, margin=0.02)
+    known = [] if before is None else [np.quantile(before.y, [0.05, 0.95])]
+    y = limits_of(np.quantile(each, [SHARE, 1.0 - SHARE]), bins.low, bins.high, *known)
+    marks = (
+        *(() if before is None else _training(before, x)),
+        Dots("push" if before is None else "before", place, each, titles(names, each, unit), name="one push"),
+        _bars("before", bins, unit, "pushes, in bins"),
+    )
+    return Chart(f"{label}.", now.axis.label, label, x, y, marks, names=now.axis.names)
 
 
-def _room(y: Array) -> tuple[float, float]:
-    low, high = np.quantile(y, [0.01, 0.99])
-    margin = 0.1 * max(high - low, 1e-12)
-    return float(low - margin), float(high + margin)
+def _training(before: Values, x: tuple[float, float]) -> tuple[Mark, ...]:
+    low, middle, high = np.quantile(before.y, [0.05, 0.5, 0.95])
+    ends = np.array(x)
+    band = Band("push", ends, np.full(2, low), np.full(2, high), name="middle 90 % of the training windows")
+    return band, Line("push", ends, np.full(2, middle), name="median in training")
 
 
-def _driver(table: PushTable, covariate: str) -> tuple[Array, str]:
-    """The covariate, or the order of the pushes if it is not recorded."""
-    if covariate not in table.covariates:
-        return push_order(table).astype(np.float64), "Push count"
-    return table.covariates[covariate], with_unit(covariate)
-
-
-def _opening(table: PushTable, mechanism: str | None) -> tuple[Array, str]:
-    """What a measurement error opens the gap with: a clock offset with the speed, a shift with the direction."""
-    velocity, _, angle = table.inputs.T
-    if mechanism == "clock_offset":
-        return 1e3 * velocity * np.cos(angle), "Speed into the contact (mm/s)"
-    return np.degrees(wrap_angle(table.covariates["push_heading"] - angle)), NORMAL
+def _bars(kind: str, bins: Means, unit: str, name: str) -> Bars:
+    ends = zip(bins.y, bins.low, bins.high, strict=True)
+    shown = [estimate(Gain(float(value), float(low), float(high)), unit) for value, low, high in ends]
+    return Bars(kind, bins.x, bins.y, bins.low, bins.high, shown, name=name)

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
-
 import numpy as np
 
+from push_predictor.evaluation.report.figures.push_maps import contact_label
 from push_predictor.evaluation.report.figures.residuals import standardised_residuals
-from push_predictor.reporting.canvas import Picture, draw
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.reporting import html
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.maps import Column, Halves, columns_of, halves_of, paint_residual_maps
+from push_predictor.residuals.reporting.figures.maps import Column, Halves, columns_of, halves_of, map_charts
 from push_predictor.residuals.reporting.figures.partial import strength_of
 from push_predictor.residuals.reporting.phrases import covariate_phrase
 from push_predictor.residuals.reporting.summary import comparisons_of
 
-SIZE = (10.0, 6.6)  # inches
 
-
-def map_pictures(out: Path, trace: Trace) -> list[Picture]:
+def map_figures(trace: Trace) -> list[str]:
     """Maps of the analysis pushes and of the held-out pushes."""
-    pictures = []
-    for name, title, columns in (
-        ("maps_analysis", "analysis pushes", _analysis_columns(trace)),
-        ("maps_held_out", "held-out pushes", _held_out_columns(trace)),
+    figures = []
+    for title, columns in (
+        ("analysis pushes", _analysis_columns(trace)),
+        ("held-out pushes", _held_out_columns(trace)),
     ):
-        if not columns:
-            continue
-        path = out / f"{name}.png"
-        draw(path, SIZE, partial(paint_residual_maps, outline=trace.model.rig.outline, columns=columns))
-        pictures.append(Picture(path, f"Maps of the mean residual of {title}.", _map_caption(trace, title, columns)))
-    return pictures
+        shown = map_charts(trace.model.rig.outline, columns) if columns else []
+        if shown:
+            per_row = len(columns) if len(columns) > 1 else len(OUTPUTS)
+            figures.append(html.charts(shown, _map_caption(trace, title, columns), per_row))
+    return figures
 
 
 def _analysis_columns(trace: Trace) -> list[Column]:
@@ -68,22 +64,18 @@ def _map_caption(trace: Trace, title: str, columns: list[Column]) -> str:
     )
     after = "the deployed model on windows cut again" if trace.verdict == "measurement" else "with the effects found"
     meaning = {"before": "the deployed model", "refit": "retrained on the analysis pushes", "after": after}
-    shown = dict.fromkeys(column.title.partition("\n")[0] for column in columns)
-    models = [f"{name.capitalize()}: {meaning[name]}." for name in shown]
-    numbers = " Numbers: pushes." if len(columns) < 3 else ""
+    models = [f"{name.capitalize()}: {meaning[name]}." for name in dict.fromkeys(column.title for column in columns)]
     return (
         f"Mean residual of {pushes} {title} over contact point and push angle, in units of the predicted standard "
-        f"deviation; orange is positive, purple negative. {' '.join(models)}{_split_words(trace)} {trust}{numbers} "
-        "Hatched: fewer than six windows."
+        f"deviation. {' '.join(models)}{_split_words(trace, columns)} {trust} Up: push angle. Across: "
+        f"{contact_label(trace.model.rig.outline)}. Grey: fewer than six windows."
     )
 
 
-def _split_words(trace: Trace) -> str:
-    """How the maps are split, if the first effect depends on a covariate."""
-    if not trace.terms or not trace.terms[0].basis.drivers:
+def _split_words(trace: Trace, columns: list[Column]) -> str:
+    """Why the maps are split, if they are."""
+    if not any(column.part for column in columns):
         return ""
+    where = "at the step" if trace.terms[0].basis.name == "step" else "at the median strength of the first effect"
     name = covariate_phrase(trace.terms[0].covariate)
-    return (
-        f" Maps are split at the median strength of the first effect, because an effect that changes with {name} may "
-        "cancel in one map of all pushes."
-    )
+    return f" Maps are split {where}: an effect that changes with {name} may cancel in one map of all pushes."

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.report.figures.push_maps import ColourScale, contact_label, paint_panel
 from push_predictor.evaluation.report.maps import Cells, PushMap, coarse_cells, recorded_map
 from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.recordings.table import PushTable
-from push_predictor.reporting.canvas import SYMBOLS
+from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.reporting import chart
+from push_predictor.reporting.chart import Chart
+from push_predictor.reporting.html import number
+from push_predictor.residuals.reporting.advice import DRIFTING
 from push_predictor.residuals.reporting.figures.partial import Strength
-from push_predictor.residuals.reporting.phrases import covariate_phrase
+from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, place_of_step
+from push_predictor.residuals.reporting.quantities import count
 from push_predictor.types import Array, BoolArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LEAST_REACH = 1.0  # predicted standard deviations at either end of the colours; less is noise of few windows
 WIDEST = 97.0  # % of the cells whose values the colours resolve
+NARROW = (215.0, 195.0)  # pixels of a panel if there are more than three in a row
+LEAST_HALF = 24  # windows; fewer fill too few cells
+LEAST_CELLS = 4  # of a map that is worth a picture
+MEANING = "mean residual / predicted standard deviation"
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,7 @@ class Column:
     """A column of the picture: standardised residuals z (n, 3) of the windows of a table."""
 
     title: str
+    part: str
     table: PushTable
     z: Array
 
@@ -43,38 +47,40 @@ class Halves:
 
 
 def halves_of(strength: Strength | None, table: PushTable) -> Halves:
-    """Windows below and above the median of the fitted effect: its sign differs between them."""
-    if strength is None or not strength.effect.basis.drivers:
-        return Halves((np.ones(len(table), dtype=np.bool_),), ("",))
+    """Windows before and after a step, else below and above the median of the fitted effect.
+
+    One part if the effect is constant, or if either part has too few windows.
+    """
+    whole = Halves((np.ones(len(table), dtype=np.bool_),), ("",))
+    if strength is None or not strength.effect.basis.drivers or not len(table):
+        return whole
+    basis = strength.effect.basis
     values = strength.curve(table.covariates, len(table))[0]
     widest = values[:, int(np.argmax(values.std(axis=0)))]
-    above = widest > np.median(widest)
-    return Halves((~above, above), _names(strength.effect.basis, above, table))
+    place = basis.values(table.covariates, len(table))[:, 0] > 0.5 if basis.name == "step" else _above(widest)
+    if min(int(place.sum()), int((~place).sum())) < LEAST_HALF:
+        return whole
+    return Halves((~place, place), _names(basis, place, table))
 
 
 def columns_of(title: str, table: PushTable, z: Array, halves: Halves) -> list[Column]:
     """A column for each half."""
     return [
-        Column(title if not name else f"{title}\n{name}", table.take(mask), z[mask])
-        for mask, name in zip(halves.masks, halves.names, strict=True)
-        if mask.any()
+        Column(title, name, table.take(mask), z[mask]) for mask, name in zip(halves.masks, halves.names, strict=True)
     ]
 
 
-def paint_residual_maps(figure: Figure, outline: Outline, columns: Sequence[Column]) -> None:
-    """Paint rows dx, dy, dtheta, a column for each of `columns`; numbers are pushes."""
-    maps = [residual_map(outline, column, _cells(outline, columns)) for column in columns]
-    scale = scale_of(maps)
-    axes = figure.subplots(len(SYMBOLS), len(columns), sharex=True, sharey=True, squeeze=False)
-    for k, row in enumerate(axes):
-        for ax, shown in zip(row, maps, strict=True):
-            image = paint_panel(ax, outline, shown, shown.mean[..., k], scale, counted=len(columns) < 3)
-        row[0].set_ylabel(f"{SYMBOLS[k]}\nPush angle (deg)")
-    for ax, column in zip(axes[0], columns, strict=True):
-        ax.set_title(column.title)
-    label = "Mean residual / predicted standard deviation"
-    figure.colorbar(image, ax=axes.ravel().tolist(), label=label, extend=scale.extend, pad=0.01, aspect=36, shrink=0.8)
-    figure.supxlabel(contact_label(outline), fontsize=9.0)
+def map_charts(outline: Outline, columns: Sequence[Column]) -> list[Chart]:
+    """Rows dx, dy, dtheta, a column for each of `columns`; empty if there are too few windows."""
+    cells = _cells(outline, columns)
+    if np.prod(cells.shape) < LEAST_CELLS:
+        return []
+    maps = [residual_map(outline, column, cells) for column in columns]
+    if not any(np.isfinite(shown.mean).any() for shown in maps):
+        return []
+    reach = reach_of(maps)
+    size = NARROW if len(columns) > 3 else chart.SMALL
+    return [_panel(c, m, k, reach, size) for k in range(len(OUTPUTS)) for c, m in zip(columns, maps, strict=True)]
 
 
 def residual_map(outline: Outline, column: Column, cells: Cells) -> PushMap:
@@ -83,12 +89,32 @@ def residual_map(outline: Outline, column: Column, cells: Cells) -> PushMap:
     return recorded_map(outline, shown, np.zeros_like(column.z), cells)
 
 
-def scale_of(maps: Sequence[PushMap]) -> ColourScale:
-    """One scale for all, symmetric about zero."""
+def reach_of(maps: Sequence[PushMap]) -> float:
+    """The end of one colour scale for all, symmetric about zero."""
     known = np.abs(np.concatenate([m.mean[np.isfinite(m.mean)] for m in maps]))
-    reach = max(LEAST_REACH, float(np.percentile(known, WIDEST))) if known.size else LEAST_REACH
-    cut = bool(known.size and known.max() > reach)
-    return ColourScale(-reach, reach, "PuOr_r", "both" if cut else "neither")
+    return max(LEAST_REACH, float(np.percentile(known, WIDEST))) if known.size else LEAST_REACH
+
+
+def _panel(column: Column, shown: PushMap, k: int, reach: float, size: tuple[float, float]) -> Chart:
+    contact, angle = 1e3 * shown.cells.contact, np.degrees(shown.cells.angle)
+    values = shown.mean[..., k]
+    title = f"{OUTPUTS[k]}, {column.title}"
+    part = f"; {column.part}" if column.part else ""
+    cells = chart.Cells("", contact, angle, values / reach, _titles(shown, values))
+    ends = (float(contact[0]), float(contact[-1])), (float(angle[0]), float(angle[-1]))
+    key = number(-reach, 2), number(reach, 2), MEANING
+    return Chart(
+        f"Map of the mean residual of {title}{part}.", "Contact (mm)", f"Angle (deg){part}", *ends, (cells,),
+        title=title, size=size, key=key,
+    )  # fmt: skip
+
+
+def _titles(shown: PushMap, values: Array) -> list[list[str]]:
+    pushes = np.zeros(values.shape, dtype=np.int64) if shown.pushes is None else shown.pushes
+    return [
+        [f"{count(int(pushes[r, c]), 'push', 'pushes')}: {number(float(values[r, c]), 2)}" for c in range(len(row))]
+        for r, row in enumerate(values)
+    ]
 
 
 def _cells(outline: Outline, columns: Sequence[Column]) -> Cells:
@@ -99,10 +125,21 @@ def _cells(outline: Outline, columns: Sequence[Column]) -> Cells:
     return Cells(cells.contact, np.linspace(angle[0], angle[-1], len(cells.angle)))
 
 
+def _above(values: Array) -> BoolArray:
+    """Windows above the median, or above the middle of the range if few are: levels may repeat."""
+    above = values > np.median(values)
+    return above if above.mean() > 0.25 else values > 0.5 * (values.min() + values.max())
+
+
 def _names(basis: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str, str]:
-    phrase, values = covariate_phrase(basis.drivers[0]), table.covariates[basis.drivers[0]]
+    values = table.covariates[basis.drivers[0]]
+    if basis.name == "step":
+        place = place_of_step(basis.drivers[0], basis.place)
+        first, second = ("until", "since") if basis.drivers[0] in DRIFTING else ("below", "above")
+        return f"{first} {place}", f"{second} {place}"
     low, high = values[~above], values[above]
-    if len(basis.drivers) == 1 and high.size and low.size and (low.max() <= high.min() or high.max() <= low.min()):
-        lower, upper = f"{phrase}: low", f"{phrase}: high"
+    if len(basis.drivers) == 1 and (low.max() <= high.min() or high.max() <= low.min()):
+        phrase = bare(covariate_phrase(basis.drivers[0]))
+        lower, upper = f"low {phrase}", f"high {phrase}"
         return (lower, upper) if low.max() <= high.min() else (upper, lower)
-    return f"effect of {phrase}: low", f"effect of {phrase}: high"
+    return "weak effect", "strong effect"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,19 +13,19 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint
 from push_predictor.models.mechanisms import Push
-from push_predictor.reporting.canvas import COLOURS, PREDICTED, SYMBOLS, UNIT_NAMES, UNITS, grid
+from push_predictor.recordings.table import OUTPUTS
+from push_predictor.reporting.canvas import UNIT_NAMES, UNITS
+from push_predictor.reporting.chart import SMALL, Band, Bars, Chart, Line, limits_of
 from push_predictor.residuals.evidence.standardised import mechanics_under
-from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows, shift_of
+from push_predictor.residuals.outcome import Gain, Trace
+from push_predictor.residuals.reporting.figures.partial import CENTRAL, DRAWS, LEAST_PUSHES, Rows
+from push_predictor.residuals.reporting.quantities import estimate
 from push_predictor.types import Array, BoolArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHIFT_BINS = 8
 COURSE_BINS = 9
 PLACES = ("first third", "middle third", "last third")
+KINDS = ("fit", "dy", "dtheta")  # colours of the thirds
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,26 +49,38 @@ class Means:
     high: Array
 
 
-def paint_shifts(figure: Figure, trace: Trace, effect: Effect, analysis: Rows, held_out: Rows | None) -> None:
-    """Paint the mean shift found against the fitted shift, per output; a correct effect lies on the diagonal."""
-    axes = figure.subplots(1, 3)
-    for k, ax in enumerate(axes):
-        _paint_shift(ax, trace, effect, (analysis, held_out), k)
-    axes[0].set_ylabel("Observed shift")
-    axes[0].legend(loc="upper left", handlelength=1.2)
+@dataclass(frozen=True, eq=False)
+class Shifts:
+    """An effect's fitted shift (n, 3), and the shift found (n, 3), mm and deg; design (n, 3, p) of its coefficients.
+
+    covariance (p, p): of the coefficients.
+    """
+
+    rows: Rows
+    fitted: Array
+    found: Array
+    design: Array
+    covariance: Array
 
 
-def paint_course(figure: Figure, trace: Trace, effect: Effect, rows: Rows, course: Course) -> None:
-    """Paint the shift of each output along an axis: lines fitted, points found."""
-    axes = figure.subplots(1, 3)
-    for k, ax in enumerate(axes):
-        grid(ax)
-        ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
-        for (name, group), colour in zip(course.groups, COLOURS, strict=False):
-            _paint_group(ax, binned_means(trace, effect, rows, course.x, group, k), colour, name)
-        ax.set_title(f"Shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
-    axes[0].legend(loc="best", handlelength=1.2)
-    axes[1].set_xlabel(course.label)
+def shifts_of(trace: Trace, effect: Effect, rows: Rows) -> Shifts:
+    """The shifts of the windows by an effect."""
+    push = Push(rows.table.inputs, rows.table.duration, rows.table.covariates)
+    together = joint(mechanics_under(trace.model), [effect], push)
+    fitted = together.shift * UNITS
+    residual = np.linalg.solve(rows.whitener, rows.unexplained[:, :, None])[:, :, 0] * UNITS
+    design = together.designs[0] * np.array(UNITS)[:, None]
+    return Shifts(rows, fitted, fitted + residual, design, effect.covariance)
+
+
+def shift_charts(analysis: Shifts, held_out: Shifts | None) -> list[Chart]:
+    """The mean shift found against the fitted shift, per output; a correct effect lies on the diagonal."""
+    return [_shift_chart((analysis, held_out), k) for k in range(len(OUTPUTS))]
+
+
+def course_charts(shifts: Shifts, course: Course) -> list[Chart]:
+    """The shift of each output along an axis: lines fitted, points found."""
+    return [_course_chart(shifts, course, k) for k in range(len(OUTPUTS))]
 
 
 def course_of(effect: Effect, outline: Outline, rows: Rows) -> Course:
@@ -87,64 +98,57 @@ def course_of(effect: Effect, outline: Outline, rows: Rows) -> Course:
     return Course(np.degrees(table.inputs[:, 2]), "Push angle (deg)", groups)
 
 
-def binned_means(
-    trace: Trace, effect: Effect, rows: Rows, x: Array, group: BoolArray, output: int, bins: int = COURSE_BINS
-) -> Means:
+def binned_means(shifts: Shifts, x: Array, group: BoolArray, output: int, bins: int = COURSE_BINS) -> Means:
     """Means of an output's shift (shown units) in bins of x (n,) with equal counts of the group's windows."""
-    design = _design(trace, effect, rows)[:, output] * UNITS[output]
-    fitted = shift_of(trace, effect, rows.table)[:, output] * UNITS[output]
-    found = fitted + _residual(rows)[:, output] * UNITS[output]
+    push_id = shifts.rows.table.push_id
+    fitted, found, design = shifts.fitted[:, output], shifts.found[:, output], shifts.design[:, output]
     edges = np.unique(np.quantile(x[group], np.linspace(0.0, 1.0, bins + 1)[1:-1])) if group.any() else np.empty(0)
     number = np.where(group, np.searchsorted(edges, x, side="right"), -1)
     each = []
     for b in np.unique(number[number >= 0]):
         inside = number == b
-        if len(set(rows.table.push_id[inside].tolist())) < LEAST_PUSHES:
+        if len(set(push_id[inside].tolist())) < LEAST_PUSHES:
             continue
         mean = design[inside].mean(axis=0)
-        weights = push_bootstrap(rows.table.push_id[inside], draws=DRAWS)
+        weights = push_bootstrap(push_id[inside], draws=DRAWS)
         low, high = np.quantile(weights @ found[inside] / weights.sum(axis=1), [0.025, 0.975])
-        half = CENTRAL * np.sqrt(max(float(mean @ effect.covariance @ mean), 0.0))
+        half = CENTRAL * np.sqrt(max(float(mean @ shifts.covariance @ mean), 0.0))
         each.append([x[inside].mean(), fitted[inside].mean(), half, found[inside].mean(), low, high])
     return Means(*np.array(each).reshape(-1, 6).T)
 
 
-def _paint_group(ax: Axes, means: Means, colour: str, name: str) -> None:
-    ax.fill_between(means.place, means.fitted - means.half, means.fitted + means.half, color=colour, alpha=0.2, lw=0.0)
-    ax.plot(means.place, means.fitted, color=colour, linewidth=1.5, label=name)
-    _bars(ax, means, colour, "o")
+def _course_chart(shifts: Shifts, course: Course, k: int) -> Chart:
+    means = [binned_means(shifts, course.x, group, k) for _, group in course.groups]
+    x = limits_of(course.x, margin=0.02)
+    y = limits_of(np.zeros(1), *(each for m in means for each in (m.low, m.high, m.fitted - m.half, m.fitted + m.half)))
+    fits = (
+        (Band(kind, m.place, m.fitted - m.half, m.fitted + m.half), Line(kind, m.place, m.fitted, name=name))
+        for m, kind, (name, _) in zip(means, KINDS, course.groups, strict=False)
+    )
+    found = tuple(_bars(m, kind, UNIT_NAMES[k]) for m, kind in zip(means, KINDS, strict=False))
+    marks = Line("zero", np.array(x), np.zeros(2)), *(mark for fit in fits for mark in fit), *found
+    return Chart(f"{_title(k)} against {course.label}.", course.label, _title(k), x, y, marks, size=SMALL)
 
 
-def _paint_shift(ax: Axes, trace: Trace, effect: Effect, parts: Sequence[Rows | None], k: int) -> None:
-    grid(ax)
-    ends = []
-    looks = (("#D55E00", "o", "analysis pushes"), ("#3b3b3b", "s", "held-out pushes"))
-    for rows, (colour, marker, name) in zip(parts, looks, strict=True):
-        if rows is None:
-            continue
-        fitted = shift_of(trace, effect, rows.table)[:, k] * UNITS[k]
-        everything = np.ones(len(fitted), dtype=np.bool_)
-        means = binned_means(trace, effect, rows, fitted, everything, k, SHIFT_BINS)
-        _bars(ax, means, colour, marker, name)
-        ends += [*means.place.tolist()]
-    if ends:
-        ax.plot([min(ends), max(ends)], [min(ends), max(ends)], color=PREDICTED, linewidth=1.4)
-    ax.set_title(f"Shift of {SYMBOLS[k]} ({UNIT_NAMES[k]})")
-    ax.set_xlabel("Fitted shift")
+def _shift_chart(parts: Sequence[Shifts | None], k: int) -> Chart:
+    looks = ("before", "analysis pushes"), ("held", "held-out pushes")
+    found: list[Bars] = []
+    for shifts, (kind, name) in zip(parts, looks, strict=True):
+        if shifts is not None:
+            fitted = shifts.fitted[:, k]
+            means = binned_means(shifts, fitted, np.ones(len(fitted), dtype=np.bool_), k, SHIFT_BINS)
+            found.append(_bars(means, kind, UNIT_NAMES[k], name))
+    x = limits_of(np.zeros(1), *(bars.x for bars in found))
+    y = limits_of(np.array(x), *(end for bars in found for end in (bars.low, bars.high)))
+    marks = Line("fit", np.array(x), np.array(x), name="as fitted"), *found
+    return Chart(f"{_title(k)}, observed against fitted.", "Fitted shift", _title(k), x, y, marks, size=SMALL)
 
 
-def _bars(ax: Axes, means: Means, colour: str, marker: str, name: str | None = None) -> None:
-    ends = np.abs(np.stack([means.found - means.low, means.high - means.found]))
-    face = "white" if marker == "s" else colour
-    ax.errorbar(means.place, means.found, ends, fmt=marker, color=colour, mfc=face, markersize=4.5, elinewidth=1.1,
-                capsize=2.0, label=name, zorder=3)  # fmt: skip
+def _title(k: int) -> str:
+    return f"Shift of {OUTPUTS[k]} ({UNIT_NAMES[k]})"
 
 
-def _design(trace: Trace, effect: Effect, rows: Rows) -> Array:
-    push = Push(rows.table.inputs, rows.table.duration, rows.table.covariates)
-    return joint(mechanics_under(trace.model), [effect], push).designs[0]
-
-
-def _residual(rows: Rows) -> Array:
-    """Residuals (n, 3) after all effects: m, m, rad."""
-    return np.asarray(np.linalg.solve(rows.whitener, rows.unexplained[:, :, None])[:, :, 0])
+def _bars(means: Means, kind: str, unit: str, name: str = "") -> Bars:
+    ends = zip(means.found, means.low, means.high, strict=True)
+    titles = [estimate(Gain(float(value), float(low), float(high)), unit) for value, low, high in ends]
+    return Bars(kind, means.place, means.found, means.low, means.high, titles, name=name)

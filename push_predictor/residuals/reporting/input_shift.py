@@ -1,0 +1,65 @@
+"""The inputs that left the range of training: which, from where to where, and for which share of the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from push_predictor.reporting.html import number
+from push_predictor.residuals.outcome import Trace
+from push_predictor.residuals.reporting.phrases import covariate_phrase, shown_unit_of
+
+
+class InputShift(Protocol):
+    """A covariate whose range now differs from that of training."""
+
+    @property
+    def covariate(self) -> str:
+        """Its name."""
+
+    @property
+    def training(self) -> tuple[float, float]:
+        """Range in training."""
+
+    @property
+    def now(self) -> tuple[float, float]:
+        """Range of the new windows."""
+
+    @property
+    def share_outside(self) -> float:
+        """Share of the new windows outside the range of training."""
+
+
+def input_shifts(trace: Trace) -> Sequence[InputShift]:
+    """The shifts of a trace, the largest share outside first."""
+    shifts: Sequence[InputShift] = getattr(trace, "input_shift", ())
+    return sorted(shifts, key=lambda shift: -shift.share_outside)
+
+
+def input_shift_json(trace: Trace) -> list[dict[str, Any]]:
+    """The shifts as the JSON of a trace lists them."""
+    return [
+        {
+            "covariate": shift.covariate,
+            "training": [float(end) for end in shift.training],
+            "now": [float(end) for end in shift.now],
+            "share_outside": float(shift.share_outside),
+        }
+        for shift in input_shifts(trace)
+    ]
+
+
+def shift_clause(shift: InputShift) -> str:
+    """Where a covariate is now and where it was in training, in one clause."""
+    factor, unit = shown_unit_of(shift.covariate)
+    now, before = (_range(ends, factor, unit) for ends in (shift.now, shift.training))
+    return f"{covariate_phrase(shift.covariate)} is now {now}, in training {before}"
+
+
+def share_clause(shift: InputShift) -> str:
+    """The share of windows outside."""
+    return f"{100.0 * shift.share_outside:.0f} % of the windows lie outside the range of training"
+
+
+def _range(ends: tuple[float, float], factor: float, unit: str) -> str:
+    return f"{number(factor * float(ends[0]), 3)} to {number(factor * float(ends[1]), 3)} {unit}".rstrip()
