@@ -13,12 +13,23 @@ from synthetic import square_rig
 
 from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import Alarm, ScoreKind, alarm_json, alarm_sentence, with_alarm
-from push_predictor.evaluation.alarm.scores import AlarmMonitor, alarm_state, calibrate, held_out_moments
+from push_predictor.evaluation.alarm.scores import (
+    FOLDS,
+    AlarmMonitor,
+    _scores_by_push,
+    alarm_state,
+    calibrate,
+    held_out_moments,
+)
 from push_predictor.evaluation.metrics import standardised
+from push_predictor.evaluation.splits import push_folds
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import retrain_model, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -192,6 +203,80 @@ def test_training_pushes_are_scored_by_cross_validation(models: dict[str, PushMo
     assert standardised(*held_out_moments(models["gp"]), training.outcomes).std(axis=0) == pytest.approx(
         fresh, rel=0.15
     )
+
+
+def test_training_pushes_of_a_learnt_model_are_scored_by_refits_of_the_other_half(models: dict[str, PushModel]):
+    """Hyperparameters that have seen a push make its residuals smaller than those of a new one."""
+    model = models["gp"]
+    rows, folds = model.training, push_folds(model.training, FOLDS)
+    mean, covariance = held_out_moments(model)
+    for fold in range(FOLDS):
+        refitted, own = retrain_model(model, rows.take(np.flatnonzero(folds != fold))), folds == fold
+        expected = refitted.predict_rows(rows.inputs[own], rows.duration[own])
+        np.testing.assert_allclose(mean[own], expected.mean, rtol=1e-9)
+        np.testing.assert_allclose(covariance[own], expected.covariance, rtol=1e-9)
+    assert np.abs(mean - model.held_out_moments(folds).mean).max() > 1e-5
+
+
+def test_effects_are_kept_while_the_base_is_refitted_without_them(models: dict[str, PushModel]):
+    base, rows = models["gp"], models["gp"].training
+    drift = DriverBasis("linear", ("slider_heading",), (0.0,), (3.0,))
+    effect = Effect(None, "slider_heading", drift, np.full(18, 0.3), 1e-4 * np.eye(18), np.array([0.02, 0.02, 0.5]))
+    predictor = ExtendedPredictor(base.predictor.base, base.predictor.physics, (effect,), np.array([1.0, 1.2, 1.0]))
+    shift = predictor.shift(Push(rows.inputs, rows.duration, rows.covariates)).mean
+    moved = replace(rows, outcomes=rows.outcomes + shift)
+    mean, covariance = held_out_moments(replace(base, predictor=predictor, training=moved))
+    of_base, without = held_out_moments(base)
+    np.testing.assert_allclose(mean, of_base + shift, atol=1e-9)
+    assert np.all(covariance[:, 1, 1] > 1.4 * without[:, 1, 1])
+
+
+def test_hyperparameters_are_kept_where_half_the_rows_are_too_few_to_refit_them():
+    model = train_model(made_up(12, 3, windows=1), square_rig(), "gp", name="few")
+    kept = model.held_out_moments(push_folds(model.training, FOLDS))
+    assert np.array_equal(held_out_moments(model)[0], kept.mean)
+    assert calibrate(model).scores.shape[0] == 12
+
+
+def scores_of(model: PushModel, table: PushTable) -> Array:
+    prediction = model.predict_rows(table.inputs, table.duration)
+    found = _scores_by_push(calibrated(model), table, prediction.mean, prediction.covariance)
+    return np.array([found[push] for push in table.pushes])
+
+
+def test_score_of_a_push_does_not_depend_on_a_longer_push_among_them(models: dict[str, PushModel]):
+    """The longest window sets the steps of the integration."""
+    model, table = models["analytical"], made_up(6, 5)
+    velocity = np.repeat([0.15, 0.05, 0.05, 0.2, 0.05, 0.05], 3)
+    table = replace(table, inputs=np.column_stack([velocity, table.inputs[:, 1:]]))
+    alone = [scores_of(model, table.take(np.flatnonzero(table.push_id == push)))[0] for push in table.pushes]
+    np.testing.assert_allclose(scores_of(model, table), alone, rtol=1e-9, atol=1e-12)
+
+
+def test_score_is_as_wide_for_many_windows_as_for_few(models: dict[str, PushModel]):
+    """Windows of a push share a part of their noise, so their sum grows faster than the root of their number."""
+    model = models["analytical"]
+    found = calibrated(model)
+    assert found.window_correlation[1:4] == pytest.approx(0.36, abs=0.15)
+    for windows in (1, 8):
+        spread = scores_of(model, made_up(150, 8, windows=windows)).std(axis=0)[1:4]
+        assert spread == pytest.approx(found.scores.std(axis=0)[1:4], rel=0.25), windows
+
+
+def test_windows_of_different_pushes_are_not_correlated():
+    model = train_model(made_up(80, 0, windows=1), square_rig(), "analytical", name="single windows")
+    assert not calibrate(model).window_correlation.any()
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_every_score_but_the_size_counts_in_both_directions(sign: float, models: dict[str, PushModel]):
+    model = models["analytical"]
+    found, table = calibrated(model), made_up(60, 9)
+    assert [kind.two_sided for kind in found.kinds] == [False] + [True] * (len(found.kinds) - 1)
+    moved = scores_of(model, replace(table, outcomes=table.outcomes + sign * 2.0 * NOISE))
+    for k in (1, 2, 3):
+        alarm = Alarm((replace(found.kinds[k], weight=1.0),), found.scores[:, k : k + 1], 0.01)
+        assert fired_after(alarm, moved[:, k : k + 1]) is not None, found.kinds[k].name
 
 
 @pytest.mark.slow
