@@ -138,7 +138,8 @@ def _moves(trace: Trace, index: int) -> str:
     effect = trace.effects[index]
     noun = moved_noun(effect.mechanism)
     if effect.covariate in (CONSTANT, "session") or (effect.basis == "constant" and effect.covariate in UNVARIED):
-        return f"{noun} differs from {'the model' if trace.model.kind == 'analytical' else 'training'}"
+        trained = trace.model.kind != "analytical" or trace.verdict == "wrench_only"  # the force is not part of a model
+        return f"{noun} differs from {'training' if trained else 'the model'}"
     if effect.basis == "step" and index < len(trace.terms):
         known = MECHANISMS.get(effect.mechanism)
         onset = known.onset if known and known.onset else f"{noun} changed"

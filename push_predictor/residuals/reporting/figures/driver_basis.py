@@ -118,13 +118,13 @@ def _fit(strength: Strength, table: PushTable, axis: Axis, q: int, factor: float
     return [Band("fit", x, mean - half, mean + half), Line("fit", x, mean, name=name)], [mean - half, mean + half]
 
 
-def _determined(width: Array) -> BoolArray:
+def determined(width: Array) -> BoolArray:
     """Bins that determine the parameter: their interval is not far wider than most."""
     return np.asarray(width <= WIDEST * np.median(width)) if len(width) else np.zeros(0, dtype=np.bool_)
 
 
 def _bars(kind: str, name: str, bins: Binned, q: int, factor: float, unit: str, aside: float) -> Bars:
-    kept = _determined(bins.high[:, q] - bins.low[:, q])
+    kept = determined(bins.high[:, q] - bins.low[:, q])
     value, low, high = (factor * each[kept, q] for each in (bins.value, bins.low, bins.high))
     each = [estimate(Gain(*map(float, ends)), unit) for ends in zip(value, low, high, strict=True)]
     return Bars(kind, bins.place[kept] + aside, value, low, high, each, name=name)

@@ -1,0 +1,398 @@
+"""What a reader of a trace's page sees: the answer in three sentences, the key picture, no raw values, folded parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from html import unescape
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import made_up_traces as made_up
+import numpy as np
+import pytest
+from made_up_traces import (
+    DRIFT,
+    EXPERIMENT,
+    GRAIN,
+    JUMP,
+    PLACE,
+    made_up_trace,
+    planted,
+    slippery,
+    without_motion_effect,
+)
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.reporting.chart import Dots
+from push_predictor.residuals import outcome
+from push_predictor.residuals.outcome import Gain, Sized, Trace
+from push_predictor.residuals.reporting.answer import answer
+from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
+from push_predictor.residuals.reporting.figures.errors import error_charts
+from push_predictor.residuals.reporting.figures.maps import columns_of, halves_of, map_charts
+from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
+from push_predictor.residuals.reporting.figures.pushes import axis_of, bins_along, means_along
+from push_predictor.residuals.reporting.page import write_trace_report
+from push_predictor.residuals.reporting.quantities import interval_cell
+from push_predictor.residuals.reporting.shift_size import shift_sizes
+from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
+from push_predictor.residuals.reporting.trace_json import trace_json
+
+ROW = '<tr><th scope="row">'
+RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
+LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
+MORE = Sized("relative change of the force over the driver's range", 0.2, 0.1, 0.3, "1")
+FASTER = SimpleNamespace(covariate="velocity", training=(0.01, 0.05), now=(0.1, 0.15), share_outside=0.97)
+SIDES = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
+UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
+
+
+def shifted(trace: Trace, verdict: str = "input_shift") -> Trace:
+    """A copy of a trace whose pushes were faster than those of training."""
+    copy = replace(trace, verdict=verdict)  # type: ignore[arg-type]
+    object.__setattr__(copy, "input_shift", (FASTER,))
+    return copy
+
+
+TRACES: dict[str, Callable[[], Trace]] = {
+    "none": lambda: made_up_trace(count=90),
+    "effect": lambda: made_up_trace(planted("contact_friction", "elapsed_time", JUMP, 0.15)),
+    "constant": lambda: made_up_trace(planted("contact_friction", "model_inputs", DriverBasis("constant"), -0.08)),
+    "two effects": lambda: made_up_trace(slippery(0.06), planted(*GRAIN, 0.1, 0.05)),
+    "category": lambda: made_up_trace(planted("contact_friction", "edge", SIDES, 0.1, -0.1, 0.05)),
+    "map": lambda: made_up_trace(planted("contact_friction", "slider_x", PLACE, 0.05, -0.03, 0, 0, 0)),
+    "mechanism_only": lambda: made_up_trace(
+        slippery(0.06), verdict="mechanism_only", equivalent=("push_index",), undecided=True, experiment=EXPERIMENT
+    ),
+    "driver_only": lambda: made_up_trace(planted(None, "elapsed_time", DRIFT, *UNKNOWN), verdict="driver_only"),
+    "wrench_only": lambda: without_motion_effect("wrench_only", "surface_friction", "model_inputs", MORE),
+    "measurement": lambda: without_motion_effect("measurement", "clock_offset", "model_inputs", LATE),
+    "variance": lambda: without_motion_effect("variance", "", "elapsed_time", None),
+    "input_shift": lambda: shifted(made_up_trace(count=60)),
+}
+
+
+@cache
+def trace_of(name: str) -> Trace:
+    return TRACES[name]()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
+    """The page of a trace by its name in TRACES."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    @cache
+    def page(name: str) -> str:
+        return write_trace_report(folder / f"{name}.html", trace_of(name)).read_text()
+
+    return page
+
+
+def text_of(page: str) -> str:
+    """What a reader sees, hover texts included."""
+    body = page[page.index("<body>") :]
+    return unescape(re.sub(r"<[^>]+>", "\n", body))
+
+
+def sentences_of(page: str) -> list[str]:
+    """The paragraphs of the answer."""
+    block = re.search(r'<div class="answer">(.*?)</div>', page, re.S)
+    assert block
+    return [unescape(text) for text in re.findall(r"<p>(.*?)</p>", block[1], re.S)]
+
+
+# --- the answer ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_page_begins_with_three_plain_sentences(pages: Callable[[str], str], name: str) -> None:
+    page = pages(name)
+    found = sentences_of(page)
+    assert len(found) == 3 and page.index('class="answer"') < page.index("<svg")
+    for sentence in found:
+        assert sentence.endswith(".") and ". " not in sentence and len(sentence.split()) <= 25, sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "size", "action"),
+    [
+        ("none", r"^No change found\.$", r"change of contact friction by 0\.021 would have been found", "no action"),
+        ("effect", r"^Contact friction changed 620 s into the session\.$", r" is 0\.1\d+ \(95 % CI .* mm and .* deg\.",
+         r"^Use the extended model: on 50 held-out pushes its squared error is \d+ % lower than after retraining"),
+        ("two effects", "with elapsed time, and 1 further change was found", r"\(95 % CI", "^Use the extended model"),
+        ("mechanism_only", "^Contact friction changes with elapsed time", r"\(95 % CI",
+         r"^Use the extended model, and make the 1 push below: it decides between elapsed time and push count\.$"),
+        ("driver_only", "no known mechanism fits", r"^In 0\.2 s the slider moves off by 0\.\d+ mm and 0\.\d+ deg\.$",
+         "^Keep the deployed model"),
+        ("wrench_only", "^The force needed to push the slider differs from training; the motion does not",
+         r"^It is 20 % \(95 % CI 10 to 30\) larger than in training\.$", "^Keep the motion model"),
+        ("measurement", "not the motion model: a clock offset between tracker and robot",
+         r"^The lateness of the slider's stamps is 12\.0 ms \(95 % CI 10\.5 to 13\.5\)\.$", "^Synchronise the clocks"),
+        ("variance", "^The noise of the outcomes changes with elapsed time", "the noise of dy changes by the factor",
+         "^Retrain the model"),
+        ("input_shift", r"^Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s\.$",
+         r"^97 % of the windows lie outside the range of training\.$", "^Train on pushes in the new range"),
+    ],
+)  # fmt: skip
+def test_answer_states_what_changed_how_big_it_is_and_what_to_do(
+    name: str, change: str, size: str, action: str
+) -> None:
+    found = answer(trace_of(name))
+    for sentence, pattern in zip(found, (change, size, action), strict=True):
+        assert re.search(pattern, sentence), sentence
+
+
+@pytest.mark.parametrize(
+    ("extended", "gain", "better", "words"),
+    [
+        (False, Gain(-0.1, -0.3, 0.1), False, "Keep the deployed model: on 50 held-out pushes the effect does not"),
+        (False, Gain(-0.1, -0.3, 0.1), True, "Retrain the model on the new pushes: that lowers the errors"),
+        (False, Gain(0.0, 0.0, 0.0), True, "Retrain the model on the new pushes: that is enough"),
+        (True, Gain(-0.5, -0.6, -0.4), True, "Use the extended model: on 50 held-out pushes"),
+    ],
+)
+def test_action_follows_from_the_gain_and_from_retraining(extended: bool, gain: Gain, better: bool, words: str) -> None:
+    trace = trace_of("effect")
+    held = trace.held_out
+    held = replace(held, refit=held.after if better else held.before)
+    model = trace.extended if extended else None
+    assert answer(replace(trace, held_out=held, gain_nlpd=gain, extended=model))[2].startswith(words)
+
+
+def test_many_rivals_are_counted_not_listed() -> None:
+    rivals = ("push_index", "slid_distance", "slider_x")
+    action = answer(replace(trace_of("mechanism_only"), equivalent=rivals, experiment=()))[2]
+    assert action.startswith("Use the extended model, and vary elapsed time and 3 rivals independently")
+
+
+# --- what no reader should see ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_page_shows_no_raw_values(pages: Callable[[str], str], name: str) -> None:
+    found = re.findall(RAW, text_of(pages(name)))
+    assert not found, found
+
+
+def test_unknown_numbers_are_dashes(tmp_path: Path) -> None:
+    trace = without_motion_effect(
+        "wrench_only", "surface_friction", "model_inputs", Sized("force", np.nan, np.nan, np.nan, "N")
+    )
+    tested = (outcome.Tested(None, "velocity", float("nan")), *trace.tested)
+    detectable = {
+        "contact_friction": {"value": None, "unit": "1"},
+        "inertia": {"value": np.float64("nan"), "unit": "1"},
+    }
+    broken = replace(trace, tested=tested, minimum_detectable=detectable, gain_nlpd=Gain(np.nan, np.nan, np.nan))
+    text = text_of(write_trace_report(tmp_path / "trace.html", broken).read_text())
+    assert not re.search(RAW, text)
+
+
+# --- order, folding and pictures -------------------------------------------------------------------------------------
+
+
+def test_page_answers_before_it_proves(pages: Callable[[str], str]) -> None:
+    page = pages("mechanism_only")
+    headings = re.findall(r"<h2[^>]*>(.*?)</h2>", page)
+    assert headings == [
+        "Before, refit, after", "Rival explanations, and pushes that would decide", "The effect",
+        "Residuals before and after", "What else was tested", "What remains, and what could have been missed", "Notes",
+        "Data and method",
+    ]  # fmt: skip
+    assert page.index("<svg") < page.index("<h2")  # the key picture
+
+
+def test_fifteen_candidates_are_open_and_the_others_folded(pages: Callable[[str], str]) -> None:
+    page = pages("effect")
+    section = page[page.index("What else was tested") : page.index("What remains")]
+    shown, folded = section.split("<details>")
+    assert shown.count(ROW) == 15 and folded.count(ROW) == len(trace_of("effect").tested) - 15
+    assert "The other 9 pairs" in folded and "<details open" not in page
+
+
+def test_found_candidate_is_open_however_large_its_p(tmp_path: Path) -> None:
+    trace = trace_of("effect")
+    tested = tuple(replace(t, p_value=0.9) if t.covariate == "elapsed_time" else t for t in trace.tested)
+    page = write_trace_report(tmp_path / "trace.html", replace(trace, tested=tested)).read_text()
+    shown = page[page.index("What else was tested") :].split("<details>")[0]
+    assert shown.count(ROW) == 15 and shown.count(">found<") == 1
+
+
+@pytest.mark.parametrize("name", ["none", "effect", "constant", "map", "driver_only", "variance"])
+def test_key_picture_names_single_pushes(pages: Callable[[str], str], name: str) -> None:
+    page = pages(name)
+    key = page[page.index("<svg") : page.index("<h2")]
+    names = set(re.findall(r"<title>push (2-\d+): ", key))
+    pushes = set(trace_of(name).analysis.pushes)
+    assert names <= pushes and len(names) > 0.5 * len(pushes)
+
+
+@pytest.mark.parametrize(("name", "words"), [("input_shift", "Pushing speed (mm/s)"), ("effect", "Elapsed time (s)")])
+def test_key_picture_labels_its_axis_in_words_with_unit(pages: Callable[[str], str], name: str, words: str) -> None:
+    page = pages(name)
+    assert words in page[page.index("<svg") : page.index("<h2")]
+
+
+def test_bins_that_do_not_determine_the_parameter_are_not_drawn() -> None:
+    assert determined(np.array([1.0, 1.2, 3.0, 1e9])).tolist() == [True, True, True, False]
+    assert determined(np.zeros(0)).tolist() == []
+
+
+def test_key_chart_shows_the_step_of_the_effect() -> None:
+    trace = trace_of("effect")
+    (chart,) = basis_charts(trace, strength_of(trace.terms[0], trace.analysis), analysis_rows(trace), None)
+    dots = next(mark for mark in chart.marks if isinstance(mark, Dots))
+    before, after = dots.x < JUMP.place, dots.x > JUMP.place
+    assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
+
+
+def test_force_is_compared_with_that_in_training(tmp_path: Path) -> None:
+    trace = trace_of("wrench_only")
+
+    def loaded(table: Any, force: float) -> Any:
+        return replace(table, covariates={**table.covariates, "normal_force": np.full(len(table), force)})
+
+    model = replace(trace.model, training=loaded(trace.model.training, 1.0))
+    known = replace(trace, model=model, analysis=loaded(trace.analysis, 1.2))
+    page = write_trace_report(tmp_path / "trace.html", known).read_text()
+    key = page[page.index("<svg") : page.index("<h2")]
+    assert "Normal force (N)" in key and "median in training" in key and ": 1.2 N<" in key
+
+
+def test_late_clock_is_drawn_against_the_speed_into_the_contact(tmp_path: Path) -> None:
+    trace = trace_of("measurement")
+    table = trace.analysis
+    speed = table.inputs[:, 0] * np.cos(table.inputs[:, 2])
+    gaps = replace(table, covariates={**table.covariates, "contact_gap": -0.012 * speed})
+    page = write_trace_report(tmp_path / "trace.html", replace(trace, analysis=gaps)).read_text()
+    key = page[page.index("<svg") : page.index("<h2")]
+    assert "Speed into the contact (mm/s)" in key and "Measured gap at the contact (mm)" in key
+    assert "as the error predicts" in key
+
+
+def test_held_out_errors_are_shown_for_each_push_before_and_after() -> None:
+    trace = trace_of("effect")
+    shown = comparisons_of(trace)
+    position, heading = error_charts(trace.held_out.table, "elapsed_time", [shown[0], shown[-1]])
+    for chart in (position, heading):
+        before, after = (mark for mark in chart.marks if isinstance(mark, Dots))
+        assert len(before.x) == len(after.x) == len(trace.held_out.table.pushes)
+        late = before.x > JUMP.place
+        assert np.mean(before.y[late]) > 1.3 * np.mean(after.y[late])
+
+
+def test_held_out_section_shows_errors_before_and_after_and_scores_with_intervals(pages: Callable[[str], str]) -> None:
+    page = pages("effect")
+    section = page[page.index("Before, refit, after") : page.index("<details>")]
+    assert section.count('class="dot before"') == section.count('class="dot after"') > 50
+    scores = re.findall(r'data-column="squared error \(NMSE\)">([\d.]+)<span class="interval">\[', section)
+    assert len(scores) == 3 and float(scores[2]) < float(scores[0])
+
+
+def test_largest_input_shift_comes_first() -> None:
+    trace = shifted(trace_of("none"))
+    wider = SimpleNamespace(covariate="angle", training=(-0.5, 0.5), now=(0.6, 1.0), share_outside=1.0)
+    object.__setattr__(trace, "input_shift", (FASTER, wider))
+    change, size, _ = answer(trace)
+    assert change == "Push angle is now 34.4 to 57.3 deg, in training −28.6 to 28.6 deg."
+    assert size == "100 % of the windows lie outside the range of training; 1 further input has shifted as well."
+
+
+def test_input_shift_beside_another_verdict_is_a_warning(tmp_path: Path) -> None:
+    page = write_trace_report(tmp_path / "trace.html", shifted(trace_of("effect"), "effect")).read_text()
+    warning = re.search(r'<p class="warning">(.*?)</p>', page)
+    assert warning and warning[1].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
+
+
+def test_input_shift_reaches_json_and_terminal() -> None:
+    trace = trace_of("input_shift")
+    assert summary_lines(trace)[0].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
+    assert summary_lines(trace)[1].endswith("Train on pushes in the new range, then trace again.")
+
+
+def test_json_lists_the_input_shift() -> None:
+    listed = trace_json(shifted(trace_of("effect"), "effect"))["input_shift"]
+    assert listed == [{"covariate": "velocity", "training": [0.01, 0.05], "now": [0.1, 0.15], "share_outside": 0.97}]
+    assert trace_json(trace_of("none"))["input_shift"] == []
+
+
+# --- maps ------------------------------------------------------------------------------------------------------------
+
+
+def test_maps_of_a_step_are_split_at_its_place() -> None:
+    trace = trace_of("effect")
+    halves = halves_of(strength_of(trace.terms[0], trace.analysis), trace.analysis)
+    time = trace.analysis.covariates["elapsed_time"]
+    assert halves.names == ("until 620 s", "since 620 s")
+    assert time[halves.masks[0]].max() < JUMP.place <= time[halves.masks[1]].min()
+
+
+@pytest.mark.parametrize("place", [-1.0, 30.0, 990.0, 2000.0])
+def test_maps_are_whole_where_a_half_would_be_empty(place: float) -> None:
+    trace = trace_of("effect")
+    step = planted("contact_friction", "elapsed_time", replace(JUMP, place=place), 0.15)
+    halves = halves_of(strength_of(step, trace.analysis), trace.analysis)
+    assert len(halves.masks) == 1 and halves.masks[0].all()
+    charts = map_charts(trace.model.rig.outline, columns_of("before", trace.analysis, trace.residual, halves))
+    assert len(charts) == 3
+
+
+def test_maps_of_an_effect_with_levels_are_split_between_levels() -> None:
+    trace = trace_of("category")
+    rare = np.arange(len(trace.analysis)) % 10 == 0
+    sides = replace(trace.analysis, covariates={**trace.analysis.covariates, "edge": np.where(rare, 0.0, 1.0)})
+    first, second = halves_of(strength_of(trace.terms[0], sides), sides).masks
+    np.testing.assert_array_equal(first, rare)
+    np.testing.assert_array_equal(second, ~rare)
+
+
+def test_step_in_few_late_pushes_splits_off_those() -> None:
+    trace = trace_of("effect")
+    step = planted("contact_friction", "elapsed_time", replace(JUMP, place=850.0), 0.15)
+    first, second = halves_of(strength_of(step, trace.analysis), trace.analysis).masks
+    assert 24 <= second.sum() < 0.25 * first.sum()
+
+
+# --- numbers ---------------------------------------------------------------------------------------------------------
+
+
+def test_no_number_is_minus_zero() -> None:
+    assert interval_cell(Gain(-8.0, -13.0, -0.2)) == "−8\n[−13, 0]"
+
+
+def test_interval_of_a_small_shift_contains_it() -> None:
+    trace = trace_of("constant")
+    uncertain = replace(trace.terms[0], coefficients=np.array([1e-4]), covariance=np.array([[0.01]]))
+    for size in shift_sizes(trace, uncertain, trace.analysis):
+        assert size.low <= size.value <= size.high
+
+
+# --- bins ------------------------------------------------------------------------------------------------------------
+
+
+def test_levels_of_a_covariate_are_bins_of_their_own() -> None:
+    rng = np.random.default_rng(0)
+    speed = np.repeat([0.01, 0.02, 0.05], [30, 90, 30]) + 1e-4 * rng.standard_normal(150)
+    bins = bins_along(speed, 10)
+    assert [len(np.unique(bins[part])) for part in (slice(0, 30), slice(30, 120), slice(120, 150))] == [1, 1, 1]
+    assert len(np.unique(bins)) == 3 and len(np.unique(bins_along(rng.random(500), 10))) == 10
+
+
+def test_bins_have_the_mean_and_an_interval_around_it() -> None:
+    table = made_up.pushes(80, 4)
+    bins = means_along(axis_of(table, "elapsed_time"), table.push_id, table.covariates["elapsed_time"])
+    np.testing.assert_allclose(bins.x, bins.y)
+    assert len(bins.x) == 10 and bins.pushes.sum() == 80
+    assert np.all((bins.low <= bins.y) & (bins.y <= bins.high))
+
+
+def test_covariate_that_is_not_recorded_gives_way_to_the_time() -> None:
+    table = made_up.pushes(10, 4)
+    assert axis_of(table, "model_inputs").label == "Elapsed time (s)"
+    assert axis_of(replace(table, covariates={}), "model_inputs").label == "Push count"
+    assert axis_of(table, "slider_heading").x.max() > 10.0  # degrees
