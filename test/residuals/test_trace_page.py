@@ -251,6 +251,28 @@ def test_key_chart_shows_the_step_of_the_effect() -> None:
     assert abs(np.nanmedian(dots.y[before])) < 0.03 and np.nanmedian(dots.y[after]) == pytest.approx(0.15, abs=0.03)
 
 
+def test_change_since_training_is_drawn_along_the_time(tmp_path: Path) -> None:
+    trace = trace_of("constant")
+    (effect,), (term,) = trace.effects, trace.terms
+    since = DriverBasis("step", ("session",), place=0.5)
+
+    def later(table: Any) -> Any:
+        return replace(table, covariates={**table.covariates, "session": np.ones(len(table))})
+
+    changed = replace(
+        trace,
+        effects=(replace(effect, covariate="session", basis="step"),),
+        terms=(replace(term, covariate="session", basis=since),),
+        analysis=later(trace.analysis),
+        held_out=replace(trace.held_out, table=later(trace.held_out.table)),
+        extended=None,
+    )
+    page = write_trace_report(tmp_path / "trace.html", changed).read_text()
+    assert sentences_of(page)[0] == "Contact friction differs from the model."
+    key = page[page.index("<svg") : page.index("<h2")]
+    assert "Elapsed time (s)" in key and key.count('class="dot push"') > 50
+
+
 def test_force_is_compared_with_that_in_training(tmp_path: Path) -> None:
     trace = trace_of("wrench_only")
 

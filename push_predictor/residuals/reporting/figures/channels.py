@@ -19,8 +19,8 @@ from push_predictor.residuals.reporting.figures.pushes import (
     axis_of,
     means_along,
     push_means,
+    recorded_axis,
     titles,
-    values_of,
 )
 from push_predictor.residuals.reporting.quantities import estimate
 from push_predictor.types import Array, TextArray
@@ -108,15 +108,14 @@ def size_chart(trace: Trace, covariate: str, outputs: list[int]) -> Chart | None
 
 def input_chart(trace: Trace, covariate: str) -> Chart | None:
     """Histograms of a covariate in training and now; None if either lacks it."""
-    both = [values_of(table, covariate) for table in (trace.model.training, trace.analysis)]
-    if both[0] is None or both[1] is None:
+    before, now = (recorded_axis(table, covariate) for table in (trace.model.training, trace.analysis))
+    if before is None or now is None:
         return None
-    axis, before = axis_of(trace.analysis, covariate), axis_of(trace.model.training, covariate)
-    edges = np.linspace(*limits_of(axis.x, before.x, margin=0.02), HISTOGRAM + 1)
-    shares = [100.0 * np.histogram(each, edges)[0] / max(len(each), 1) for each in (before.x, axis.x)]
+    edges = np.linspace(*limits_of(now.x, before.x, margin=0.02), HISTOGRAM + 1)
+    shares = [100.0 * np.histogram(each.x, edges)[0] / len(each.x) for each in (before, now)]
     marks = Columns("push", edges, shares[0], name="training"), Columns("before", edges, shares[1], name="now")
     ends = (float(edges[0]), float(edges[-1])), (0.0, 1.1 * float(np.max(shares)))
-    return Chart(f"{axis.label} in training and now.", axis.label, "% of windows", *ends, marks, size=SMALL)
+    return Chart(f"{now.label} in training and now.", now.label, "% of windows", *ends, marks, size=SMALL)
 
 
 def _force(table: PushTable, covariate: str, mechanism: str | None) -> Values | None:

@@ -104,13 +104,12 @@ def _fit(strength: Strength, table: PushTable, axis: Axis, q: int, factor: float
         points = np.array(basis.levels)
     elif basis.name in PERIODIC:
         points = np.linspace(-np.pi, np.pi, GRID)
-    elif basis.drivers:
-        values = table.covariates[basis.drivers[0]]
-        points = np.linspace(values.min(), values.max(), GRID)
     else:
-        points = np.array([axis.x.min(), axis.x.max()])
+        values = table.covariates[basis.drivers[0]] if basis.drivers else np.zeros(1)
+        points = np.linspace(values.min(), values.max(), GRID)
     mean, half = (factor * each[:, q] for each in strength.curve(dict.fromkeys(basis.drivers, points), len(points)))
-    x = axis.factor * points if basis.drivers else points
+    varies = np.ptp(points) > 0.0  # else along the time
+    x = axis.factor * points if varies else np.linspace(axis.x.min(), axis.x.max(), GRID)
     name = "fitted, with 95 % interval"
     if basis.name == "category":
         shown = [f"fitted: {number(float(value), 3)}" for value in mean]

@@ -49,21 +49,22 @@ class Means:
 
 
 def axis_of(table: PushTable, covariate: str) -> Axis:
-    """The covariate, or the time (else the push count) if the windows do not contain it."""
-    values = values_of(table, covariate)
-    if values is None:
-        return axis_of(table, "elapsed_time") if "elapsed_time" in table.covariates else _order(table)
+    """The covariate, or the time (else the push count) if it is not recorded or does not vary."""
+    axis = recorded_axis(table, covariate)
+    if axis is not None and np.ptp(axis.x) > 0.0:
+        return axis
+    return _order(table) if covariate == "elapsed_time" else axis_of(table, "elapsed_time")
+
+
+def recorded_axis(table: PushTable, covariate: str) -> Axis | None:
+    """A covariate or an input; None if there are no windows, or if they do not contain it."""
+    values = table.inputs[:, INPUTS.index(covariate)] if covariate in INPUTS else table.covariates.get(covariate)
+    if values is None or not len(values):
+        return None
     names = {float(v): f"{v:g}" for v in np.unique(values)} if covariate in ("edge", "recording") else {}
     factor, unit = shown_unit_of(covariate)
     name = label(covariate_phrase(covariate))
     return Axis(factor * values, f"{name} ({unit})" if unit else name, names, factor)
-
-
-def values_of(table: PushTable, covariate: str) -> Array | None:
-    """A covariate or an input (n,); None if the windows do not contain it."""
-    if covariate in INPUTS:
-        return table.inputs[:, INPUTS.index(covariate)]
-    return table.covariates.get(covariate)
 
 
 def push_means(push_id: TextArray, values: Array) -> tuple[list[str], Array]:
