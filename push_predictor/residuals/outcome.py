@@ -10,9 +10,12 @@ from push_predictor.evaluation.validation import Comparison
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.types import Array
 
-Verdict = Literal["none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance"]
+Verdict = Literal[
+    "none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance", "input_shift"
+]
 CHANNELS: dict[Verdict, str] = {
     "none": "none",
     "effect": "motion",
@@ -21,6 +24,7 @@ CHANNELS: dict[Verdict, str] = {
     "variance": "motion",
     "wrench_only": "wrench",
     "measurement": "measurement",
+    "input_shift": "none",
 }
 
 
@@ -63,7 +67,7 @@ class Tested:
 
 @dataclass(frozen=True)
 class Gain:
-    """After minus refit on held-out pushes, with the 95 % interval of a paired bootstrap of pushes."""
+    """After minus the model without the effects on held-out pushes; 95 % interval by a paired bootstrap of pushes."""
 
     value: float
     low: float
@@ -90,9 +94,11 @@ class Trace:
 
     effects: in the order of selection; terms: the same as effects of a model, empty if the mean of the motion is
     unchanged. equivalent: rivals of the first effect's covariate; mechanisms: rivals of its mechanism. analysis: the
-    windows that were searched; residual, unexplained (n, 3): their standardised residuals before and after. extended:
-    the model with the effects, None if the motion model does not change. remaining: mechanism and covariate of the
-    strongest effect that is still significant. notes: further sentences for the reader.
+    windows that were searched; residual, unexplained (n, 3): their standardised residuals before and after. gain_over:
+    the better of the two models without the effects, with which the gain compares. extended: the model with the
+    effects, None if the motion model does not change. remaining: mechanism and covariate of the strongest effect that
+    is still significant. input_shift:
+    inputs whose new values leave those of training. notes: further sentences for the reader.
     """
 
     verdict: Verdict
@@ -109,12 +115,14 @@ class Trace:
     held_out: HeldOut
     gain_nmse: Gain
     gain_nlpd: Gain
+    gain_over: Literal["deployed", "refit"]
     extended: PushModel | None
     tested: tuple[Tested, ...]
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: tuple[str | None, str] | None
     experiment: tuple[Mapping[str, float], ...]
     alpha: float
+    input_shift: tuple[ShiftedInput, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
     def __repr__(self) -> str:
@@ -128,7 +136,7 @@ class Trace:
             [
                 f"Trace of {self.model.name!r}: verdict {self.verdict}",
                 *(effects or ["  no effect found"]),
-                f"  NLPD after less refit on {pushes} held-out pushes: {interval}",
+                f"  NLPD after less {self.gain_over} on {pushes} held-out pushes: {interval}",
                 f"  extended model: {'yes' if self.extended else 'no'}",
             ]
         )

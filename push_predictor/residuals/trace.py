@@ -24,18 +24,23 @@ from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
-from push_predictor.residuals.channels.motion import MotionFinding, motion_effects
-from push_predictor.residuals.channels.wrench import WRENCH_BIAS, WrenchFinding, wrench_effects
-from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
+from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, WrenchFinding, wrench_effects
+from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
+from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
+from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
+from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again, load_evidence, previous_residual
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
-from push_predictor.residuals.extension.held_out_gain import compared, gain
+from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
+from push_predictor.residuals.extension.recalibration import calibrated_held_out
 from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
+from push_predictor.types import BoolArray
 
 FEWEST_PUSHES = 12
 SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
@@ -75,49 +80,85 @@ def trace(
     watch: called with the name of each stage and the share of the work done when it begins. Raises RequestError for an
     alpha outside (0, 1), a covariate that is not recorded, or too few pushes.
     """
-    _check(model, loaded.table, alpha, covariates)
     context = _Context.of(model, loaded, alpha, covariates, seed)
-    analysis, training = context.evidence.table, model.training
-    watch("measurement", 0.1)
-    measured = measurement_errors(analysis, training, loaded.rig, context.share("measurement"), seed)
-    if measured is not None and measured.errors:
-        corrected = _corrected(context, measured)
-        if _explains_residuals(context, corrected):
-            return _of_measurement(context, measured, corrected)
-    watch("motion", 0.15)
-    motion = motion_effects(model, context.evidence, context.share("motion"), context.covariates, seed)
-    watch("force", 0.6)
-    forces = wrench_effects(analysis, training, context.evidence.physics, context.share("wrench"), seed)
+    found = _searched(context, watch)
+    if found.corrected is not None:
+        return _of_measurement(context, found.corrected)
     watch("extended model", 0.7)
-    biased = _biased(forces) if not motion.terms and not motion.variance else None
-    if biased is not None:
-        return _of_measurement(context, biased, _corrected(context, biased))
-    return _of_motion(context, motion, measured, forces)
+    return _of_motion(context, found)
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What was found on each channel, before anything is opened that was held out.
+
+    measured: None if the windows do not determine measurement errors. corrected: None, or the measurement error that
+    explains the residuals; nothing else was searched for then.
+    """
+
+    measured: MeasurementFinding | None
+    motion: MotionFinding
+    forces: WrenchFinding
+    corrected: _Corrected | None = None
+
+
+def search_channels(
+    model: PushModel,
+    loaded: LoadedData,
+    *,
+    alpha: float = 0.01,
+    covariates: Sequence[str] | None = None,
+    seed: int = 0,
+) -> Searched:
+    """Search the windows like `trace`, but extend no model and open no held-out pushes."""
+    return _searched(_Context.of(model, loaded, alpha, covariates, seed), no_watch)
 
 
 @dataclass(frozen=True, eq=False)
 class _Context:
-    """The question of a trace and its data, split once: evidence of the analysis pushes, and the held-out pushes."""
+    """The question of a trace and its data, split once: the analysis pushes, their evidence, and the held-out pushes.
 
+    model: the deployed one, or one about mechanics where that cannot extrapolate. windows: of the analysis, as they
+    were measured. inside: those among the inputs of training.
+    """
+
+    deployed: PushModel
     model: PushModel
     loaded: LoadedData
     alpha: float
     covariates: tuple[str, ...] | None
     seed: int
+    windows: PushTable
     evidence: Evidence
+    inside: BoolArray
     held_out: PushTable
+    shifted: tuple[ShiftedInput, ...]
 
     @classmethod
     def of(
         cls, model: PushModel, loaded: LoadedData, alpha: float, covariates: Sequence[str] | None, seed: int
     ) -> _Context:
         """Predict all windows, add the previous push's residual to their covariates, and split them."""
-        every = evidence_of(model, loaded.table)
+        _check(model, loaded.table, alpha, covariates)
+        shift = input_shift(model, loaded.table)
+        searched = about_mechanics(model) if shift.inputs else model
+        every = widened(evidence_of(searched, loaded.table), model.training, shift)
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
         held = held_out_rows(table)
-        names = None if covariates is None else tuple(covariates)
-        return cls(model, loaded, alpha, names, seed, replace(every, table=table).take(~held), table.take(held))
+        return cls(
+            deployed=model,
+            model=searched,
+            loaded=loaded,
+            alpha=alpha,
+            covariates=None if covariates is None else tuple(covariates),
+            seed=seed,
+            windows=table.take(~held),
+            evidence=replace(every.take(~held), table=with_instrument(table).take(~held)),
+            inside=~shift.outside[~held],
+            held_out=table.take(held),
+            shifted=shift.inputs,
+        )
 
     def share(self, channel: str) -> float:
         """The part of alpha that a channel may spend."""
@@ -126,46 +167,66 @@ class _Context:
 
 @dataclass(frozen=True, eq=False)
 class _Corrected:
-    """The same pushes, cut again from corrected streams."""
+    """Measurement errors, and the same pushes cut again from corrected streams; None without streams."""
 
-    evidence: Evidence
-    held_out: PushTable
+    finding: MeasurementFinding
+    evidence: Evidence | None
+    held_out: PushTable | None
 
 
 @dataclass(frozen=True, eq=False)
 class _Extension:
-    """The refit, the model with the effects (the refit if none were added), all effects found, and the gain."""
+    """The refit, the model with the effects (None if none were added), all effects found, and the gain."""
 
     refit: PushModel
-    after: PushModel
+    after: PushModel | None
     effects: tuple[Effect, ...]
-    added: bool
-    nmse: Gain = NO_GAIN
-    nlpd: Gain = NO_GAIN
+    gain: HeldOutGain | None
+
+
+# --- search --------------------------------------------------------------------------------------------------------
+
+
+def _searched(context: _Context, watch: Watch) -> Searched:
+    model, analysis, seed = context.model, context.windows, context.seed
+    watch("measurement", 0.1)
+    measured = measurement_errors(analysis, model.training, context.loaded.rig, context.share("measurement"), seed)
+    if measured is not None and measured.errors:
+        corrected = _corrected(context, measured)
+        if _explains_residuals(context, corrected):
+            return Searched(measured, NO_MOTION, NO_WRENCH, corrected)
+    watch("motion", 0.15)
+    motion = motion_effects(
+        model, context.evidence, context.share("motion"), context.covariates, seed, inside=context.inside
+    )
+    watch("force", 0.6)
+    forces = wrench_effects(analysis, model.training, context.evidence.physics, context.share("wrench"), seed)
+    biased = _biased(forces) if not motion.terms and not motion.variance else None
+    return Searched(measured, motion, forces, None if biased is None else _corrected(context, biased))
 
 
 # --- measurement ---------------------------------------------------------------------------------------------------
 
 
-def _corrected(context: _Context, measured: MeasurementFinding) -> _Corrected | None:
-    """The windows of the recordings after all corrections; None without recordings."""
+def _corrected(context: _Context, measured: MeasurementFinding) -> _Corrected:
+    """The windows of the recordings after all corrections."""
     if context.loaded.recordings is None:
-        return None
+        return _Corrected(measured, None, None)
     recordings = list(context.loaded.recordings)
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
     table = cut_again(recordings, context.loaded.rig, window_options(context.model))
     held = held_out_rows(table)
-    return _Corrected(evidence_of(context.model, table.take(~held)), table.take(held))
+    return _Corrected(measured, evidence_of(context.model, table.take(~held)), table.take(held))
 
 
-def _explains_residuals(context: _Context, corrected: _Corrected | None) -> bool:
+def _explains_residuals(context: _Context, corrected: _Corrected) -> bool:
     """Whether a correction halves the residuals of a model that is badly off.
 
     A compliant tip opens the gap like a late clock, but no correction of the clock brings the predictions back. Without
     streams to correct, or with small residuals, the gap alone decides.
     """
-    if corrected is None:
+    if corrected.evidence is None:
         return True
     before, after = _excess(context.evidence), _excess(corrected.evidence)
     return before < BADLY_OFF or after < 0.5 * before
@@ -186,14 +247,15 @@ def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
     return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)
 
 
-def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: _Corrected | None) -> Trace:
+def _of_measurement(context: _Context, corrected: _Corrected) -> Trace:
     """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
-    model, first = context.model, measured.errors[0]
-    refit = refit_base(model, context.evidence.table)
+    model, measured = context.model, corrected.finding
+    first, cut = measured.errors[0], corrected.evidence is not None
+    refit = calibrated_held_out(refit_base(model, context.evidence.table))
     return Trace(
         verdict="measurement",
         kind="mean",
-        model=model,
+        model=context.deployed,
         effects=tuple(
             FoundEffect(e.mechanism, CONSTANT, (), "constant", parameter, _of_trace(e.p_value, "measurement"), 0.0)
             for e in measured.errors
@@ -203,52 +265,56 @@ def _of_measurement(context: _Context, measured: MeasurementFinding, corrected: 
         equivalent=(),
         mechanisms=first.rivals,
         undecided=bool(first.rivals),
-        analysis=context.evidence.table,
+        analysis=context.windows,
         residual=context.evidence.z,
-        unexplained=(corrected or context).evidence.z,
-        held_out=_held_out(context, refit, model, (corrected or context).held_out),
+        unexplained=(corrected.evidence or context.evidence).z,
+        held_out=_held_out(context, refit, model, corrected.held_out or context.held_out),
         gain_nmse=NO_GAIN,
         gain_nlpd=NO_GAIN,
+        gain_over="refit",
         extended=None,
         tested=_family_wise(measured.tested, "measurement"),
         minimum_detectable={},
         remaining=None,
         experiment=(),
         alpha=context.alpha,
-        notes=(NO_STREAMS if corrected is None else CUT_AGAIN, *notes_of_data(context.loaded)),
+        input_shift=context.shifted,
+        notes=(CUT_AGAIN if cut else NO_STREAMS, *notes_of_data(context.loaded)),
     )
 
 
 # --- motion, variance and wrench -----------------------------------------------------------------------------------
 
 
-def _of_motion(
-    context: _Context, motion: MotionFinding, measured: MeasurementFinding | None, forces: WrenchFinding
-) -> Trace:
+def _of_motion(context: _Context, found: Searched) -> Trace:
+    motion, measured, forces = found.motion, found.measured, found.forces
     extension = _extension(context, motion)
+    gain, after = extension.gain, extension.after or extension.refit
     equivalent = motion.equivalent if motion.terms or motion.variance else _rival_covariates(forces)
     tested = _family_wise(motion.tested, "motion"), _family_wise(forces.tested, "wrench")
     return Trace(
-        verdict=_verdict(motion, forces),
+        verdict=_verdict(motion, forces, context.shifted),
         kind="mean" if motion.terms else "variance" if motion.variance else None,
-        model=context.model,
+        model=context.deployed,
         effects=_found_effects(context, motion, forces, extension.effects),
         terms=extension.effects,
         equivalent=equivalent,
         mechanisms=motion.mechanisms,
         undecided=bool(equivalent),
-        analysis=context.evidence.table,
+        analysis=context.windows,
         residual=context.evidence.z,
-        unexplained=evidence_of(extension.after, context.evidence.table).z,
-        held_out=_held_out(context, extension.refit, extension.after, context.held_out),
-        gain_nmse=extension.nmse,
-        gain_nlpd=extension.nlpd,
-        extended=extension.after if extension.added and extension.nlpd.high < 0.0 else None,
+        unexplained=evidence_of(after, context.evidence.table).z,
+        held_out=_held_out(context, extension.refit, after, context.held_out),
+        gain_nmse=gain.nmse if gain else NO_GAIN,
+        gain_nlpd=gain.nlpd if gain else NO_GAIN,
+        gain_over=gain.reference if gain else "refit",
+        extended=extension.after if gain and gain.nlpd.high < 0.0 else None,
         tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
         minimum_detectable=motion.minimum_detectable,
         remaining=motion.remaining,
         experiment=motion.experiment,
         alpha=context.alpha,
+        input_shift=context.shifted,
         notes=notes_of(context.loaded, motion, measured, forces),
     )
 
@@ -258,25 +324,24 @@ def _extension(context: _Context, motion: MotionFinding) -> _Extension:
     model, evidence = context.model, context.evidence
     refit = refit_base(model, evidence.table)
     candidates = [term.best for term in motion.terms if not term.own]
-    after = extend(refit, evidence, candidates) if candidates else refit
-    predictor = after.predictor
-    new = predictor.effects[-len(candidates) :] if candidates else ()
-    added = iter(new)
+    after = extend(refit, evidence, candidates) if candidates else None
+    added = iter(after.predictor.effects[-len(candidates) :] if after else ())
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(estimated_effects(evidence, [t.best])[0][0] if t.own else next(added) for t in motion.terms)
-    if not candidates:
-        return _Extension(refit, after, effects, added=False)
-    return _Extension(refit, after, effects, True, *gain(refit, after, context.held_out, model.training_mean))
+    gain = held_out_gain(model, refit, after, evidence.table, context.held_out) if after else None
+    return _Extension(calibrated_held_out(refit), after, effects, gain)
 
 
-def _verdict(motion: MotionFinding, forces: WrenchFinding) -> Verdict:
+def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[ShiftedInput]) -> Verdict:
     if motion.terms:
         if motion.terms[0].best.mechanism is None:
             return "driver_only"
         return "mechanism_only" if motion.equivalent else "effect"
     if motion.variance:
         return "variance"
-    return "wrench_only" if forces.effects else "none"
+    if forces.effects:
+        return "wrench_only"
+    return "input_shift" if shifted else "none"
 
 
 def _rival_covariates(forces: WrenchFinding) -> tuple[str, ...]:
@@ -293,7 +358,7 @@ def _found_effects(
         return tuple(
             FoundEffect(
                 term.best.mechanism,
-                term.best.covariate,
+                SESSION if term.since_training else term.best.covariate,
                 term.outputs,
                 term.best.basis.name,
                 size_of(effect, context.evidence.table),
@@ -319,10 +384,10 @@ def _found_effects(
 
 def _held_out(context: _Context, refit: PushModel, after: PushModel, held: PushTable) -> HeldOut:
     """Held-out pushes by all three models; the last on `held`, which differs if the measurement was corrected."""
-    mean, table = context.model.training_mean, context.held_out
+    mean, table = context.deployed.training_mean, context.held_out
     return HeldOut(
         table,
-        compared(context.model, table, mean),
+        compared(context.deployed, table, mean),
         compared(refit, table, mean),
         compared(after, held, mean),
         digest_of(table),

@@ -97,7 +97,7 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
     """Lower contact friction changes every window, and the same model learns it when retrained."""
     found = traced(changes=Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2)))
     result = trace_json(found)
-    assert (result["verdict"], result["kind"], result["covariates"][0]) == ("effect", "mean", "model_inputs")
+    assert (result["verdict"], result["kind"], result["covariates"][0]) == ("effect", "mean", "session")
     assert not result["motion_model_changed"] and found.extended is None
     assert result["gain"]["nlpd"] == {"value": 0.0, "low": 0.0, "high": 0.0}
     refit, before = (sum(result[model]["nlpd"].values()) for model in ("refit", "before"))
@@ -105,11 +105,23 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
     assert "Retraining on the new pushes fixes this." in worth_sentence(found)
 
 
+def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> None:
+    plan = random_pushes(60, (0.06,), travel=0.02, rng=np.random.default_rng(5))
+    fast = simulate(replace(spec(2), pushes=plan))
+    assert fast.rig is not None
+    result = trace_json(trace(learnt(), LoadedData(cut_again([fast], fast.rig), (fast,), fast.rig)))
+    (shift,) = result["input_shift"]
+    assert (result["verdict"], shift["covariate"], shift["share_outside"]) == ("input_shift", "velocity", 1.0)
+    assert shift["training"] == pytest.approx([0.02, 0.02], rel=0.1)
+    assert shift["now"] == pytest.approx([0.06, 0.06], rel=0.1)
+    assert not result["motion_model_changed"]
+
+
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:
     """Contact friction falls by 0.2. The refit keeps the mechanics, so that the effect is added to them."""
     slippery = Changes(contact_friction=lambda moment: np.full(len(moment.travelled), -0.2))
     found = trace(learnt("mechanics"), loaded(slippery, Faults()), covariates=["elapsed_time"])
     (effect,) = found.effects
-    assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "model_inputs")
+    assert (found.verdict, effect.mechanism, effect.covariate) == ("effect", "contact_friction", "session")
     assert effect.parameter is not None and effect.parameter.low < -0.2 < effect.parameter.high < -0.1
     assert found.terms[0].exact and found.gain_nlpd.value < 0.0

@@ -123,6 +123,7 @@ def traced(model: PushModel, analysis: PushTable, held: PushTable, effects: tupl
         held_out=HeldOut(held, before, again, last, digest_of(held)),
         gain_nmse=nmse,
         gain_nlpd=nlpd,
+        gain_over="refit",
         extended=after if terms and nlpd.high < 0.0 else None,
         tested=TESTED if terms else tuple(replace(t, p_value=0.3 + 0.7 * t.p_value) for t in TESTED),
         minimum_detectable=DETECTABLE,

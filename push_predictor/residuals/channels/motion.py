@@ -12,19 +12,20 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
-from push_predictor.residuals.channels.variance import VarianceEffect, variance_effects
+from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
-from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.experiment import separating_pushes
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.term_choice import SelectedTerm
-from push_predictor.types import Array
+from push_predictor.types import Array, BoolArray
 
 NOTABLE = 1.3  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
+FEWEST_PUSHES = 12  # whose variance is judged
 
 Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 
@@ -53,16 +54,27 @@ class MotionFinding:
     confounded: tuple[str, ...]
 
 
+NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), (), ())
+
+
 def motion_effects(
-    model: PushModel, evidence: Evidence, alpha: float, names: Sequence[str] | None = None, seed: int = 0
+    model: PushModel,
+    evidence: Evidence,
+    alpha: float,
+    names: Sequence[str] | None = None,
+    seed: int = 0,
+    *,
+    inside: BoolArray | None = None,
 ) -> MotionFinding:
-    """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None."""
+    """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None.
+
+    inside (n,): windows whose variance is judged, all if None: elsewhere the model's noise is an extrapolation.
+    """
     inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
     share = (1.0 - VARIANCE_SHARE) * alpha
     found = search(evidence, candidates_of(evidence, names, inputs), inputs, share, seed, baseline=baseline)
-    spread = variance_effects(
-        model, evidence, found.unexplained, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline
-    )
+    known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
+    spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None
     return MotionFinding(
@@ -78,6 +90,20 @@ def motion_effects(
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
     )
+
+
+def _spread(
+    model: PushModel,
+    evidence: Evidence,
+    z: Array,
+    alpha: float,
+    names: Sequence[str] | None,
+    seed: int,
+    baseline: Baseline,
+) -> VarianceFinding:
+    if len(evidence.table.pushes) < FEWEST_PUSHES:
+        return VarianceFinding((), ())
+    return variance_effects(model, evidence, z, VARIANCE_SHARE * alpha, seed, names=names, baseline=baseline)
 
 
 def _other_mechanisms(first: SelectedTerm | None) -> tuple[str, ...]:

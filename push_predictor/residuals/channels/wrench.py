@@ -79,7 +79,7 @@ class WrenchFinding:
     against_training: bool
 
 
-NOTHING = WrenchFinding((), (), float("nan"), False)
+NO_WRENCH = WrenchFinding((), (), float("nan"), False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +110,10 @@ def wrench_effects(
 ) -> WrenchFinding:
     """Effects on the force of new windows that differ from the baseline (the model's training windows)."""
     if any(name not in table.covariates for name in FORCES):
-        return NOTHING
+        return NO_WRENCH
     windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
     if len(windows.pushes) < FEWEST_PUSHES:
-        return NOTHING
+        return NO_WRENCH
     force = _force_of(stacked(windows, base, FORCES), physics)
     return _searched(force, alpha, seed)
 

@@ -16,9 +16,11 @@ PLACE = ("slider_x", "slider_y")
 OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: outcomes of the push, not causes
 # They share noise with the residual, or vary along a push: judged against their relation in the training data.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
-RIG_PROPERTIES = ("edge", *HEADINGS, *PLACE, "velocity")  # their effects count only if they differ from training
+OF_SESSION = ("elapsed_time", "push_index", "slid_distance", "recording")  # counted from the start of a session
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
 CONSTANT = "model_inputs"
+SESSION = "session"  # the step between the training pushes and the later ones
+UNDRIVEN = (CONSTANT, SESSION)
 MOST_LEVELS = 12
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 

@@ -47,11 +47,23 @@ class ResidualBlocks:
     block: IntArray
 
     def orthogonal_to(self, columns: Array | None) -> ResidualBlocks:
-        """Project off orthonormal columns (3 n, q), all outputs together."""
+        """Project off orthonormal columns (3 n, q), all outputs together, and adjust for these too."""
         if columns is None:
             return self
         parts = [flat - columns @ (columns.T @ flat) for flat in (self.residual.ravel(), self.adjusted.ravel())]
-        return ResidualBlocks(parts[0].reshape(self.residual.shape), parts[1].reshape(self.residual.shape), self.block)
+        residual, adjusted = (part.reshape(self.residual.shape) for part in parts)
+        rows_of = columns.reshape(*self.residual.shape, -1)
+        for rows in _rows_of(self.block):
+            there = rows_of[rows].reshape(-1, columns.shape[1])
+            adjusted[rows] = _unshrunk(there, adjusted[rows].ravel()).reshape(len(rows), -1)
+        return ResidualBlocks(residual, adjusted, self.block)
+
+
+def _unshrunk(columns: Array, values: Array) -> Array:
+    """(1 - H)^-1/2 times values (k,), H the part of the hat matrix in a block; columns (k, q) orthonormal over all."""
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    factor = 1.0 / np.sqrt(np.maximum(1.0 - size**2, SINGULAR)) - 1.0
+    return np.asarray(values + left @ (factor * (left.T @ values)))
 
 
 def sums_by(block: IntArray, values: Array) -> Array:

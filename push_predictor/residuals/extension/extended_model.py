@@ -17,11 +17,12 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.extension.recalibration import calibrated_held_out
 from push_predictor.residuals.extension.refit import with_predictor
 
 
 def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate]) -> PushModel:
-    """The base with these candidates as effects, and retrained (learnt) or rescaled (analytical) without them.
+    """The base with these candidates as effects, retrained without them if learnt, and its deviations scaled to fit.
 
     evidence: of the deployed model, which was not trained on these pushes. A base that was trained on them has absorbed
     part of the effects, so its own residuals would make them too small. Raises TrainingError for too few rows.
@@ -35,11 +36,9 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     shift, _ = predictor.shift(push)
     if learnt or absorbs:
         trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
-        return with_predictor(trained, table, predictor.with_base(trained.predictor.base))
-    mean, covariance, _ = predictor.base.moments(push)
-    residual = table.outcomes - mean - shift
-    scale = np.sqrt(np.mean(residual**2, axis=0) / np.diagonal(covariance, axis1=1, axis2=2).mean(axis=0))
-    return with_predictor(base, table, replace(predictor, scale=scale))
+        of_trained = predictor.with_base(trained.predictor.base)
+        return calibrated_held_out(with_predictor(trained, table, of_trained))
+    return calibrated_held_out(with_predictor(base, table, predictor))
 
 
 def _with_effects(

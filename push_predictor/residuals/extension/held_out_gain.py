@@ -1,16 +1,57 @@
-"""The gain of an extension on held-out pushes: extended model minus refit, in NMSE and in NLPD."""
+"""The gain of an extension on held-out pushes, in NMSE and in NLPD: only what its mean brings counts."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.extension.recalibration import (
+    calibrated_held_out,
+    calibrated_on,
+    uncertainty_of_effects,
+)
 from push_predictor.residuals.outcome import Gain
 from push_predictor.types import Array
+
+Reference = Literal["deployed", "refit"]
+
+
+@dataclass(frozen=True)
+class HeldOutGain:
+    """After minus the reference, which is the better of the two models without the effects."""
+
+    reference: Reference
+    nmse: Gain
+    nlpd: Gain
+
+
+def held_out_gain(
+    deployed: PushModel, refit: PushModel, after: PushModel, analysis: PushTable, held_out: PushTable
+) -> HeldOutGain:
+    """The gain over the deployed model and over the refit, whichever is less certain.
+
+    An effect of size zero with its uncertainty improves an overconfident model too. So the predicted deviations of both
+    references fit pushes that they did not see, with the uncertainty of the effects added and without it.
+    """
+    there, here = (uncertainty_of_effects(after, table) for table in (held_out, analysis))
+    in_refit = uncertainty_of_effects(after, refit.training)
+    references: list[tuple[Reference, PushModel, PushModel]] = [
+        ("deployed", calibrated_on(deployed, analysis), calibrated_on(deployed, analysis, here)),
+        ("refit", calibrated_held_out(refit), calibrated_held_out(refit, in_refit)),
+    ]
+    mean = deployed.training_mean
+    found, scored = [], compared(after, held_out, mean)
+    for name, plain, widened in references:
+        first = compared(widened, held_out, mean)
+        alike = (compared(plain, held_out, mean), replace(first, covariance=first.covariance + there))
+        nmse = _difference(alike[0], scored, total_nmse)
+        found += [HeldOutGain(name, nmse, _difference(each, scored, total_nlpd)) for each in alike]
+    return max(found, key=lambda each: each.nlpd.high)
 
 
 def gain(
@@ -21,14 +62,14 @@ def gain(
     training_mean (3,): the reference of the NMSE; the refit's if None.
     """
     reference = refit.training_mean if training_mean is None else training_mean
-    first, second = (push_scores(compared(model, held_out, reference)) for model in (refit, after))
-
-    def difference(figure: Figure) -> Gain:
-        return Gain(**vars(difference_by_push(first, second, figure)))
-
-    return difference(total_nmse), difference(total_nlpd)
+    first, second = (compared(model, held_out, reference) for model in (refit, after))
+    return _difference(first, second, total_nmse), _difference(first, second, total_nlpd)
 
 
 def compared(model: PushModel, table: PushTable, training_mean: Array) -> Comparison:
     """A model's predictions of a table; the NMSE is relative to this mean outcome (3,)."""
     return replace(compare(model, table), training_mean=training_mean)
+
+
+def _difference(first: Comparison, second: Comparison, figure: Figure) -> Gain:
+    return Gain(**vars(difference_by_push(push_scores(first), push_scores(second), figure)))

@@ -10,9 +10,9 @@ import numpy as np
 from push_predictor.evaluation.report.tables import paired_difference
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.effects.effect import Effect
-from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.outcome import FoundEffect, Gain, Sized, Trace
-from push_predictor.residuals.reporting.input_shift import input_shifts, share_clause
+from push_predictor.residuals.reporting.input_shift import share_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, listed, mechanism_phrase
 from push_predictor.residuals.reporting.quantities import count, estimate, in_shown_unit, shown_unit
@@ -21,7 +21,6 @@ from push_predictor.residuals.reporting.wording import FORCE, headline
 
 MOST_NAMES = 3  # rivals that one sentence lists
 USUAL = "contact_friction"  # the mechanism whose detectable size is shown if nothing was found
-FIXED = (CONSTANT, "session")  # covariates of a change that lasts
 REMEDIES = {
     "clock_offset": "Synchronise the clocks of tracker and robot",
     "frame_rotation": "Calibrate the tracker's frame again",
@@ -90,7 +89,7 @@ def _size_of_force(trace: Trace) -> str:
     if trace.effects[0].mechanism != FORCE:
         return f"The {_parameter_clause(size)}."
     covariate = trace.effects[0].covariate
-    if covariate in FIXED:
+    if covariate in UNDRIVEN:
         low, high = sorted(abs(end) for end in (size.low, size.high))
         share = estimate(Gain(100.0 * abs(size.value), 100.0 * low, 100.0 * high), "%")
         return f"It is {share} {'larger' if size.value > 0.0 else 'smaller'} than in training."
@@ -116,7 +115,7 @@ def _size_of_noise(trace: Trace) -> str:
 
 
 def _size_of_shift(trace: Trace) -> str:
-    first, *others = input_shifts(trace)
+    first, *others = trace.input_shift
     more = f"; {count(len(others), 'further input has', 'further inputs have')} shifted as well" if others else ""
     return f"{share_clause(first)}{more}."
 

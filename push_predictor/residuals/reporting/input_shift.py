@@ -2,38 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from push_predictor.reporting.html import number
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.reporting.phrases import covariate_phrase, shown_unit_of
-
-
-class InputShift(Protocol):
-    """A covariate whose range now differs from that of training."""
-
-    @property
-    def covariate(self) -> str:
-        """Its name."""
-
-    @property
-    def training(self) -> tuple[float, float]:
-        """Range in training."""
-
-    @property
-    def now(self) -> tuple[float, float]:
-        """Range of the new windows."""
-
-    @property
-    def share_outside(self) -> float:
-        """Share of the new windows outside the range of training."""
-
-
-def input_shifts(trace: Trace) -> Sequence[InputShift]:
-    """The shifts of a trace, the largest share outside first."""
-    shifts: Sequence[InputShift] = getattr(trace, "input_shift", ())
-    return sorted(shifts, key=lambda shift: -shift.share_outside)
 
 
 def input_shift_json(trace: Trace) -> list[dict[str, Any]]:
@@ -45,18 +19,18 @@ def input_shift_json(trace: Trace) -> list[dict[str, Any]]:
             "now": [float(end) for end in shift.now],
             "share_outside": float(shift.share_outside),
         }
-        for shift in input_shifts(trace)
+        for shift in trace.input_shift
     ]
 
 
-def shift_clause(shift: InputShift) -> str:
+def shift_clause(shift: ShiftedInput) -> str:
     """Where a covariate is now and where it was in training, in one clause."""
     factor, unit = shown_unit_of(shift.covariate)
     now, before = (_range(ends, factor, unit) for ends in (shift.now, shift.training))
     return f"{covariate_phrase(shift.covariate)} is now {now}, in training {before}"
 
 
-def share_clause(shift: InputShift) -> str:
+def share_clause(shift: ShiftedInput) -> str:
     """The share of windows outside."""
     return f"{100.0 * shift.share_outside:.0f} % of the windows lie outside the range of training"
 

@@ -14,7 +14,7 @@ from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
 from push_predictor.residuals.reporting.figures.key import key_figure
 from push_predictor.residuals.reporting.figures.map_pictures import map_figures
-from push_predictor.residuals.reporting.input_shift import input_shifts, share_clause, shift_clause
+from push_predictor.residuals.reporting.input_shift import share_clause, shift_clause
 from push_predictor.residuals.reporting.phrases import capitalised, effect_phrase
 from push_predictor.residuals.reporting.quantities import count
 from push_predictor.residuals.reporting.tables import (
@@ -98,7 +98,7 @@ def _facts(trace: Trace) -> dict[str, str]:
 
 def _shifted_inputs(trace: Trace) -> list[str]:
     """Inputs outside the range of training, where they are not the verdict itself."""
-    shifts = () if str(trace.verdict) == "input_shift" else input_shifts(trace)
+    shifts = () if trace.verdict == "input_shift" else trace.input_shift
     texts = [f"{capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in shifts]
     return [html.paragraph(text, "warning") for text in texts]
 

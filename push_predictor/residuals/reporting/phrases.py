@@ -9,7 +9,7 @@ import numpy as np
 
 from push_predictor.models.request import UNITS
 from push_predictor.reporting.html import number
-from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION, UNDRIVEN
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ COVARIATES: dict[str, str] = {
     "tangential_force": "tangential force",
     "previous_residual": "the residual of the previous push",
     "recording": "recording",
-    "session": "session",
+    SESSION: "the session (since training)",
     CONSTANT: "nothing (constant)",
 }
 
@@ -99,7 +99,7 @@ def covariate_phrase(covariate: str) -> str:
 
 def effect_phrase(mechanism: str | None, covariate: str) -> str:
     """An effect as a noun phrase: mechanism and covariate."""
-    if covariate == CONSTANT:
+    if covariate in UNDRIVEN:
         return f"{mechanism_phrase(mechanism)} (constant)"
     return f"{mechanism_phrase(mechanism)} (depends on {covariate_phrase(covariate)})"
 

@@ -27,6 +27,7 @@ def trace_json(trace: Trace) -> dict[str, Any]:
         "refit": metrics_json(held_out.refit),
         "after": metrics_json(held_out.after),
         "gain": {"nmse": _gain(trace.gain_nmse), "nlpd": _gain(trace.gain_nlpd)},
+        "gain_over": trace.gain_over,
         "minimum_detectable": {name: dict(size) for name, size in trace.minimum_detectable.items()},
         "remaining": {"effect_present": trace.remaining is not None, "strongest": _strongest(trace)},
         "experiment": [dict(push) for push in trace.experiment],

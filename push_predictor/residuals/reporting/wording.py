@@ -10,9 +10,9 @@ from push_predictor.evaluation.metrics import gaussian_nlpd
 from push_predictor.evaluation.validation import Comparison
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.html import number
-from push_predictor.residuals.evidence.drivers import CONSTANT
-from push_predictor.residuals.outcome import FoundEffect, Gain, Trace
-from push_predictor.residuals.reporting.input_shift import input_shifts, share_clause, shift_clause
+from push_predictor.residuals.evidence.drivers import UNDRIVEN
+from push_predictor.residuals.outcome import FoundEffect, Gain, Trace, Verdict
+from push_predictor.residuals.reporting.input_shift import share_clause, shift_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import (
     MECHANISMS,
@@ -26,7 +26,6 @@ from push_predictor.residuals.reporting.phrases import (
 from push_predictor.residuals.reporting.quantities import count, estimate, in_shown_unit, p_text
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 
-SHIFTED = "input_shift"
 FURTHER = "In addition"
 FORCE = "surface_friction"  # its size is a share of the force
 UNVARIED = ("push_heading", "edge")  # covariates of constant effects that are fixed to the world or to the slider
@@ -43,15 +42,15 @@ def headline(trace: Trace) -> str:
         return "No change found"
     if trace.verdict == "measurement":
         return "The measurement is wrong, not the motion model"
-    if str(trace.verdict) == SHIFTED:
-        return capitalised(shift_clause(input_shifts(trace)[0]))
+    if trace.verdict == "input_shift":
+        return capitalised(shift_clause(trace.input_shift[0]))
     return capitalised(_claim(trace, 0))
 
 
 def evidence_sentence(trace: Trace) -> str:
     """The sentences of the verdict between the headline and the rivals."""
     evidence = EVIDENCE[trace.verdict](trace)
-    sized = trace.verdict not in ("none", "measurement", SHIFTED) and not evidence.startswith("p = ")
+    sized = trace.verdict not in ("none", "measurement", "input_shift") and not evidence.startswith("p = ")
     return f"Size: {evidence}" if sized else evidence if evidence.startswith("p = ") else capitalised(evidence)
 
 
@@ -60,7 +59,7 @@ def worth_sentence(trace: Trace) -> str:
     pushes = count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
     if trace.verdict == "measurement":
         return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
-    if str(trace.verdict) == SHIFTED:
+    if trace.verdict == "input_shift":
         return "The motion model stays unchanged. Train on pushes in the new range, then trace again."
     if not trace.terms:
         retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
@@ -93,9 +92,10 @@ def _decision(trace: Trace) -> str:
 
 def _gain(trace: Trace, pushes: str) -> str:
     effects = "the effect changes" if len(trace.terms) == 1 else "the effects change"
+    reference = "as deployed" if trace.gain_over == "deployed" else "retrained"
     return (
         f"On {pushes} {effects} the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "
-        "The reference is the same model retrained without the effect. Below zero is better."
+        f"The reference is the model {reference} without the effect. Below zero is better."
     )
 
 
@@ -124,11 +124,11 @@ def _claim(trace: Trace, index: int) -> str:
     """What an effect is, in one clause: its mechanism and what it depends on."""
     effect = trace.effects[index]
     if trace.verdict == "variance":
-        if effect.covariate == CONSTANT:
+        if effect.covariate in UNDRIVEN:
             return "the noise of the outcomes differs from training; the mean does not"
         return f"the noise of the outcomes changes with {covariate_phrase(effect.covariate)}; the mean does not"
     if effect.mechanism is None:
-        how = "" if effect.covariate == CONSTANT else f", depending on {covariate_phrase(effect.covariate)}"
+        how = "" if effect.covariate in UNDRIVEN else f", depending on {covariate_phrase(effect.covariate)}"
         return f"the slider moves differently than predicted{how}; no known mechanism fits"
     return f"{_moves(trace, index)}{'; the motion does not' if trace.verdict == 'wrench_only' else ''}"
 
@@ -137,7 +137,7 @@ def _moves(trace: Trace, index: int) -> str:
     """Subject and verb for a known mechanism, by the basis of its dependence."""
     effect = trace.effects[index]
     noun = moved_noun(effect.mechanism)
-    if effect.covariate in (CONSTANT, "session") or (effect.basis == "constant" and effect.covariate in UNVARIED):
+    if effect.covariate in UNDRIVEN or (effect.basis == "constant" and effect.covariate in UNVARIED):
         trained = trace.model.kind != "analytical" or trace.verdict == "wrench_only"  # the force is not part of a model
         return f"{noun} differs from {'training' if trained else 'the model'}"
     if effect.basis == "step" and index < len(trace.terms):
@@ -161,7 +161,7 @@ def _none(trace: Trace) -> str:
     if closest is None:
         return text
     name = mechanism_phrase(closest.mechanism)
-    depends = "" if closest.covariate == CONSTANT else f", depending on {covariate_phrase(closest.covariate)}"
+    depends = "" if closest.covariate in UNDRIVEN else f", depending on {covariate_phrase(closest.covariate)}"
     text = f"{text} The closest candidate is {name}{depends}, with p = {p_text(closest.p_value)}."
     if closest.p_value <= trace.alpha:
         text = f"{text} It is not significant: the level is divided among motion, force and measurement."
@@ -222,12 +222,12 @@ def _variance(trace: Trace) -> str:
 
 def _shifted(trace: Trace) -> str:
     """The share of windows outside the range of training, for each input."""
-    first, *others = input_shifts(trace)
+    first, *others = trace.input_shift
     further = [f" {capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in others]
     return f"{share_clause(first)}.{''.join(further)}"
 
 
-EVIDENCE: dict[str, Callable[[Trace], str]] = {
+EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
     "none": _none,
     "effect": _effects,
     "driver_only": _effects,
@@ -235,7 +235,7 @@ EVIDENCE: dict[str, Callable[[Trace], str]] = {
     "wrench_only": _effects,
     "measurement": _measurement,
     "variance": _variance,
-    SHIFTED: _shifted,
+    "input_shift": _shifted,
 }
 
 

@@ -17,8 +17,9 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
-from push_predictor.residuals.evidence.drivers import LOCAL, RIG_PROPERTIES
+from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for, inputs_basis
+from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.loading import with_inputs
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
@@ -46,12 +47,13 @@ class Baseline:
         return (own and self.inputs.learnt) or candidate.covariate in LOCAL
 
     def compares(self, candidate: Candidate) -> bool:
-        """Whether a candidate depends on a fixed property of the rig, so that it may have acted in training too.
+        """Whether a candidate may have acted in training too, because its covariate has a value there.
 
-        A learnt base that folds sides or does not take the position as input lacks such an effect from the start.
+        A learnt base that folds sides or does not take the position as input lacks such an effect from the start. What
+        is counted from the start of a session has another meaning in each.
         """
         recorded = all(name in self.evidence.table.covariates for name in candidate.basis.drivers)
-        return self.inputs.learnt and recorded and candidate.covariate in RIG_PROPERTIES and not self.judges(candidate)
+        return self.inputs.learnt and recorded and candidate.covariate not in OF_SESSION and not self.judges(candidate)
 
     def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         """Block scores and information of a candidate on the training windows."""
@@ -84,7 +86,7 @@ class Baseline:
 
 def baseline_of(model: PushModel, mechanics: Mechanics) -> Baseline:
     """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps."""
-    table, predictor = with_inputs(model.training), model.predictor.with_independent_outputs()
+    table, predictor = with_instrument(with_inputs(model.training)), model.predictor.with_independent_outputs()
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
     return Baseline(evidence, inputs_basis(model, table))

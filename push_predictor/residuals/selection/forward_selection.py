@@ -21,6 +21,7 @@ from push_predictor.types import Array
 
 MOST_TERMS = 3
 OWN = 2  # rank of effects in the base's own inputs, after those of a covariate (0) and those local to a push (1)
+CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 DWARFED = 12.0  # ratio of gains from which an effect in the base's own inputs is selected first
 
 
@@ -64,7 +65,8 @@ def search(
             return SearchResult(tuple(terms), tuple(candidates), first, screened, z)
         found = selection.first_to_select(found, screened, z)
         used = {term.best.covariate for term in terms}
-        terms.append(selection.choice.term(found, screened, z, used))
+        term = selection.choice.term(found, screened, z, used)
+        terms.append(replace(term, since_training=selection.since_training(term.best, z)))
         z = selection.subtracted(terms[-1], z)
 
 
@@ -117,6 +119,17 @@ class ForwardSelection:
             return residual
         constant = term.best.response
         return residual - constant @ fit(constant, residual)
+
+    def since_training(self, candidate: Candidate, z: Array) -> bool:
+        """Whether an effect that depends on nothing differs from training; for a learnt base every one does."""
+        if self.baseline is None or candidate.covariate != CONSTANT:
+            return False
+        if self.choice.inputs.learnt:
+            return True
+        residualizer = self.choice.residualizers[candidate.kind]
+        blocks = residualizer.blocks(z, self.choice.evidence.block).orthogonal_to(candidate.nuisance)
+        change = difference(self._raw(candidate, blocks), self.baseline.scores(candidate))
+        return bool(screen([change], self.choice.seed).p_value[0] <= CHANGED)
 
     def _against_training(self, screened: Screened, blocks: Sequence[ResidualBlocks]) -> Screened:
         """Raise p of effects of fixed rig properties to that of their difference from training, all at once."""

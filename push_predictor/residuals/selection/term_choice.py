@@ -47,7 +47,7 @@ class SelectedTerm:
     rivals: all that these data do not reject, the best first. p_value: family-wise. coefficients: of the candidate's
     columns. shift (n, 3): what the term explains of the standardised residuals. share: of the sum of squares of the
     standardised residual that the term explains. own: whether the term lies in the inputs of a learnt base, so that a
-    refit learns it.
+    refit learns it. since_training: whether a constant effect is a change since training.
     """
 
     best: Candidate
@@ -58,6 +58,7 @@ class SelectedTerm:
     share: float
     naming: Naming
     own: bool
+    since_training: bool = False
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from push_predictor.residuals.reporting.figures.channels import (
 )
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts
 from push_predictor.residuals.reporting.figures.partial import analysis_rows, strength_of
-from push_predictor.residuals.reporting.input_shift import input_shifts
 from push_predictor.residuals.reporting.quantities import count
 
 EFFECT = "Each grey dot is one push: the size of the effect that this push alone shows."
@@ -51,8 +50,8 @@ def _charts(trace: Trace) -> tuple[list[Chart], str]:
         return _known(gap_chart(trace)), GAP
     if trace.verdict == "variance":
         return _known(noise_chart(trace)), SIZE
-    if str(trace.verdict) == "input_shift":
-        return _known(*(input_chart(trace, shift.covariate) for shift in input_shifts(trace))), INPUTS
+    if trace.verdict == "input_shift":
+        return _known(*(input_chart(trace, shift.covariate) for shift in trace.input_shift)), INPUTS
     if trace.terms and trace.effects[0].mechanism is not None:
         return [_effect_chart(trace)], MAP if len(trace.terms[0].basis.drivers) > 1 else EFFECT
     covariate = trace.effects[0].covariate if trace.effects else ""

@@ -1,0 +1,38 @@
+"""What a trace goes on with where new pushes leave the inputs of training: mechanics, and noise in proportion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.input_shift import InputShift
+from push_predictor.residuals.evidence.standardised import Evidence
+
+
+def about_mechanics(model: PushModel) -> PushModel:
+    """The model trained again on its own training windows, with fitted mechanics as its mean.
+
+    A learnt function of the inputs knows nothing outside them; mechanics do. Unchanged if it has mechanics already, or
+    effects.
+    """
+    predictor = model.predictor
+    if not (isinstance(predictor, GaussianProcessPredictor) and predictor.absorbs):
+        return model
+    options = TrainingOptions(seed=model.provenance.seed, kernels=predictor.kernels, mean="mechanics")
+    sources = model.provenance.sources
+    return train_model(model.training, model.rig, model.kind, name=model.name, sources=sources, options=options)
+
+
+def widened(evidence: Evidence, training: PushTable, shift: InputShift) -> Evidence:
+    """The evidence with predicted deviations in proportion to the tip's travel, where that is beyond training."""
+    if not any(each.covariate == "velocity" for each in shift.inputs):
+        return evidence
+    longest = float(np.max(training.inputs[:, 0] * training.duration))
+    travel = evidence.table.inputs[:, 0] * evidence.table.duration
+    factor = np.where(shift.outside, np.maximum(travel / longest, 1.0), 1.0)
+    return replace(evidence, whitener=evidence.whitener / factor[:, None, None])

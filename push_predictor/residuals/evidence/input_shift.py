@@ -1,0 +1,81 @@
+"""Whether new pushes lie outside the inputs that a model was trained on: there its error is extrapolation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, BoolArray
+
+SPEED_MARGIN = 0.15  # relative: speeds are estimated from few samples
+ANGLE_MARGIN = 0.1  # rad
+CONTACT_MARGIN = 0.03  # of the perimeter
+WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
+NOTABLE = 0.05  # share of the windows outside from which an input has shifted
+
+
+@dataclass(frozen=True)
+class ShiftedInput:
+    """An input whose new values leave those of training: both ranges, and the share of new windows outside."""
+
+    covariate: str
+    training: tuple[float, float]
+    now: tuple[float, float]
+    share_outside: float
+
+
+@dataclass(frozen=True, eq=False)
+class InputShift:
+    """The inputs that have shifted, the most shifted first, and the windows (n,) outside in any of them."""
+
+    inputs: tuple[ShiftedInput, ...]
+    outside: BoolArray
+
+
+def input_shift(model: PushModel, table: PushTable) -> InputShift:
+    """Compare the inputs of n new windows with those of a model's training windows."""
+    training = model.training.inputs
+    outline = model.rig.outline
+    outside = {
+        "velocity": _beyond(table.inputs[:, 0], training[:, 0], SPEED_MARGIN * float(training[:, 0].max())),
+        "contact": _apart(outline, table.inputs[:, 1], training[:, 1]),
+        "angle": _beyond(table.inputs[:, 2], training[:, 2], ANGLE_MARGIN),
+    }
+    shifted = [
+        ShiftedInput(name, _range(training[:, k]), _range(table.inputs[:, k]), float(outside[name].mean()))
+        for k, name in enumerate(outside)
+        if outside[name].mean() >= NOTABLE
+    ]
+    shifted.sort(key=lambda each: -each.share_outside)
+    rows = np.zeros(len(table), dtype=np.bool_)
+    for each in shifted:
+        rows |= outside[each.covariate]
+    return InputShift(tuple(shifted), rows)
+
+
+def _beyond(values: Array, known: Array, margin: float) -> BoolArray:
+    return np.asarray((values < known.min() - margin) | (values > known.max() + margin))
+
+
+def _apart(outline: Outline, contact: Array, known: Array) -> BoolArray:
+    """Contacts (n,) far from every known one; the symmetry that a model folds is folded here too."""
+    order = outline.rotational_symmetry
+    if order == 0:
+        return np.zeros(len(contact), dtype=np.bool_)
+    places = np.sort(np.mod(known * order, 1.0))
+    margin = max(CONTACT_MARGIN * order, WIDEST_GAPS * _usual_gap(places))
+    away = np.mod(contact * order, 1.0)[:, None] - places[None, :]
+    return np.asarray(np.min(np.abs(away - np.round(away)), axis=1) > margin)
+
+
+def _usual_gap(places: Array) -> float:
+    """The 90th percentile of the gaps between neighbouring training contacts on the closed outline."""
+    return float(np.quantile(np.diff(np.append(places, places[0] + 1.0)), 0.9))
+
+
+def _range(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())

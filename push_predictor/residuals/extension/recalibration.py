@@ -1,0 +1,48 @@
+"""Predicted deviations that fit pushes which the model did not see: only then do gains come from the mean alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+LEAST = 0.25  # share of the mean square that may be put down to other uncertainty
+
+
+def calibrated_on(model: PushModel, table: PushTable, extra: Array | None = None) -> PushModel:
+    """The model with deviations that fit a table it was not trained on; extra (n, 3, 3): further covariance there."""
+    prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
+    return _scaled(model, table, prediction.mean, prediction.covariance, extra)
+
+
+def calibrated_held_out(model: PushModel, extra: Array | None = None) -> PushModel:
+    """The model with deviations that fit its training windows, each predicted without its push.
+
+    extra (n, 3, 3): further covariance at the training windows.
+    """
+    mean, covariance, _ = model.held_out_moments()
+    return _scaled(model, model.training, mean, covariance, extra)
+
+
+def uncertainty_of_effects(model: PushModel, table: PushTable) -> Array:
+    """Covariance (n, 3, 3) of a table's outcomes that comes from the effects of a model."""
+    return model.predictor.shift(Push(table.inputs, table.duration, table.covariates)).covariance
+
+
+def _scaled(model: PushModel, table: PushTable, mean: Array, covariance: Array, extra: Array | None) -> PushModel:
+    """E[r^2 / v] = s^2 + E[(extra + of effects) / v], v the variance by the base alone."""
+    predictor = model.predictor
+    of_effects = uncertainty_of_effects(model, table)
+    own = np.diagonal(covariance - of_effects, axis1=1, axis2=2)
+    other = np.diagonal(of_effects + (0.0 if extra is None else extra), axis1=1, axis2=2)
+    square = np.mean((table.outcomes - mean) ** 2 / own, axis=0)
+    factor = np.sqrt(np.maximum(square - np.mean(other / own, axis=0), LEAST * square))
+    if isinstance(predictor, ExtendedPredictor):
+        return replace(model, predictor=replace(predictor, scale=predictor.scale * factor))
+    return replace(model, predictor=ExtendedPredictor(predictor.base, predictor.physics, (), factor))
