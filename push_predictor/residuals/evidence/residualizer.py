@@ -23,14 +23,17 @@ class Residualizer:
         flat = values.reshape(len(values), -1)
         return np.asarray(flat - self.q @ (self.q.T @ flat)).reshape(values.shape)
 
-    def blocks(self, z: Array, block: IntArray) -> ResidualBlocks:
-        """Residuals z (n, 3) minus their fit, with the small-sample adjustment of every block (n,)."""
+    def blocks(self, z: Array, block: IntArray, noise: Array | None = None) -> ResidualBlocks:
+        """Residuals z (n, 3) minus their fit, with the small-sample adjustment of every block (n,).
+
+        noise (n, 3): what is adjusted in place of the residuals.
+        """
         residual = self(z)
-        adjusted = residual.copy()
+        adjusted = residual.copy() if noise is None else self(noise)
         if self.q.shape[1]:
             for rows in _rows_of(block):
                 values, vectors = np.linalg.eigh(np.eye(len(rows)) - self.q[rows] @ self.q[rows].T)
-                adjusted[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ residual[rows])
+                adjusted[rows] = (vectors / np.sqrt(np.maximum(values, SINGULAR))) @ (vectors.T @ adjusted[rows])
         return ResidualBlocks(residual, adjusted, block)
 
 

@@ -22,6 +22,8 @@ from push_predictor.types import Array
 MOST_TERMS = 3
 OWN = 2  # rank of effects in the base's own inputs, after those of a covariate (0) and those local to a push (1)
 CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
+HOPELESS = 0.5  # p from which nothing can be significant
+OBVIOUS = 10.0  # nats, cross-validated: by chance no candidate gains as much
 DWARFED = 12.0  # ratio of gains from which an effect in the base's own inputs is selected first
 
 
@@ -86,9 +88,26 @@ class ForwardSelection:
         return {id(c): self.baseline.scores(c) for c in self.choice.candidates if self.baseline.judges(c)}
 
     def screened(self, z: Array) -> Screened:
-        """Screen all candidates on residuals z (n, 3)."""
+        """Screen all candidates on residuals z (n, 3).
+
+        The bootstrap takes the residuals for noise. With few blocks a strong effect would drown in itself, so the noise
+        is then what the effect leaves of them.
+        """
+        first = self._screened(z, z)
+        if not self.alpha < first.p_value.min() <= HOPELESS:
+            return first
+        strongest = self.choice.strongest(first, z)
+        return first if strongest.gain < OBVIOUS else self._screened(z, self._without(strongest.candidate, z))
+
+    def _without(self, candidate: Candidate, z: Array) -> Array:
+        """The residuals minus the shrunk fit of a candidate."""
+        residualizer = self.choice.residualizers[candidate.kind]
+        columns = residualizer(candidate.columns)
+        return np.asarray(z - columns @ fit(columns, residualizer(z), self.choice.evidence.block))
+
+    def _screened(self, z: Array, noise: Array) -> Screened:
         candidates, block = self.choice.candidates, self.choice.evidence.block
-        blocks = {kind: out.blocks(z, block) for kind, out in self.choice.residualizers.items()}
+        blocks = {kind: out.blocks(z, block, noise) for kind, out in self.choice.residualizers.items()}
         # Many candidates share one array of nuisance columns: each is projected off only once.
         groups = {(c.kind, id(c.nuisance)): c for c in candidates}
         apart = {key: blocks[c.kind].orthogonal_to(c.nuisance) for key, c in groups.items()}
