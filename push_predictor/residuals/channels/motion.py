@@ -68,12 +68,14 @@ def motion_effects(
 ) -> MotionFinding:
     """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None.
 
-    inside (n,): windows whose variance is judged, all if None: elsewhere the model's noise is an extrapolation.
+    inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: its noise is not
+    judged, and an error that depends on the inputs alone is no effect.
     """
     inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
     share = (1.0 - VARIANCE_SHARE) * alpha
-    found = search(evidence, candidates_of(evidence, names, inputs), inputs, share, seed, baseline=baseline)
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
+    candidates = [c for c in candidates_of(evidence, names, inputs) if known.all() or not _of_inputs_alone(c)]
+    found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None
@@ -90,6 +92,10 @@ def motion_effects(
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
     )
+
+
+def _of_inputs_alone(candidate: Candidate) -> bool:
+    return candidate.mechanism is None and candidate.kind == "constant"
 
 
 def _spread(
