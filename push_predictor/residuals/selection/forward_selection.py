@@ -23,7 +23,7 @@ MOST_TERMS = 3
 OWN = 2  # rank of effects in the base's own inputs, after those of a covariate (0) and those local to a push (1)
 CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 HOPELESS = 0.5  # p from which nothing can be significant
-OBVIOUS = 10.0  # nats, cross-validated: by chance no candidate gains as much
+OBVIOUS = 30.0  # nats, cross-validated; chance gains up to 20
 DWARFED = 12.0  # ratio of gains from which an effect in the base's own inputs is selected first
 
 
@@ -90,14 +90,20 @@ class ForwardSelection:
     def screened(self, z: Array) -> Screened:
         """Screen all candidates on residuals z (n, 3).
 
-        The bootstrap takes the residuals for noise. With few blocks a strong effect would drown in itself, so the noise
-        is then what the effect leaves of them.
+        The bootstrap takes the residuals for noise. With few blocks an obvious effect would drown in itself, so the
+        noise is then what the strongest leaves of them.
         """
         first = self._screened(z, z)
         if not self.alpha < first.p_value.min() <= HOPELESS:
             return first
-        strongest = self.choice.strongest(first, z)
-        return first if strongest.gain < OBVIOUS else self._screened(z, self._without(strongest.candidate, z))
+        gains = self.choice.gains(first, z)
+        obvious = [k for k, gain in gains.items() if gain >= OBVIOUS]
+        if not obvious:
+            return first
+        strongest = self.choice.candidates[max(gains, key=lambda k: gains[k])]
+        again, p_value = self._screened(z, self._without(strongest, z)), first.p_value.copy()
+        p_value[obvious] = np.minimum(p_value[obvious], again.p_value[obvious])
+        return replace(first, p_value=p_value)
 
     def _without(self, candidate: Candidate, z: Array) -> Array:
         """The residuals minus the shrunk fit of a candidate."""

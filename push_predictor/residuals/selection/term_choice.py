@@ -89,13 +89,13 @@ class TermChoice:
 
     def best_gain(self, found: Sequence[int], screened: Screened, z: Array) -> float:
         """Largest cross-validated gain among the candidates with the largest statistics."""
-        return self.strongest(screened, z, found).gain
+        best = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_NAMED]
+        return max(self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best)
 
-    def strongest(self, screened: Screened, z: Array, found: Sequence[int] | None = None) -> Judged:
-        """The candidate of the largest cross-validated gain among those with the largest statistics."""
-        among = range(len(self.candidates)) if found is None else found
-        best = (self.candidates[k] for k in sorted(among, key=lambda k: -screened.statistic[k])[:MOST_NAMED])
-        return max((self._judge([c], c.kind, z)[0] for c in best), key=lambda j: j.gain)
+    def gains(self, screened: Screened, z: Array) -> dict[int, float]:
+        """Cross-validated gains of the candidates with the largest statistics, by their number."""
+        best = np.argsort(-screened.statistic)[:MOST_JUDGED].tolist()
+        return {k: self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best}
 
     def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> SelectedTerm:
         """The best of the candidates found, named; covariates of earlier terms, used, are preferred if they fit."""
