@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import cache
 from html import unescape
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import made_up_traces as made_up
@@ -29,6 +28,7 @@ from made_up_traces import (
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.outcome import Gain, Sized, Trace
 from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
@@ -46,16 +46,14 @@ ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
 LATE = Sized("lateness of the slider's stamps", 0.012, 0.0105, 0.0135, "s")
 MORE = Sized("relative change of the force over the driver's range", 0.2, 0.1, 0.3, "1")
-FASTER = SimpleNamespace(covariate="velocity", training=(0.01, 0.05), now=(0.1, 0.15), share_outside=0.97)
+FASTER = ShiftedInput("velocity", (0.01, 0.05), (0.1, 0.15), 0.97)
 SIDES = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
 UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
 
 
 def shifted(trace: Trace, verdict: str = "input_shift") -> Trace:
     """A copy of a trace whose pushes were faster than those of training."""
-    copy = replace(trace, verdict=verdict)  # type: ignore[arg-type]
-    object.__setattr__(copy, "input_shift", (FASTER,))
-    return copy
+    return replace(trace, verdict=verdict, input_shift=(FASTER,))  # type: ignore[arg-type]
 
 
 TRACES: dict[str, Callable[[], Trace]] = {
@@ -162,6 +160,12 @@ def test_action_follows_from_the_gain_and_from_retraining(extended: bool, gain: 
     held = replace(held, refit=held.after if better else held.before)
     model = trace.extended if extended else None
     assert answer(replace(trace, held_out=held, gain_nlpd=gain, extended=model))[2].startswith(words)
+
+
+def test_gain_names_the_model_that_it_compares_with(tmp_path: Path) -> None:
+    trace = replace(trace_of("effect"), gain_over="deployed")
+    assert answer(trace)[2].endswith(" % lower than that of the deployed model.")
+    assert "after minus the deployed model" in write_trace_report(tmp_path / "trace.html", trace).read_text()
 
 
 def test_many_rivals_are_counted_not_listed() -> None:
@@ -316,11 +320,9 @@ def test_held_out_section_shows_errors_before_and_after_and_scores_with_interval
     assert len(scores) == 3 and float(scores[2]) < float(scores[0])
 
 
-def test_largest_input_shift_comes_first() -> None:
-    trace = shifted(trace_of("none"))
-    wider = SimpleNamespace(covariate="angle", training=(-0.5, 0.5), now=(0.6, 1.0), share_outside=1.0)
-    object.__setattr__(trace, "input_shift", (FASTER, wider))
-    change, size, _ = answer(trace)
+def test_further_shifted_inputs_are_counted() -> None:
+    wider = ShiftedInput("angle", (-0.5, 0.5), (0.6, 1.0), 1.0)
+    change, size, _ = answer(replace(trace_of("input_shift"), input_shift=(wider, FASTER)))
     assert change == "Push angle is now 34.4 to 57.3 deg, in training −28.6 to 28.6 deg."
     assert size == "100 % of the windows lie outside the range of training; 1 further input has shifted as well."
 

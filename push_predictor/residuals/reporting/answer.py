@@ -148,7 +148,7 @@ def _model_clause(trace: Trace) -> tuple[str, str]:
     gain = trace.gain_nlpd
     pushes = count(len(trace.held_out.table.pushes), "held-out push", "held-out pushes")
     if trace.extended is not None:
-        return "Use the extended model", f"on {pushes} {_improvement(trace)} than after retraining alone"
+        return "Use the extended model", f"on {pushes} {_improvement(trace)}"
     if gain.low == gain.high == 0.0:
         return "Retrain the model on the new pushes", "that is enough, and no extension is needed"
     if _retraining_helps(trace):
@@ -164,11 +164,14 @@ def _retraining_helps(trace: Trace) -> bool:
 
 
 def _improvement(trace: Trace) -> str:
-    every: list[dict[str, Any]] = [metrics_json(c) for c in (trace.held_out.refit, trace.held_out.after)]
-    refit, after = (metrics["nmse"]["total"] for metrics in every)
-    if refit and after is not None and after < refit:
-        return f"its squared error is {100.0 * (1.0 - after / refit):.0f} % lower"
-    return f"its log density is {-trace.gain_nlpd.value:.2g} nats per window higher"
+    """By how much the extended model is better than the better of the two without the effects."""
+    reference = trace.held_out.before if trace.gain_over == "deployed" else trace.held_out.refit
+    every: list[dict[str, Any]] = [metrics_json(c) for c in (reference, trace.held_out.after)]
+    without, after = (metrics["nmse"]["total"] for metrics in every)
+    other = "that of the deployed model" if trace.gain_over == "deployed" else "after retraining alone"
+    if without and after is not None and after < without:
+        return f"its squared error is {100.0 * (1.0 - after / without):.0f} % lower than {other}"
+    return f"its log density is {-trace.gain_nlpd.value:.2g} nats per window higher than {other}"
 
 
 def _rivals(effect: FoundEffect, equivalent: tuple[str, ...]) -> str:
