@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from push_predictor.models.effects.effect import products
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import Kind
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response
-from push_predictor.types import Array
+from push_predictor.types import Array, IntArray
 
 SPEED = "velocity"
 
@@ -47,6 +47,11 @@ class Candidate:
         if self.values is None:
             return self.response
         return products(self.response, self.values)
+
+    def take(self, rows: IntArray) -> Candidate:
+        """The candidate on the given rows, projected off nothing."""
+        values = None if self.values is None else self.values[rows]
+        return replace(self, response=self.response[rows], values=values, nuisance=None, nuisance_growing=None)
 
     @property
     def kind(self) -> Kind:

@@ -25,6 +25,7 @@ from push_predictor.types import Array, IntArray
 
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
+MOST_FITTED = 600  # windows of a fit that compares candidates
 LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
 ENOUGH = 0.2  # nats: a step that gains less is the last
@@ -65,9 +66,17 @@ class ExactFit:
 
 
 def exact_fit(evidence: Evidence, candidate: Candidate, z: Array, controls: Array) -> ExactFit:
-    """The candidate fitted alone to residuals z (n, 3), the controls (n, m) regressed out."""
+    """The candidate fitted alone to residuals z (n, 3), the controls (n, m) regressed out.
+
+    Where nothing is regressed out, windows spread over the session are enough for the coefficients.
+    """
     problem = _Problem.of(evidence, [candidate], controls, z)
-    found = problem.solved()
+    if controls.shape[1] or candidate.nuisance is not None or len(z) <= MOST_FITTED:
+        found = problem.solved()
+    else:
+        rows = np.linspace(0, len(z) - 1, MOST_FITTED).astype(np.int64)
+        some = _Problem.of(evidence.take(rows), [candidate.take(rows)], controls[rows], z[rows])
+        found = problem.linearised(some.solved().coefficients)
     (effect,), there = problem.effects(found.coefficients), candidate
     if effect.exact:
         responses = np.einsum("nij,njp->nip", evidence.whitener, found.joint.responses(effect))

@@ -18,7 +18,7 @@ from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.extension.recalibration import calibrated_held_out
-from push_predictor.residuals.extension.refit import with_predictor
+from push_predictor.residuals.extension.refit import spread_rows, with_predictor
 
 
 def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate]) -> PushModel:
@@ -32,9 +32,9 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else None
     effects, cross = estimated_effects(evidence, candidates, own_inputs)
     predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
-    table, push = evidence.table, Push(evidence.table.inputs, evidence.table.duration, evidence.table.covariates)
-    shift, _ = predictor.shift(push)
+    table = spread_rows(base, evidence.table)
     if learnt or absorbs:
+        shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
         trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
         of_trained = predictor.with_base(trained.predictor.base)
         return calibrated_held_out(with_predictor(trained, table, of_trained))

@@ -41,16 +41,23 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
     return _moved(chosen, table.covariates[candidate.covariate], judged) if _is_step(chosen) else chosen
 
 
-def best_step(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Judged:
-    """The candidate as a step of its covariate, at the place between two windows where it gains most."""
-    values = table.covariates[candidate.covariate]
+def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Judged:
+    """The candidate as an effect that begins within these pushes, in the basis that gains most.
+
+    It sets in at once between two windows, or grows from zero at the start, linearly or ever more slowly.
+    """
+    name = candidate.covariate
+    values = table.covariates[name]
+    growing = [standard_basis(kind, name, values) for kind in ("linear", "logarithmic")]
+    growing[0] = replace(growing[0], centre=(float(values.min()),))
 
     def judged(basis: DriverBasis) -> Judged:
         tried = _with_basis(candidate, basis, table)
         return Judged(tried, gains_of(z, tried.columns, block))
 
-    tried = [judged(DriverBasis("step", (candidate.covariate,), place=place)) for place in _places(values)]
-    return _moved(max(tried, key=_gain), values, judged)
+    steps = [judged(DriverBasis("step", (name,), place=place)) for place in _places(values)]
+    step = _moved(max(steps, key=_gain), values, judged)
+    return max([step, *map(judged, growing)], key=_gain)
 
 
 def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:

@@ -14,11 +14,11 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.candidates.coefficients import exact_fit
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, OF_SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.basis_choice import best_step, simplest_basis
+from push_predictor.residuals.selection.basis_choice import best_onset, simplest_basis
 from push_predictor.residuals.selection.cross_validation import Judged, fit, judge, judged_exactly
 from push_predictor.residuals.selection.naming import (
     MOST_UNEXPLAINED,
@@ -134,34 +134,52 @@ class TermChoice:
         return sorted((self._with_simplest_basis(j.candidate, z) for j in first), key=lambda j: -j.gain)
 
     def _with_onset(self, judged: list[Judged], z: Array) -> list[Judged]:
-        """With steps in front, if a constant effect surely sets in at some value of a covariate.
+        """With whole effects in front: a constant one, or one that surely begins with some value of a covariate.
 
-        Where a base absorbs no constant effect, a step is compared with it as a whole.
+        Where a base absorbs no constant effect, the constant and the changing part of an effect are found apart.
         """
-        constant = [j for j in judged if j.candidate.covariate == CONSTANT and j.candidate.mechanism is not None]
-        if self.inputs.absorbs or judged[0].candidate.covariate != CONSTANT or not constant:
+        first = judged[0].candidate
+        if self.inputs.absorbs or first.covariate not in (CONSTANT, *OF_SESSION):
+            return judged
+        constant = self._constants(judged)
+        if not constant:
             return judged
         always = max((self._exact(j, z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain)
-        surely = [j for j in self._steps(str(always.candidate.mechanism), z) if surely_larger(j, always)]
+        surely = [j for j in self._onsets(str(always.candidate.mechanism), z) if surely_larger(j, always)]
         return [*surely, *judged]
 
-    def _steps(self, mechanism: str, z: Array) -> list[Judged]:
-        """The whole effect of a mechanism as a step of each covariate, the best covariates fitted exactly, by gain."""
+    def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
+        """The constant effects found, if one comes first; else that of the first one's mechanism."""
+        first = judged[0].candidate
+        if first.covariate == CONSTANT:
+            return [j for j in judged if j.candidate.covariate == CONSTANT and j.candidate.mechanism is not None]
+        nothing = np.zeros(1)
+        same = [c for c in self.candidates if c.label == (first.mechanism, CONSTANT) and c.mechanism is not None]
+        return [Judged(c, nothing) for c in same]
+
+    def _onsets(self, mechanism: str, z: Array) -> list[Judged]:
+        """The whole effect of a mechanism by its onset along each covariate, the best fitted exactly, by gain."""
         each = {c.covariate: c for c in reversed(self.candidates) if c.mechanism == mechanism}
-        stepped = [self._stepped(c, z) for c in each.values() if c.basis.name == "linear"]
+        stepped = [self._by_onset(c, z) for c in each.values() if c.basis.name == "linear"]
         best = sorted(stepped, key=lambda j: -j.gain)[:MOST_NAMED]
         return sorted((self._whole(j.candidate, z) for j in best), key=lambda j: -j.gain)
 
-    def _stepped(self, candidate: Candidate, z: Array) -> Judged:
-        """The candidate's whole effect from some value of its covariate on."""
+    def _by_onset(self, candidate: Candidate, z: Array) -> Judged:
+        """The candidate's whole effect by its onset along its covariate."""
         whole = replace(candidate, nuisance=None, nuisance_growing=None)
-        return best_step(whole, self.evidence.table, z, self.evidence.block)
+        return best_onset(whole, self.evidence.table, z, self.evidence.block)
 
     def _whole(self, candidate: Candidate, z: Array) -> Judged:
-        """The candidate fitted exactly, and judged by its whole effect."""
+        """The candidate fitted exactly, and judged by its whole effect; a fit serves all with the same values."""
         nothing = np.empty((len(z), 0))
-        fitted = exact_fit(self.evidence, candidate, z, nothing)
-        return judged_exactly(fitted, z, Residualizer(nothing), self.evidence.block)
+        key = (candidate.mechanism, None if candidate.values is None else candidate.values.tobytes())
+        known = self._known.get(key)
+        if known is None or known[0] is not z:
+            fitted = exact_fit(self.evidence, candidate, z, nothing)
+            known = self._known[key] = z, judged_exactly(fitted, z, Residualizer(nothing), self.evidence.block)
+        same, judged = replace(candidate, response=known[1].candidate.response), known[1]
+        assert judged.exact is not None  # fitted above
+        return replace(judged, candidate=same, exact=replace(judged.exact, candidate=same))
 
     def _judge(self, candidates: Sequence[Candidate], kind: Kind, z: Array) -> list[Judged]:
         return judge(candidates, z, controls_for(kind, self.inputs), self.evidence.block)
@@ -194,7 +212,7 @@ class TermChoice:
         along = [_if_growing(c, growing) for c in first.values() if c.covariate == driver]
         refined = {j.candidate.label: j for j in reversed(judged)}
         if judged[0].exact:  # a whole effect: the others are compared with it as such
-            others = [self._stepped(c, z) for c in along if c.mechanism is not None and c.label not in refined]
+            others = [self._by_onset(c, z) for c in along if c.mechanism is not None and c.label not in refined]
             best = sorted(others, key=lambda j: -j.gain)[:MOST_RIVALS]
             return sorted([judged[0], *(self._whole(j.candidate, z) for j in best)], key=lambda j: -j.gain)
         linear = sorted((refined.get(c.label) or self._with_simplest_basis(c, z) for c in along), key=lambda j: -j.gain)
