@@ -43,8 +43,8 @@ class Sized:
 class FoundEffect:
     """One effect of the JSON, on whatever channel it was found.
 
-    mechanism: None if unknown. basis: of the dependence on the covariate. p_value: family-wise. share_of_residual: of
-    the sum of squares of the standardised residual.
+    mechanism: None if unknown; resembles: the one that comes closest then. basis: of the dependence on the covariate.
+    p_value: family-wise. share_of_residual: of the sum of squares of the standardised residual.
     """
 
     mechanism: str | None
@@ -54,6 +54,7 @@ class FoundEffect:
     parameter: Sized | None
     p_value: float
     share_of_residual: float
+    resembles: str | None = None
 
 
 @dataclass(frozen=True)

@@ -364,6 +364,7 @@ def _found_effects(
                 size_of(effect, context.evidence.table),
                 _of_trace(term.p_value, "motion"),
                 term.share,
+                term.naming.resembles,
             )
             for term, effect in zip(motion.terms, effects, strict=True)
         )

@@ -13,6 +13,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
+from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
@@ -23,7 +24,7 @@ from push_predictor.residuals.selection.power import detectable_json, minimum_de
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.types import Array, BoolArray
 
-NOTABLE = 1.3  # ratio of standard deviations; a smaller change of the variance is not reported
+NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
 
@@ -85,13 +86,22 @@ def motion_effects(
         mechanisms=_other_mechanisms(first),
         tested=_tested(found),
         deviation=baseline.deviation if inputs.learnt else None,
-        minimum_detectable=detectable_json(minimum_detectable(found, evidence, inputs, share, baseline)),
+        minimum_detectable={
+            **detectable_json(minimum_detectable(found, evidence, inputs, share, baseline)),
+            **_detectable_noise(spread),
+        },
         remaining=_remaining(found, share),
         experiment=_experiment(first, evidence, inputs),
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
     )
+
+
+def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
+    if not np.isfinite(spread.detectable):
+        return {}
+    return {"noise": {"value": spread.detectable, "unit": "times training", "covariate": SESSION}}
 
 
 def _of_inputs_alone(candidate: Candidate) -> bool:

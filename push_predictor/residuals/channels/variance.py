@@ -17,7 +17,7 @@ from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
-from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline
 from push_predictor.residuals.selection.screening import Scores, Screened, block_scores, screen
@@ -25,7 +25,8 @@ from push_predictor.types import Array
 
 TINY = 1e-12
 ALL = "all"
-MATERIAL = 1.25  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
+MATERIAL = 1.2  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
+QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +48,14 @@ class VarianceEffect:
 class VarianceFinding:
     """Significant effects, strongest first, one per covariate; tested: all of them.
 
-    rivals: covariates that are no longer significant after the trend of the first is removed.
+    rivals: covariates that are no longer significant after the trend of the first is removed. detectable: the smallest
+    ratio to training that would have been found with 80 % probability, NaN without training windows.
     """
 
     found: tuple[VarianceEffect, ...]
     tested: tuple[VarianceEffect, ...]
     rivals: tuple[str, ...] = ()
+    detectable: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +119,23 @@ def _tested(
         constant = _constant(model, evidence, z, baseline)
         there = len(constant[0].score.rows) - len(trials[0].score.rows) if trials else 0
         trials = [*(_padded(t, there) for t in trials), *constant]
-    return _finding(trials, alpha, seed) if trials else VarianceFinding((), ())
+    if not trials:
+        return VarianceFinding((), ())
+    screened = screen([t.score for t in trials], seed)
+    found = _finding(trials, screened, alpha)
+    if baseline is None:
+        return found
+    return replace(found, detectable=_detectable(screened.threshold(alpha), evidence, z, baseline))
+
+
+def _detectable(threshold: float, evidence: Evidence, z: Array, baseline: Baseline) -> float:
+    """The ratio of standard deviations whose logarithm exceeds the threshold with 80 % probability."""
+    square = 0.0
+    for residual, block in ((z, evidence.block), (baseline.evidence.z, baseline.evidence.block)):
+        size = _log_squares(residual).mean(axis=1)
+        of_block = sums_by(block, (size - size.mean())[:, None])[:, 0]
+        square += float(np.sum(of_block**2)) / len(size) ** 2
+    return max(MATERIAL, float(np.exp(0.5 * (threshold + QUANTILE) * np.sqrt(square))))
 
 
 def _log_squares(residual: Array) -> Array:
@@ -177,8 +196,7 @@ def _padded(trial: _Trial, rows: int) -> _Trial:
     return replace(trial, score=trial.score.padded(rows))
 
 
-def _finding(trials: list[_Trial], alpha: float, seed: int) -> VarianceFinding:
-    screened = screen([t.score for t in trials], seed)
+def _finding(trials: list[_Trial], screened: Screened, alpha: float) -> VarianceFinding:
     ranked = sorted(range(len(trials)), key=lambda k: -screened.statistic[k])
     first: dict[str, VarianceEffect] = {}
     for k in ranked:

@@ -50,6 +50,7 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
         "parameter": None if effect.parameter is None else vars(effect.parameter),
         "p_value": effect.p_value,
         "share_of_residual": effect.share_of_residual,
+        "resembles": effect.resembles,
     }
 
 

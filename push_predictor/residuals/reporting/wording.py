@@ -129,7 +129,8 @@ def _claim(trace: Trace, index: int) -> str:
         return f"the noise of the outcomes changes with {covariate_phrase(effect.covariate)}; the mean does not"
     if effect.mechanism is None:
         how = "" if effect.covariate in UNDRIVEN else f", depending on {covariate_phrase(effect.covariate)}"
-        return f"the slider moves differently than predicted{how}; no known mechanism fits"
+        closest = f" ({mechanism_phrase(effect.resembles)} comes closest)" if effect.resembles else ""
+        return f"the slider moves differently than predicted{how}; no known mechanism fits{closest}"
     return f"{_moves(trace, index)}{'; the motion does not' if trace.verdict == 'wrench_only' else ''}"
 
 

@@ -28,13 +28,15 @@ MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechan
 class Naming:
     """Possible covariates and mechanisms of an effect, the best first; known: whether a mechanism of the library fits.
 
-    unexplained: share of the gain along the covariate that only the generic polynomial achieves.
+    unexplained: share of the gain along the covariate that only the generic polynomial achieves. resembles: where no
+    mechanism fits, the one that comes closest.
     """
 
     drivers: tuple[str, ...]
     mechanisms: tuple[str | None, ...]
     known: bool
     unexplained: float
+    resembles: str | None = None
 
     @property
     def undecided(self) -> bool:

@@ -199,7 +199,8 @@ class TermChoice:
         fitting = [j for j in known if unexplained[id(j)] <= MOST_UNEXPLAINED]
         if not fitting and generics:
             best = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
-            return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0))
+            closest = known[0].candidate.mechanism if known else None
+            return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0), closest)
         fitting = fitting or known[:1] or by_gain[:1]  # the last two if there is no generic candidate
         best = fitting[0]
         rivals = open_rivals(best, fitting[1:], self._case(best, z), self.seed)
