@@ -53,13 +53,15 @@ def design_of(
     mechanism: str | None, basis: DriverBasis, physics: AnalyticalPush, push: Push, outcome_scale: Array
 ) -> Array:
     """The design matrices (n, 3, p * m) of an effect: products of responses and basis columns."""
-    n = len(push.inputs)
-    responses = (
-        generic_responses(physics, push, outcome_scale)
-        if mechanism is None
-        else mechanism_named(mechanism).response(physics, push)
-    )
-    return products(responses, basis.values(push.covariates, n))
+    responses = responses_of(mechanism, physics, push, outcome_scale)
+    return products(responses, basis.values(push.covariates, len(push.inputs)))
+
+
+def responses_of(mechanism: str | None, physics: AnalyticalPush, push: Push, outcome_scale: Array) -> Array:
+    """Derivatives (n, 3, p) of the outcome by the parameters of a mechanism."""
+    if mechanism is None:
+        return generic_responses(physics, push, outcome_scale)
+    return mechanism_named(mechanism).response(physics, push)
 
 
 def products(responses: Array, values: Array) -> Array:

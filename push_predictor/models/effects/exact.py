@@ -68,10 +68,7 @@ def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, deriva
     ends = {name: _ends(name, change) for name, change in changes.items()} if derivatives else {}
     tried = [{**changes, name: end} for name, both in ends.items() for end in both]
     moved = displaced(fitted, [changes, {}, *tried], push) if exact else np.zeros((2, n, 3))
-    of_parameter = {
-        name: (moved[2 * k + 3] - moved[2 * k + 2]) / (high - low)[:, None]
-        for k, (name, (low, high)) in enumerate(ends.items())
-    }
+    of_parameter = _slopes(ends, moved[2:])
     shift, designs = moved[0] - moved[1], []
     for effect in effects:
         if not effect.exact:
@@ -83,15 +80,40 @@ def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, deriva
     return JointShift(shift, designs, of_parameter)
 
 
+def slopes_of(mechanics: FittedMechanics, changes: Changes, push: Push) -> Changes:
+    """Derivatives (n, 3) of the displacement under changes, by each parameter that changes."""
+    ends = {name: _ends(name, change) for name, change in changes.items()}
+    tried = [{**changes, name: end} for name, both in ends.items() for end in both]
+    return _slopes(ends, displaced(mechanics, tried, push)) if tried else {}
+
+
+def _slopes(ends: dict[str, tuple[Array, Array]], moved: Array) -> Changes:
+    """Derivatives (n, 3) from displacements (2 q, n, 3) at both ends of q changes."""
+    return {
+        name: (moved[2 * k + 1] - moved[2 * k]) / (high - low)[:, None]
+        for k, (name, (low, high)) in enumerate(ends.items())
+    }
+
+
 def changes_of(effects: Sequence[Effect], push: Push) -> Changes:
     """The sum of all effects' changes of each parameter, at most the largest that a rig can have."""
+    return within_limits(sums_of(effects, push))
+
+
+def within_limits(changes: Changes) -> Changes:
+    """Changes of at most the largest that a rig can have."""
+    return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in changes.items()}
+
+
+def sums_of(effects: Sequence[Effect], push: Push) -> Changes:
+    """The sum of all effects' changes of each parameter."""
     n, total = len(push.inputs), Changes()
     for effect in effects:
         values = effect.basis.values(push.covariates, n)
         strengths = effect.coefficients.reshape(-1, values.shape[1]) @ values.T
-        for name, strength in zip(_quantities(effect), strengths, strict=True):
+        for name, strength in zip(quantities_of(effect), strengths, strict=True):
             total[name] = total.get(name, 0.0) + strength
-    return {name: np.clip(change, -LARGEST[name], LARGEST[name]) for name, change in total.items()}
+    return total
 
 
 def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) -> Array:
@@ -118,8 +140,9 @@ def _ends(name: str, change: Array) -> tuple[Array, Array]:
 
 def _stacked(of_parameter: Changes, effect: Effect) -> Array:
     """Derivatives (n, 3, p) by the parameters of an effect, from those by name."""
-    return np.stack([of_parameter[name] for name in _quantities(effect)], axis=2)
+    return np.stack([of_parameter[name] for name in quantities_of(effect)], axis=2)
 
 
-def _quantities(effect: Effect) -> tuple[str, ...]:
+def quantities_of(effect: Effect) -> tuple[str, ...]:
+    """Names of the parameters that an exact effect changes."""
     return mechanism_named(str(effect.mechanism)).quantities

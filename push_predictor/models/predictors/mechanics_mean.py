@@ -37,7 +37,13 @@ class MechanicsMean:
 
     def outcomes(self, push: Push, residuals: Moments) -> Moments:
         """Moments of the outcomes from those of the residuals."""
+        mean, covariance, process_covariance = self.scaled(push, residuals)
+        return Moments(mean + self.displacement(push), covariance, process_covariance)
+
+    def scaled(self, push: Push, residuals: Moments) -> Moments:
+        """Moments of the outcomes about the displacement from those of the residuals."""
         size = self.size(push)
-        mean = residuals.mean * size[:, None] + self.displacement(push)
         square = (size * size)[:, None, None]
-        return Moments(mean, residuals.covariance * square, residuals.process_covariance * square)
+        return Moments(
+            residuals.mean * size[:, None], residuals.covariance * square, residuals.process_covariance * square
+        )

@@ -24,7 +24,7 @@ _Numbers = TypeVar("_Numbers", float, Array)
 
 @dataclass(frozen=True)
 class Axis:
-    """One side of a box, from low to high, divided into cells of equal length (4 at least)."""
+    """One side of a box, from low to high, divided into cells of equal length (3 at least)."""
 
     low: float
     high: float
@@ -44,10 +44,11 @@ class Axis:
 class TensorSpline:
     """Interpolating cubic splines of K functions on boxes that share their D axes; twice differentiable in each.
 
-    values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots.
+    values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots; knots: how many there are.
     """
 
     def __init__(self, axes: Sequence[Axis], values: Array) -> None:
+        self.knots = int(np.prod(values.shape[:-1]))
         for d, axis in enumerate(axes):
             values = along(d + 1, _knots_to_coefficients(axis.cells), values)
         shape = values.shape

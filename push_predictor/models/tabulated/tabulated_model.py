@@ -4,9 +4,10 @@ A prediction of a learnt model reads six dense factors of n^2 / 2 numbers, but i
 inputs. So it is tabulated once. The table is compared with the model and used only if it is accurate. Every other push
 and every other model is predicted by the model itself.
 
-The mechanics have no table, neither alone nor as the mean of a learnt model nor in effects: they have kinks where
-contacts begin to slip, and a table would have to be very fine there. A single push is computed in plain numbers
-instead. A prior model averages over many parameters, and has a coarse table of its own (tabulated_prior).
+The mechanics have no table, neither alone nor as the mean of a learnt model: they have kinks where contacts begin to
+slip, and a table would have to be very fine there. A single push is computed in plain numbers instead. A prior model
+averages over many parameters, and has a coarse table of its own (tabulated_prior). Effects take several integrations a
+push: `with_effect_table` tabulates them, with the mechanics that they change (effect_table).
 """
 
 from __future__ import annotations
@@ -19,10 +20,21 @@ import numpy as np
 
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import GaussianProcessPredictor, Moments, PriorPredictor
+from push_predictor.models.predictors import (
+    AnalyticalPredictor,
+    GaussianProcessPredictor,
+    MechanicsPredictor,
+    Moments,
+    PriorPredictor,
+    Shift,
+)
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest
+from push_predictor.models.tabulated.effect_table import EffectTable
+from push_predictor.models.tabulated.effect_table_build import build_effect_table
 from push_predictor.models.tabulated.prediction_table import TooFineError
+from push_predictor.models.tabulated.single_effects import SingleEffects
+from push_predictor.models.tabulated.table_accuracy import relative_error
 from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
@@ -57,6 +69,8 @@ class TableAccuracy:
 class TabulatedModel:
     """A model with its table, and in words how it predicts. domain and error are None if there is no table.
 
+    effects: the table of its effects, None if they are computed.
+
     A push gets the same prediction alone as among others, to rounding. Made by `tabulate`.
     """
 
@@ -64,6 +78,7 @@ class TabulatedModel:
     how: str
     domain: TabulatedDomain | None = None
     error: TableAccuracy | None = None
+    effects: EffectTable | None = None
 
     @property
     def tabulated(self) -> bool:
@@ -73,8 +88,37 @@ class TabulatedModel:
     def predict_rows(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None) -> Prediction:
         """Like PushModel.predict; in the domain within the tolerances of this module, elsewhere the same.
 
-        Of an extended model the base is tabulated; the effects are computed and added.
+        Of an extended model the base is tabulated. Its effects are computed and added, unless they have a table.
         """
+        if self.effects is None:
+            return self._computed(inputs, duration, covariates)
+        push = self.model.predictor.completed(Push(inputs, duration, covariates or {}))
+        if len(inputs) == 1:
+            alone = self._single_effects.shift(push)
+            return self._computed(inputs, duration, covariates) if alone is None else self._shifted(push, alone)
+        located = self.effects.located(push)
+        if located.inside.all():
+            return self._shifted(push, self.effects.shift(push, located))
+        if not located.inside.any():
+            return self._computed(inputs, duration, covariates)
+        chosen, other = (_taken(push, rows) for rows in (located.inside, ~located.inside))
+        exact = self._computed(other.inputs, other.duration, other.covariates)
+        table = self._shifted(chosen, self.effects.shift(chosen, self.effects.located(chosen)))
+        return _merged(located.inside, table, exact)
+
+    def _shifted(self, push: Push, shift: Shift) -> Prediction:
+        """Predictions from what the base adds to a table of effects, and the shift in that table."""
+        assert self.effects is not None
+        rest, scale = self._added(push), self.effects.source.predictor.scale
+        factor = np.outer(scale, scale)
+        return Prediction(
+            rest.mean + shift.mean,
+            rest.covariance * factor + shift.covariance,
+            rest.process_covariance * factor,
+            rest.in_domain & self.model.covariates_seen(push),
+        )
+
+    def _computed(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
         if self.domain is None:
             return self._exact.predict_rows(inputs, duration, covariates)
         push, predictor = Push(inputs, duration, covariates or {}), self._exact.predictor
@@ -101,6 +145,25 @@ class TabulatedModel:
     def _residual(self) -> PushModel:
         """The model of what is tabulated: the base, without the mechanics about which it has learnt residuals."""
         return _without_mean(self.model.base)
+
+    @cached_property
+    def _single_effects(self) -> SingleEffects:
+        assert self.effects is not None
+        return SingleEffects(self.effects)
+
+    def _added(self, push: Push) -> Prediction:
+        """What the base adds to a table of effects: all but the displacement of its mechanics."""
+        predictor, n = self.model.predictor.base, len(push.inputs)
+        if isinstance(predictor, AnalyticalPredictor | MechanicsPredictor):
+            covariance = np.broadcast_to(predictor.covariance, (n, 3, 3))
+            return Prediction(np.zeros((n, 3)), covariance, covariance, self.model.in_domain(push.inputs))
+        if self.domain is None:
+            learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)
+        else:
+            learnt = self._learnt(self.domain, push.inputs, push.duration)
+        if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
+            return learnt
+        return Prediction(*predictor.mean.scaled(push, _moments(learnt)), learnt.in_domain)
 
     def _of_base(self, learnt: Prediction, push: Push) -> Prediction:
         """Predictions of the base from those of what it has learnt."""
@@ -143,6 +206,20 @@ def tabulate(model: PushModel) -> TabulatedModel:
     return TabulatedModel(model, f"exact: {how}too far off")
 
 
+def with_effect_table(tabulated: TabulatedModel) -> TabulatedModel:
+    """The same with a table of its effects, if it has effects and the table is accurate; takes some seconds."""
+    if not tabulated.model.predictor.effects:
+        return tabulated
+    table, how = build_effect_table(tabulated.model)
+    return replace(tabulated, how=f"{tabulated.how}; effects: {how}", effects=table)
+
+
+def _taken(push: Push, rows: BoolArray) -> Push:
+    return Push(
+        push.inputs[rows], push.duration[rows], {name: column[rows] for name, column in push.covariates.items()}
+    )
+
+
 def _with_base(model: PushModel, base: PriorPredictor) -> PushModel:
     predictor = model.predictor.with_base(base) if model.predictor.effects else base
     return replace(model, predictor=predictor)
@@ -169,13 +246,6 @@ def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:
     of_outcome = relative_error(table.covariance, exact.covariance)
     of_process = relative_error(table.process_covariance, exact.process_covariance)
     return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
-
-
-def relative_error(found: Array, exact: Array) -> Array:
-    """Largest relative error (n,) of covariances (n, 3, 3) in the variance of any combination of outputs."""
-    whitener = np.linalg.inv(np.linalg.cholesky(exact))
-    eigenvalues = np.linalg.eigvalsh(whitener @ found @ whitener.transpose(0, 2, 1))
-    return np.asarray(np.abs(eigenvalues - 1.0).max(axis=1))
 
 
 def _probes(model: PushModel) -> Array:

@@ -1,0 +1,193 @@
+"""Building a table of effects: which axes matter, how many knots, and how accurate it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.models.mechanics.fitted import RECORDING
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.tabulated.effect_axes import ChangeAxes, PlaceAxis, change_axes
+from push_predictor.models.tabulated.effect_table import EffectSource, EffectTable
+from push_predictor.models.tabulated.interpolation import Axis, TensorSpline
+from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.types import Array
+
+CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0}
+SPEED_CELLS = 3  # displacement per speed is nearly a parabola of the speed
+FEWEST_CELLS, FINEST = 4, 2.0  # cells of an axis; factor on CELLS
+COARSEST = 0.2  # factor on CELLS, below which a table is not tried
+MOST_WORK = 200_000  # integrations for a table: some microseconds each
+ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
+ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
+PROBES = 64  # random pushes that show which axes matter
+ALIKE = 1e-4  # of the largest value
+MEAN_TOLERANCE = 0.2  # predicted standard deviations, in 99 of 100 pushes; the root of the mean square is a fifth of it
+COVARIANCE_TOLERANCE = 0.1  # relative, of the variance of any combination of outputs, in 99 of 100 pushes
+CHECKED = 400  # pushes: training rows, and as many with other inputs
+
+
+def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
+    """A table of an extended model's effects, None if there is none, with the reason in words."""
+    predictor, rows = model.predictor, model.training
+    assert isinstance(predictor, ExtendedPredictor)
+    if RECORDING in predictor.needs:
+        return None, "the mechanics depend on the recording"
+    if not len(rows):
+        return None, "there are no training pushes"
+    source = EffectSource(predictor, model.usual_duration)
+    push = predictor.completed(Push(rows.inputs, rows.duration, rows.covariates))
+    change = change_axes(*source.changes(push))
+    if change is None:
+        return None, "the changes take too many values"
+    table, how = _Builder.of(source, push, change).table()
+    if table is None:
+        return None, how
+    of_mean, of_covariance = table_errors(model, table)
+    how = f"{how}, means to {of_mean:.2g} standard deviations, covariances to {100.0 * of_covariance:.2g} %"
+    if of_mean > MEAN_TOLERANCE or of_covariance > COVARIANCE_TOLERANCE:
+        return None, f"a {how}; too far off"
+    return table, how
+
+
+def table_errors(model: PushModel, table: EffectTable) -> tuple[float, float]:
+    """Differences of a table and the model that 99 of 100 pushes do not exceed.
+
+    Of means, in predicted standard deviations, and of covariances, relative: see tabulated_model.TableAccuracy.
+    """
+    push = _checked(model)
+    exact, expected = model.predictor.moments(push), model.predictor.shift(push)
+    found = table.shift(push, table.located(push))
+    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
+    of_mean = np.abs(found.mean - table.source.anchor(push) - expected.mean) / sd
+    of_covariance = relative_error(exact.covariance - expected.covariance + found.covariance, exact.covariance)
+    return float(np.quantile(of_mean.max(axis=1), 0.99)), float(np.quantile(of_covariance, 0.99))
+
+
+def _checked(model: PushModel) -> Push:
+    """Training rows, and rows with inputs drawn evenly between them."""
+    rng, rows = np.random.default_rng(0), model.training
+    known = rows.take(rng.integers(len(rows), size=2 * CHECKED))
+    inputs = known.inputs.copy()
+    low, high = rows.inputs.min(axis=0), rows.inputs.max(axis=0)
+    low[1], high[1] = 0.0, 1.0
+    inputs[CHECKED:] = rng.uniform(low, high, (CHECKED, 3))
+    covariates = dict(known.covariates)
+    if {"slider_heading", "push_heading"} <= set(covariates):
+        normal = model.rig.outline.inward_normal(inputs[:, 1])
+        covariates["push_heading"] = (
+            covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + inputs[:, 2]
+        )
+    return model.predictor.completed(Push(inputs, np.full(len(inputs), model.usual_duration), covariates))
+
+
+@dataclass(frozen=True, eq=False)
+class _Builder:
+    """Axes of a table."""
+
+    source: EffectSource
+    place: PlaceAxis
+    change: ChangeAxes
+    angles: tuple[float, float]
+    speeds: tuple[float, float]
+    by_heading: bool
+    any_duration: bool
+
+    @classmethod
+    def of(cls, source: EffectSource, push: Push, change: ChangeAxes) -> _Builder:
+        """The axes that pushes need."""
+        speed = push.inputs[:, 0] * push.duration / source.duration
+        angle = push.inputs[:, 2]
+        outline = source.predictor.physics.outline
+        whole = PlaceAxis(outline, 1)
+        ends = (float(angle.min()), float(angle.max())), (float(speed.min()), float(speed.max()))
+        plain = cls(source, whole, change, *ends, True, True)
+        inputs, heading, changes = plain._probes()
+
+        def values(where: Array, towards: Array = heading, by: EffectSource = source) -> Array:
+            moved = by.moved(where, towards, changes)
+            return np.concatenate([moved, by.still(where, towards), by.slopes(where, towards, changes)], axis=1)
+
+        here, twice = values(inputs), replace(source, duration=2.0 * source.duration)
+        elsewhere, order = inputs.copy(), outline.rotational_symmetry
+        elsewhere[:, 1] = (inputs[:, 1] + (ANYWHERE if order == 0 else 1.0 / order)) % 1.0
+        return replace(
+            plain,
+            place=PlaceAxis(outline, order) if order != 1 and _alike(here, values(elsewhere)) else whole,
+            by_heading=not _alike(here, values(inputs, heading + 1.0)),
+            any_duration=_alike(here, values(inputs * [0.5, 1.0, 1.0], by=twice)),
+        )
+
+    @property
+    def by_speed(self) -> bool:
+        """Whether the speeds differ."""
+        return self.speeds[1] > ONE_SPEED * self.speeds[0]
+
+    def _probes(self) -> tuple[Array, Array, Array]:
+        rng = np.random.default_rng(0)
+        low, high = np.array([self.speeds[0], 0.0, self.angles[0]]), np.array([self.speeds[1], 1.0, self.angles[1]])
+        places = rng.uniform(self.change.low, self.change.high, (PROBES, len(self.change.low)))
+        level = rng.integers(len(self.change.levels), size=PROBES)
+        heading = rng.uniform(-np.pi, np.pi, PROBES)
+        return rng.uniform(low, high, (PROBES, 3)), heading, self.change.changes(level, places)
+
+    def table(self) -> tuple[EffectTable | None, str]:
+        """The finest table that is not too much work."""
+        parameters = max(len(self.source.names), 1)
+        moved, slopes = self._factor(MOST_WORK, 1), self._factor(MOST_WORK, 2 * parameters)
+        if slopes < COARSEST:
+            return None, "they depend on too much"
+        splines = self._spline(self._axes(moved), self._moved), self._spline(self._axes(slopes), self.source.slopes)
+        axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
+        table = EffectTable(self.source, *axes, *splines)
+        return table, f"table of {splines[0].knots + splines[1].knots} knots"
+
+    def _spline(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> TensorSpline:
+        boxes = self.place.edges * len(self.change.levels)
+        knots = [np.linspace(axis.low, axis.high, axis.cells + 1) for axis in axes]
+        grid = np.stack(np.meshgrid(np.arange(float(boxes)), *knots, indexing="ij"), axis=-1)
+        columns = list(grid.reshape(-1, grid.shape[-1]).T)
+        box = columns.pop(0).astype(np.int64)
+        contact, angle = self.place.contact(box // len(self.change.levels), columns.pop(0)), columns.pop(0)
+        speed = columns.pop(0) if self.by_speed else np.full(len(box), np.mean(self.speeds))
+        heading = columns.pop(0) if self.by_heading else np.zeros(len(box))
+        places = np.column_stack(columns) if columns else np.empty((len(box), 0))
+        changes = self.change.changes(box % len(self.change.levels), places)
+        found = values(np.column_stack([speed, contact, angle]), heading, changes) / speed[:, None]
+        return TensorSpline(axes, found.reshape(*grid.shape[:-1], -1))
+
+    def _moved(self, inputs: Array, heading: Array, changes: Array) -> Array:
+        """Shift (n, 3) at knots; its part without changes is computed once for those that differ in changes alone."""
+        moved = self.source.moved(inputs, heading, changes)
+        apart = int(np.argmax(np.any(np.diff(np.column_stack([inputs, heading]), axis=0) != 0.0, axis=1))) + 1
+        index = np.arange(len(inputs)).reshape(self.place.edges, len(self.change.levels), -1, apart)
+        first = index[:, :1, :, :1].ravel()
+        still = self.source.still(inputs[first], heading[first])
+        together = moved.reshape(*index.shape, 3) + still.reshape(self.place.edges, 1, -1, 1, 3)
+        return np.asarray(together.reshape(-1, 3))
+
+    def _factor(self, work: int, each: int) -> float:
+        """Factor on CELLS that takes this work, with `each` integrations for a knot."""
+        free = [CELLS["place"], CELLS["angle"]] + [CELLS["heading"]] * self.by_heading
+        free += [CELLS["change"]] * len(self.change.low)
+        each *= self.place.edges * len(self.change.levels) * (SPEED_CELLS + 1 if self.by_speed else 1)
+        return float(min((work / (each * float(np.prod(free)))) ** (1.0 / len(free)), FINEST))
+
+    def _axes(self, factor: float) -> list[Axis]:
+        def cells(name: str) -> int:
+            return max(FEWEST_CELLS, round(factor * CELLS[name]))
+
+        axes = [Axis(0.0, 1.0, cells("place")), Axis(*self.angles, cells("angle"))]
+        axes += [Axis(*self.speeds, SPEED_CELLS)] * self.by_speed
+        axes += [Axis(-np.pi, np.pi, cells("heading"))] * self.by_heading
+        ends = zip(self.change.low.tolist(), self.change.high.tolist(), strict=True)
+        return [*axes, *(Axis(low, high, cells("change")) for low, high in ends)]
+
+
+def _alike(one: Array, other: Array) -> bool:
+    """Whether values (n, k) agree, next to the largest of each column."""
+    return bool(np.all(np.abs(one - other) <= ALIKE * np.abs(one).max(axis=0) + np.finfo(float).tiny))

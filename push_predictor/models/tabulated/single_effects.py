@@ -1,0 +1,136 @@
+"""Effects of one push from their table, in plain numbers: arrays of one row take several times as long."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from math import acos, atan2, inf, pi
+
+import numpy as np
+
+from push_predictor.models.effects.exact import quantities_of
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import Shift
+from push_predictor.models.tabulated.effect_axes import SAME, STEPPED
+from push_predictor.models.tabulated.effect_table import MARGIN, TURN, EffectTable
+
+
+class SingleEffects:
+    """The mean and the covariance that a table's effects give one push; the same as EffectTable.shift, to rounding."""
+
+    def __init__(self, table: EffectTable) -> None:
+        source, known = table.source, table.coefficients
+        self._table = table
+        self._effects = [_PlainEffect(table, k) for k in range(len(source.predictor.effects))]
+        self._spreads, self._centre = source.spreads.tolist(), table.change.centre.tolist()
+        self._levels, self._directions = table.change.levels.tolist(), table.change.directions.tolist()
+        self._ends = list(zip(table.change.low.tolist(), table.change.high.tolist(), strict=True))
+        self._linear = known.values * known.linear if known.linear.any() else None
+        outline, self._edges = table.place.outline, table.place.edges
+        starts = outline.edge_starts
+        self._starts = list(zip(starts[:-1].tolist(), (1.0 / np.diff(starts)).tolist(), strict=True))
+        self._smooth = outline.semi_axes is not None
+        normals = np.zeros((1, 2)) if self._smooth else outline.inward_normal(0.5 * (starts[1:] + starts[:-1]))
+        self._normal_angles = np.arctan2(normals[:, 1], normals[:, 0]).tolist()
+
+    def shift(self, push: Push) -> Shift | None:
+        """The shift at one push (n = 1), see EffectTable.shift; None where the table does not contain the push."""
+        velocity, contact, angle = push.inputs[0].tolist()
+        covariates = {name: float(column[0]) for name, column in push.covariates.items()}
+        table = self._table
+        ratio = float(push.duration[0]) / table.source.duration
+        speed = velocity * ratio
+        (least, most), (low, high) = table.angles, table.speeds
+        inside = least - MARGIN <= angle <= most + MARGIN and low - MARGIN * high <= speed <= high * (1.0 + MARGIN)
+        if not inside or not (table.any_duration or abs(ratio - 1.0) <= MARGIN):
+            return None
+        side, edge, place = self._located(contact)
+        point = [place, min(max(angle, least), most)]
+        if table.by_speed:
+            point.append(min(max(speed, low), high))
+        if table.by_heading:
+            heading = self._heading(contact, side, angle, covariates)
+            if heading is None:
+                return None
+            point.append(heading)
+        columns = [effect.columns(covariates) for effect in self._effects]
+        level = self._changed(columns, point)
+        if level is None:
+            return None
+        box = edge * len(self._levels) + level
+        slopes = speed * table.slopes.at(point, box)
+        known = table.coefficients
+        tiled = [value for effect, own in zip(self._effects, columns, strict=True) for value in own * effect.count]
+        design = slopes.reshape(-1, 3)[known.parameter] * np.array(tiled)[:, None]
+        mean = speed * table.moved.at(point, box)
+        if self._linear is not None:
+            mean = mean + self._linear @ design
+        return Shift(mean[None], (design.T @ known.covariance @ design)[None])
+
+    def _located(self, contact: float) -> tuple[int, int, float]:
+        """The edge of a contact, its number among those that differ, and the place on it; see PlaceAxis."""
+        if self._smooth:
+            return 0, 0, self._table.place.order * contact % 1.0
+        side = bisect_right(self._starts, (contact, inf)) - 1
+        start, per_length = self._starts[side]
+        fraction = min(max((contact - start) * per_length, 0.0), 1.0)
+        return side, side % self._edges, acos(1.0 - 2.0 * fraction) / pi
+
+    def _heading(self, contact: float, side: int, angle: float, given: Mapping[str, float]) -> float | None:
+        """See EffectTable; None where slider and push disagree."""
+        of_push = given["push_heading"] - angle if "push_heading" in given else None
+        if "slider_heading" not in given:
+            return None if of_push is None else _turned(of_push)
+        normal = self._normal_angles[side]
+        if self._smooth:
+            (x, y) = self._table.place.outline.inward_normal(np.array([contact]))[0].tolist()
+            normal = atan2(y, x)
+        heading = given["slider_heading"] + normal
+        if of_push is not None and abs(_turned(of_push - heading)) > MARGIN:
+            return None
+        return _turned(heading)
+
+    def _changed(self, columns: Sequence[Sequence[float]], point: list[float]) -> int | None:
+        """The level of the changes, with their places appended to the point; None where they are not in the table."""
+        stepped, away = [0.0] * len(self._spreads), [-centre for centre in self._centre]
+        for effect, own in zip(self._effects, columns, strict=True):
+            effect.add(stepped if effect.stepped else away, own, self._spreads)
+        for direction, (low, high) in zip(self._directions, self._ends, strict=True):
+            place = sum(a * d for a, d in zip(away, direction, strict=True))
+            away = [a - place * d for a, d in zip(away, direction, strict=True)]
+            if not low - SAME <= place <= high + SAME:
+                return None
+            point.append(min(max(place, low), high))
+        if not all(abs(a) <= SAME for a in away):
+            return None
+        for level, known in enumerate(self._levels):
+            if all(abs(change - other) <= SAME for change, other in zip(stepped, known, strict=True)):
+                return level
+        return None
+
+
+class _PlainEffect:
+    """One effect: its basis, and how it changes the parameters."""
+
+    def __init__(self, table: EffectTable, number: int) -> None:
+        effect = table.source.predictor.effects[number]
+        self._basis = effect.basis
+        self.stepped = effect.basis.name in STEPPED
+        width = len(effect.basis.values_one(dict.fromkeys(effect.basis.drivers, 0.0)))
+        self.count = len(effect.coefficients) // width
+        rows = effect.coefficients.reshape(self.count, width).tolist()
+        names = quantities_of(effect) if effect.exact else ()
+        self._rows = [(table.source.names.index(name), row) for name, row in zip(names, rows, strict=False)]
+
+    def columns(self, covariates: Mapping[str, float]) -> list[float]:
+        """The columns of the basis."""
+        return self._basis.values_one(covariates)
+
+    def add(self, changes: list[float], columns: Sequence[float], spreads: Sequence[float]) -> None:
+        """Add the effect's changes of parameters, in units of spreads, to those of others."""
+        for number, row in self._rows:
+            changes[number] += sum(c * x for c, x in zip(row, columns, strict=True)) / spreads[number]
+
+
+def _turned(angle: float) -> float:
+    return (angle + pi) % TURN - pi

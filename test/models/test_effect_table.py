@@ -1,0 +1,297 @@
+"""Effects from a table: close to the exact ones inside, the exact ones outside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drifting_models import pushes
+from synthetic import square_rig
+
+from push_predictor.models.effects.driver_basis import BASES, DriverBasis
+from push_predictor.models.effects.effect import Effect, mechanism_named
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.tabulated import effect_table_build
+from push_predictor.models.tabulated.effect_axes import change_axes
+from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array
+
+ALWAYS = DriverBasis("constant")
+DRIFT = DriverBasis("linear", ("elapsed_time",), (500.0,), (300.0,))
+LATER = DriverBasis("step", ("elapsed_time",), place=500.0)
+AROUND = DriverBasis("periodic", ("slider_heading",))
+MAP = DriverBasis("map", ("topic:/warmth", "elapsed_time"), (0.0, 500.0), (1.0, 300.0))
+OUTCOME = np.array([0.02, 0.02, 0.5])
+
+
+@pytest.fixture(autouse=True)
+def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third of the usual work; tables that are a little too coarse are used nevertheless."""
+    monkeypatch.setattr(effect_table_build, "MOST_WORK", 70_000)
+    monkeypatch.setattr(effect_table_build, "COARSEST", 0.0)
+    monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.5)
+    monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 0.3)
+
+
+def effect(mechanism: str, basis: DriverBasis, size: float = 1.0, exact: bool = True) -> Effect:
+    """Of alternating signs, known to 10 %; size: in units of the parameters' usual spreads."""
+    quantities = mechanism_named(mechanism).quantities
+    width = basis.values({name: np.zeros(1) for name in basis.drivers}, 1).shape[1]
+    spreads = np.repeat([BY_NAME[name].spread for name in quantities], width)
+    signs = np.where(np.arange(len(spreads)) % 2, -1.0, 1.0)
+    covariance = np.diag((0.1 * spreads) ** 2)
+    return Effect(mechanism, "any", basis, size * signs * spreads, covariance, OUTCOME, exact=exact)
+
+
+GENERIC = Effect(None, "elapsed_time", DRIFT, np.full(18, 0.05), 1e-4 * np.eye(18), OUTCOME)
+CASES = {
+    "constant": (effect("contact_friction", ALWAYS),),
+    "linear": (effect("contact_friction", DRIFT),),
+    "step and linear": (effect("centre_of_friction", LATER), effect("contact_friction", DRIFT)),
+    "map": (effect("contact_friction", MAP, 0.2),),
+    "periodic": (effect("contact_friction", AROUND),),
+    "in the world": (effect("anisotropic_friction", ALWAYS),),
+    "linear in its coefficients": (effect("contact_friction", DRIFT, 0.5, exact=False), GENERIC),
+}
+
+
+@cache
+def base(kind: str) -> PushModel:
+    """About nothing, about mechanics with a shifted centre, or the analytical model alone."""
+    rows = pushes(60)
+    if kind == "analytical":
+        return train_model(rows, square_rig(), "analytical", name=kind)
+    options = TrainingOptions()
+    if kind == "about mechanics":
+        mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
+        fitted = FittedMechanics(mechanics, {"contact_friction": 0.25, "centre_x": 0.003})
+        options = TrainingOptions(about=MechanicsMean(fitted, 0.004))
+    return train_model(rows, square_rig(), "gp", name=kind, options=options)
+
+
+def extended(kind: str, *effects: Effect) -> PushModel:
+    plain = base(kind)
+    predictor = ExtendedPredictor(plain.predictor.base, plain.predictor.physics, effects, np.array([1.0, 1.1, 0.9]))
+    return replace(plain, predictor=predictor)
+
+
+@cache
+def both(kind: str, case: str) -> tuple[TabulatedModel, TabulatedModel]:
+    """Without and with a table of effects."""
+    computed = tabulate(extended(kind, *CASES[case]))
+    return computed, with_effect_table(computed)
+
+
+def predicted(model: TabulatedModel | PushModel, table: PushTable) -> Prediction:
+    return model.predict_rows(table.inputs, table.duration, table.covariates)
+
+
+def single(model: TabulatedModel, table: PushTable, row: int = 0) -> Prediction:
+    return predicted(model, table.take(np.array([row])))
+
+
+def inside(n: int = 100) -> PushTable:
+    """New pushes between those of the training."""
+    rows = pushes(n, 5)
+    keep = (np.abs(rows.inputs[:, 2]) < 0.85) & (np.abs(rows.covariates["topic:/warmth"]) < 1.5)
+    return rows.take(np.flatnonzero(keep))
+
+
+def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None:
+    for name in ("mean", "covariance", "process_covariance", "in_domain"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), **(precision or {"rtol": 1e-12}))
+
+
+@pytest.mark.parametrize("kind", ["about nothing", "about mechanics", "analytical"])
+@pytest.mark.parametrize("case", ["step and linear", "linear"])
+def test_table_is_close_to_the_exact_effects(kind: str, case: str) -> None:
+    assert_close(kind, case)
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if "linear" not in case or "its" in case])
+def test_table_is_close_for_every_kind_of_effect(case: str) -> None:
+    assert_close("about nothing", case)
+
+
+def assert_close(kind: str, case: str) -> None:
+    computed, table = both(kind, case)
+    assert table.effects is not None, table.how
+    rows = inside()
+    found, exact = predicted(table, rows), predicted(computed, rows)
+    away = np.abs(found.mean - exact.mean).max(axis=0)
+    assert away.max() > 0.0  # the table was used
+    apart = np.abs(found.mean - exact.mean) / exact.std
+    shift = np.abs(exact.mean - predicted(base(kind), rows).mean) / exact.std
+    assert np.median(apart) < 0.02 and np.quantile(apart, 0.95) < 0.2, (np.median(apart), np.quantile(apart, 0.95))
+    assert np.sqrt(np.mean(apart**2)) < 0.15 * np.sqrt(np.mean(shift**2))
+    assert np.quantile(relative_error(found.covariance, exact.covariance), 0.95) < 0.1
+    np.testing.assert_allclose(found.process_covariance, exact.process_covariance, rtol=2e-3, atol=1e-12)
+    assert np.array_equal(found.in_domain, exact.in_domain)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_push_gets_the_same_prediction_alone_as_among_others(case: str) -> None:
+    _, table = both("about nothing", case)
+    rows = inside(20)
+    together = predicted(table, rows)
+    for k in range(0, len(rows), 4):
+        alone = single(table, rows, k)
+        np.testing.assert_allclose(alone.mean[0], together.mean[k], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(alone.covariance[0], together.covariance[k], rtol=1e-9)
+        assert alone.in_domain[0] == together.in_domain[k]
+
+
+def with_inputs(rows: PushTable, column: int, value: float) -> PushTable:
+    inputs = rows.inputs.copy()
+    inputs[:, column] = value
+    return replace(rows, inputs=inputs)
+
+
+def with_covariate(rows: PushTable, name: str, values: Array) -> PushTable:
+    return replace(rows, covariates={**rows.covariates, name: values})
+
+
+OUTSIDE = {
+    "angle": lambda rows: with_inputs(rows, 2, 1.1),
+    "speed": lambda rows: with_inputs(rows, 0, 0.03),
+    "covariate": lambda rows: with_covariate(rows, "elapsed_time", np.full(len(rows), 2000.0)),
+}
+
+
+@pytest.mark.parametrize("what", OUTSIDE)
+def test_outside_the_table_effects_are_computed(what: str) -> None:
+    computed, table = both("analytical", "linear")
+    rows = OUTSIDE[what](inside(6))
+    assert_equal(predicted(table, rows), predicted(computed, rows))
+    assert_equal(single(table, rows), single(computed, rows))
+    mixed = rows.take(np.arange(4))
+    known = inside(6).take(np.arange(4, 8))
+    merged = PushTable(
+        np.concatenate([mixed.inputs, known.inputs]),
+        np.concatenate([mixed.duration, known.duration]),
+        np.concatenate([mixed.outcomes, known.outcomes]),
+        np.concatenate([mixed.push_id, known.push_id]),
+        {name: np.concatenate([column, known.covariates[name]]) for name, column in mixed.covariates.items()},
+    )
+    found = predicted(table, merged)
+    np.testing.assert_allclose(found.mean[:4], predicted(computed, mixed).mean, rtol=1e-9)
+    np.testing.assert_allclose(found.mean[4:], predicted(table, known).mean, rtol=1e-9)
+
+
+def test_slower_and_longer_is_the_same_where_the_mechanics_do_not_depend_on_speed() -> None:
+    _, table = both("analytical", "linear")
+    rows = inside(10)
+    slow = replace(with_inputs(rows, 0, 0.01), duration=2.0 * rows.duration)
+    np.testing.assert_allclose(predicted(table, slow).mean, predicted(table, rows).mean, rtol=1e-9)
+    np.testing.assert_allclose(single(table, slow).mean, single(table, rows).mean, rtol=1e-9)
+    delayed = tabulate(extended("analytical", effect("contact_friction", DRIFT)))
+    late = FittedMechanics(delayed.model.predictor.mechanics.mechanics, {"clock_delay": 0.02})
+    predictor = replace(delayed.model.predictor, of_effects=late)
+    delayed = replace(delayed, model=replace(delayed.model, predictor=predictor))
+    tabled = with_effect_table(delayed)
+    assert tabled.effects is not None and not tabled.effects.any_duration, tabled.how
+    assert_equal(predicted(tabled, slow), predicted(delayed, slow))
+    assert_equal(single(tabled, slow), single(delayed, slow))
+    assert np.abs(predicted(tabled, rows).mean - predicted(delayed, rows).mean).max() > 0.0
+
+
+def test_headings_of_slider_and_push_that_disagree_are_computed() -> None:
+    computed, table = both("about nothing", "in the world")
+    rows = inside(6)
+    normal = square_rig().outline.inward_normal(rows.inputs[:, 1])
+    heading = rows.covariates["slider_heading"] + np.arctan2(normal[:, 1], normal[:, 0]) + rows.inputs[:, 2]
+    agree, differ = (with_covariate(rows, "push_heading", heading + by) for by in (2.0 * np.pi, 0.5))
+    assert_equal(predicted(table, agree), predicted(table, rows), rtol=1e-9)
+    assert_equal(single(table, agree), single(table, rows), rtol=1e-9)
+    assert_equal(predicted(table, differ), predicted(computed, differ))
+    assert_equal(single(table, differ), single(computed, differ))
+
+
+def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
+    table = with_effect_table(tabulate(extended("about nothing", effect("contact_friction", LATER, 0.0))))
+    assert table.effects is not None
+    rows = inside()
+    found, plain = predicted(table, rows), predicted(tabulate(base("about nothing")), rows)
+    np.testing.assert_allclose(found.mean, plain.mean, atol=1e-12)
+    later = rows.covariates["elapsed_time"] >= 500.0
+    widened = found.covariance[:, 2, 2] - plain.covariance[:, 2, 2] * 0.81
+    assert np.abs(widened[~later]).max() < 1e-12 and np.median(widened[later]) > 1e-7
+
+
+def test_before_a_step_the_prediction_is_that_of_the_base() -> None:
+    table = with_effect_table(tabulate(extended("analytical", effect("contact_friction", LATER))))
+    rows = inside()
+    before = rows.covariates["elapsed_time"] < 500.0
+    found, plain = predicted(table, rows), predicted(base("analytical"), rows)
+    apart = np.abs(found.mean - plain.mean) / plain.std
+    assert np.quantile(apart[before], 0.95) < 0.1 and np.median(apart[~before]) > 0.1
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_basis_of_one_push_is_that_of_many(name: str) -> None:
+    drivers = {"constant": (), "map": ("a", "b")}.get(name, ("a",))
+    basis = DriverBasis(name, drivers, (0.3,) * len(drivers), (1.7,) * len(drivers), 0.5, (0.0, 1.0, 2.0))
+    given = {"a": np.array([-0.7, 0.5, 1.0, 2.0]), "b": np.array([1.0, -2.0, 0.1, 3.0])}
+    for k, row in enumerate(basis.values(given, 4)):
+        assert basis.values_one({key: float(column[k]) for key, column in given.items()}) == pytest.approx(row)
+
+
+def test_changes_along_a_line_have_one_coordinate_and_round_trip() -> None:
+    rng = np.random.default_rng(0)
+    along = np.outer(rng.uniform(-1.0, 2.0, 30), [0.6, 0.8, 0.0]) + [0.0, 0.1, 0.5]
+    stepped = np.where(np.arange(30)[:, None] < 10, 0.0, [[0.3, 0.0, -0.2]])
+    axes = change_axes(stepped, along)
+    assert axes is not None and (len(axes.levels), len(axes.directions)) == (2, 1)
+    level, places, within = axes.located(stepped, along)
+    assert within.all()
+    np.testing.assert_allclose(axes.changes(level, places), stepped + along, atol=1e-9)
+    for outside in (along + [0.0, 0.0, 0.1], along + 5.0 * np.array([0.6, 0.8, 0.0])):
+        assert not axes.located(stepped, outside)[2].any()
+    assert not axes.located(stepped + 0.1, along)[2].any()
+
+
+def test_changes_that_take_too_many_values_have_no_table() -> None:
+    rng, none = np.random.default_rng(0), np.zeros((30, 3))
+    assert change_axes(none, rng.standard_normal((30, 3))) is None
+    assert change_axes(np.arange(30.0)[:, None] % 5 * np.ones((1, 3)), none) is None
+
+
+def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 1e-6)
+    table = with_effect_table(tabulate(extended("analytical", *CASES["constant"])))
+    assert table.effects is None
+    assert "too far off" in table.how and "standard deviations" in table.how
+
+
+def test_mechanics_that_depend_on_the_recording_have_no_table() -> None:
+    model = extended("analytical", *CASES["constant"])
+    needing = replace(model.predictor.effects[0], basis=DriverBasis("linear", ("recording",), (0.0,), (1.0,)))
+    rows = replace(model.training, covariates={**model.training.covariates, "recording": np.zeros(len(model.training))})
+    model = replace(model, predictor=replace(model.predictor, effects=(needing,)), training=rows)
+    assert "depend on the recording" in with_effect_table(tabulate(model)).how
+
+
+def test_model_without_effects_is_left_as_it_is() -> None:
+    plain = tabulate(base("about nothing"))
+    assert with_effect_table(plain) is plain
+
+
+def test_registry_tabulates_effects(tmp_path: Path) -> None:
+    path = tmp_path / "m.pushmodel"
+    extended("about nothing", *CASES["linear"]).save(path)
+    registry = ModelRegistry()
+    registry.load(path)
+    (line,) = registry.answering
+    assert "effects: table of" in line and registry.get("").effects is not None
