@@ -230,7 +230,8 @@ def _sized(force: _Force, best: Contrast, values: Array, draws: Array) -> tuple[
     range_ = changes[:, 0] if changes.shape[1] == 1 else np.subtract(*np.quantile(changes, [0.95, 0.05], axis=1))
     relative = np.expm1(range_)
     low, high = np.quantile(relative[1:], [0.025, 0.975])
-    name = "relative change of the force over the driver's range"
+    constant = best.covariate == CONSTANT
+    name = f"relative change of the force {'since training' if constant else 'over the range of its covariate'}"
     return (Sized(name, float(relative[0]), float(low), float(high), "1"),)
 
 

@@ -20,7 +20,7 @@ from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for, inputs_basis
 from push_predictor.residuals.evidence.instrument import with_instrument
-from push_predictor.residuals.evidence.loading import with_inputs
+from push_predictor.residuals.evidence.loading import previous_residual, with_inputs
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
 from push_predictor.residuals.selection.screening import TINY, Scores, raw_scores
@@ -89,6 +89,8 @@ def baseline_of(model: PushModel, mechanics: Mechanics) -> Baseline:
     table, predictor = with_instrument(with_inputs(model.training)), model.predictor.with_independent_outputs()
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
+    before = {"previous_residual": previous_residual(table, evidence.z)}
+    evidence = replace(evidence, table=replace(table, covariates={**table.covariates, **before}))
     return Baseline(evidence, inputs_basis(model, table))
 
 

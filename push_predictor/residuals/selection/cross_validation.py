@@ -37,6 +37,11 @@ class Judged:
         """Sum of the gains, nats."""
         return float(self.gains.sum())
 
+    @property
+    def error(self) -> float:
+        """Standard error of the gain from block to block, nats."""
+        return float(np.sqrt(len(self.gains)) * self.gains.std())
+
 
 def judge(candidates: Sequence[Candidate], z: Array, controls: Array, block: IntArray) -> list[Judged]:
     """Candidates with their gains on residuals z (n, 3), best first; the controls (n, m) are regressed out of both."""

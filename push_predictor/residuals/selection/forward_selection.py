@@ -12,7 +12,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
-from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.evidence.standardised import FEWEST_BLOCKS, Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference
 from push_predictor.residuals.selection.cross_validation import fit
 from push_predictor.residuals.selection.screening import Scores, Screened, raw_scores, screen, unit_scores
@@ -23,7 +23,7 @@ MOST_TERMS = 3
 OWN = 2  # rank of effects in the base's own inputs, after those of a covariate (0) and those local to a push (1)
 CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 HOPELESS = 0.5  # p from which nothing can be significant
-OBVIOUS = 30.0  # nats, cross-validated; chance gains up to 20
+OBVIOUS, SURE = 30.0, 3.5  # nats, cross-validated, and in standard errors: a few pushes far off gain as much
 DWARFED = 12.0  # ratio of gains from which an effect in the base's own inputs is selected first
 
 
@@ -94,13 +94,14 @@ class ForwardSelection:
         noise is then what the strongest leaves of them.
         """
         first = self._screened(z, z)
-        if not self.alpha < first.p_value.min() <= HOPELESS:
+        few = int(self.choice.evidence.block.max()) + 1 < FEWEST_BLOCKS
+        if not few or not self.alpha < first.p_value.min() <= HOPELESS:
             return first
-        gains = self.choice.gains(first, z)
-        obvious = [k for k, gain in gains.items() if gain >= OBVIOUS]
+        judged = self.choice.with_gains(first, z)
+        obvious = [k for k, j in judged.items() if j.gain >= max(OBVIOUS, SURE * j.error)]
         if not obvious:
             return first
-        strongest = self.choice.candidates[max(gains, key=lambda k: gains[k])]
+        strongest = max((judged[k] for k in obvious), key=lambda j: j.gain).candidate
         again, p_value = self._screened(z, self._without(strongest, z)), first.p_value.copy()
         p_value[obvious] = np.minimum(p_value[obvious], again.p_value[obvious])
         return replace(first, p_value=p_value)

@@ -73,8 +73,8 @@ def plausible(judged: Judged, case: Case) -> bool:
 
 def surely_larger(one: Judged, other: Judged) -> bool:
     """Whether a gain is larger by more than chance from block to block."""
-    more = one.gains - other.gains
-    return bool(more.sum() > SURELY * np.sqrt(len(more)) * more.std())
+    more = Judged(one.candidate, one.gains - other.gains)
+    return more.gain > SURELY * more.error
 
 
 def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:

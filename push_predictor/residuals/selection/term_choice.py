@@ -92,10 +92,10 @@ class TermChoice:
         best = sorted(found, key=lambda k: -screened.statistic[k])[:MOST_NAMED]
         return max(self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best)
 
-    def gains(self, screened: Screened, z: Array) -> dict[int, float]:
-        """Cross-validated gains of the candidates with the largest statistics, by their number."""
+    def with_gains(self, screened: Screened, z: Array) -> dict[int, Judged]:
+        """The candidates with the largest statistics and their cross-validated gains, by their number."""
         best = np.argsort(-screened.statistic)[:MOST_JUDGED].tolist()
-        return {k: self._judge([self.candidates[k]], self.candidates[k].kind, z)[0].gain for k in best}
+        return {k: self._judge([self.candidates[k]], self.candidates[k].kind, z)[0] for k in best}
 
     def term(self, found: list[int], screened: Screened, z: Array, used: set[str]) -> SelectedTerm:
         """The best of the candidates found, named; covariates of earlier terms, used, are preferred if they fit."""
