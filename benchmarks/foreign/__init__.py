@@ -1,0 +1,1 @@
+"""A rig of planar pushing that is simulated independently of the project, and recordings made on it."""

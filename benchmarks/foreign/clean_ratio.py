@@ -1,0 +1,33 @@
+"""How much a hidden change moves the outcomes of pushes, compared with their process noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.foreign.arrays import Floats, rotate
+from benchmarks.foreign.faults import Fault, clock_lag, tracked
+from benchmarks.foreign.motion import PushMotion
+from benchmarks.foreign.rig import Rig
+
+WINDOW = 0.2  # s
+
+
+def outcomes(rig: Rig, motion: PushMotion, touch: Floats, faults: Sequence[Fault]) -> Floats:
+    """Displacements (dx, dy, dtheta) of all windows of all pushes, without sensor noise, shape (windows, 3)."""
+    rows = []
+    for push in range(len(touch)):
+        stamps = np.arange(0.0, motion.time[push, -1], WINDOW)
+        seen = stamps - rig.sensors.tracker_latency - clock_lag(faults, touch[push] + stamps)
+        pose = np.stack([np.interp(seen, motion.time[push], values) for values in motion.pose[push].T], axis=-1)
+        step = np.diff(tracked(faults, touch[push] + stamps, pose), axis=0)
+        step[:, :2] = rotate(step[:, :2], np.full(len(step), -motion.heading[push]))
+        rows.append(step)
+    return np.concatenate(rows)
+
+
+def change_over_noise(changed: Floats, unchanged: Floats, other_noise: Floats) -> float:
+    """Root-mean-square change of outcomes in units of their difference between two draws of the noise."""
+    spread = np.sqrt(np.mean((other_noise - unchanged) ** 2, axis=0))
+    return float(np.sqrt(np.mean(((changed - unchanged) / spread) ** 2)))

@@ -1,0 +1,223 @@
+"""The independent rig: reproducible bags, contact forces within Coulomb's law, and complete truth files."""
+
+from __future__ import annotations
+
+import ast
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+pytest.importorskip("mcap_ros2.writer")
+pytest.importorskip("rosbags.typesys")
+
+from benchmarks.blind.recordings import MODEL
+from benchmarks.foreign import __main__ as command
+from benchmarks.foreign import engine, make, messages, recording
+from benchmarks.foreign.bag import write_bag
+from benchmarks.foreign.change import Change
+from benchmarks.foreign.drivers import Driver
+from benchmarks.foreign.effects import Effect
+from benchmarks.foreign.plan import PushDistribution
+from benchmarks.foreign.recording import SessionInputs
+from benchmarks.foreign.rig import Rig, draw_rig
+from benchmarks.foreign.sensing import Samples, SensedSession
+from push_predictor import load_model, read_recording
+
+PACKAGE = Path(command.__file__).parent
+TRUTH_KEYS = {
+    "number",
+    "group",
+    "seed",
+    "engine",
+    "shape",
+    "surface",
+    "friction",
+    "pushes",
+    "training_pushes",
+    "kind",
+    "channel",
+    "names",
+    "covariates",
+    "form",
+    "size",
+    "value",
+    "unit",
+    "place",
+    "place_time",
+    "second",
+    "clean_ratio",
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _coarse_steps() -> Iterator[None]:
+    """Coarser steps than for a recording, to save time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "STEPS", 100)
+        yield
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    return draw_rig(np.random.default_rng(4), "rect1")
+
+
+@pytest.fixture(scope="module")
+def inputs(rig: Rig) -> SessionInputs:
+    return recording._draw_inputs(np.random.default_rng(5), rig, 12, PushDistribution())
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Folders of the recordings and of their truth."""
+    return _make(tmp_path_factory.mktemp("made"))
+
+
+def _make(folder: Path) -> tuple[Path, Path]:
+    data, truth = folder / "data", folder / "truth"
+    options = f"make --out {data} --truth {truth} --seed 2 --count 1 --training 5 --later 4"
+    assert command.main(options.split()) == 0
+    return data, truth
+
+
+def test_the_same_seed_gives_the_same_bags(made: tuple[Path, Path], tmp_path: Path) -> None:
+    first, second = made[0] / "000", _make(tmp_path)[0] / "000"
+    for name in ("training/training_0.mcap", "new/new_0.mcap", "new/metadata.yaml"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+    assert (first / "training/training_0.mcap").read_bytes() != (first / "new/new_0.mcap").read_bytes()
+
+
+def test_a_truth_file_has_all_keys_and_a_bag_its_rig(made: tuple[Path, Path]) -> None:
+    data, truth = made
+    assert set(json.loads((truth / "000.json").read_text())) == TRUTH_KEYS
+    with (data / "000/new/new_0.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        rig_record = {record.name: record.metadata for record in reader.iter_metadata()}["push_rig"]
+        count = sum(1 for _ in reader.iter_messages())
+    assert summary is not None and summary.statistics is not None
+    assert count == summary.statistics.message_count
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert {"/slider/pose", "/pusher/pose", "/pusher/wrench", "/surface/temperature"} <= topics
+    assert {"shape", "outline", "pusher_radius", "surface", "object_mass"} <= set(rig_record)
+
+
+def test_making_again_keeps_existing_recordings(made: tuple[Path, Path]) -> None:
+    bag = made[0] / "000/new/new_0.mcap"
+    before = bag.stat().st_mtime_ns
+    _make(made[0].parent)
+    assert bag.stat().st_mtime_ns == before
+
+
+def test_contact_forces_lie_in_the_friction_cone(rig: Rig, inputs: SessionInputs) -> None:
+    noiseless = inputs.noise.scaled(0.0)
+    motion = engine.simulate(rig, inputs.plan, inputs.facts, noiseless, ())
+    heading = motion.pose[:, :, 2]
+    x, y = motion.force[:, :, 0], motion.force[:, :, 1]
+    body = np.stack([np.cos(heading) * x + np.sin(heading) * y, np.cos(heading) * y - np.sin(heading) * x], axis=-1)
+    # While the tip is on one side of the square, the side's inward normal is a body axis.
+    normal = np.max(np.abs(body), axis=-1)
+    tangential = np.min(np.abs(body), axis=-1)
+    _, outward = rig.outline.boundary(inputs.plan.contact)
+    on_side = np.abs(inputs.plan.contact * 4 % 1 - 0.5) < 0.3
+    pressed = np.sum(body * -outward[:, None], axis=-1)[on_side]
+    assert np.all(pressed >= 0) and np.median(pressed) > 0.3
+    assert np.all(tangential[on_side] <= rig.contact_friction * normal[on_side] * (1 + 1e-9))
+
+
+def test_the_tip_stays_at_the_outline_but_for_its_compliance(rig: Rig, inputs: SessionInputs) -> None:
+    motion = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, ())
+    travelled = inputs.plan.speed[:, None] * motion.time
+    ahead = np.stack([np.cos(motion.heading), np.sin(motion.heading)], axis=-1)
+    apart = motion.touch[:, None] + travelled[:, :, None] * ahead[:, None] - motion.pose[:, :, :2]
+    heading = motion.pose[:, :, 2]
+    x = np.cos(heading) * apart[:, :, 0] + np.sin(heading) * apart[:, :, 1]
+    y = np.cos(heading) * apart[:, :, 1] - np.sin(heading) * apart[:, :, 0]
+    gap = rig.outline.closest(np.stack([x, y], axis=-1).reshape(-1, 2))[2] - 0.00475
+    strongest = np.max(np.linalg.norm(motion.force, axis=-1))
+    assert gap.min() > -strongest / rig.stiffness - 1e-4
+
+
+def test_clean_ratio_is_zero_without_a_change_and_large_with_one(rig: Rig, inputs: SessionInputs) -> None:
+    rng = np.random.default_rng(0)
+    unchanged = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, ())
+    assert recording.clean_ratio(rng, engine.simulate, rig, inputs, unchanged, Change("none")) == 0.0
+    tilt = Effect("tilted_surface", 0.1, Driver("constant", "constant"))
+    idle = Effect("tilted_surface", 0.0, Driver("constant", "constant"))
+    tilted = engine.simulate(rig, inputs.plan, inputs.facts, inputs.noise, (tilt,))
+    assert recording.clean_ratio(rng, engine.simulate, rig, inputs, tilted, Change("library", (tilt,))) > 1.0
+    assert recording.clean_ratio(rng, engine.simulate, rig, inputs, unchanged, Change("library", (idle,))) < 0.01
+
+
+def test_data_and_truth_must_not_contain_each_other(tmp_path: Path) -> None:
+    options = f"make --out {tmp_path} --truth {tmp_path / 'truth'} --seed 1 --count 1"
+    assert command.main(options.split()) == 2
+
+
+def test_bags_contain_the_samples_that_were_written(rig: Rig, tmp_path: Path) -> None:
+    """As the project's own reader, which shares no code with the writer, decodes them."""
+    time = np.array([0.0, 0.25, 0.5])
+    slider = Samples(time, np.array([[0.1, 0.2, 0.015, 3.0], [0.11, 0.2, 0.015, -3.0], [0.12, 0.21, 0.015, 0.5]]))
+    pusher = Samples(time, np.tile([0.05, -0.04, 0.01, 0.0], (3, 1)))
+    wrench = Samples(time + 0.1, np.array([[1.0, 2.0, 3.0, 0.1, 0.2, 0.3]] * 3))
+    room = {"/room/humidity": Samples(time[:2], np.array([[45.5], [46.5]]))}
+    write_bag(tmp_path / "bag", rig, SensedSession(slider, pusher, wrench, room), 7 * messages.SECOND)
+    read = read_recording(tmp_path / "bag")
+    assert np.allclose(np.column_stack([read.slider.x, read.slider.y]), slider.values[:, :2], atol=1e-7)
+    assert np.allclose(read.slider.heading, slider.values[:, 3], atol=1e-12)
+    assert read.slider.stamp.tolist() == [7_000_000_000, 7_250_000_000, 7_500_000_000]
+    assert np.allclose([read.pusher.x[0], read.pusher.y[0], read.pusher.z[0]], [0.05, -0.04, 0.01], atol=1e-8)
+    assert read.wrench is not None and read.rig is not None
+    assert np.allclose([read.wrench.fx[0], read.wrench.fy[0], read.wrench.torque[0]], [1.0, 2.0, 0.3], atol=1e-7)
+    assert [scalar.value.tolist() for scalar in read.scalars.values()] == [[45.5, 46.5]]
+    assert read.rig.object_mass == pytest.approx(rig.mass, abs=1e-4)
+
+
+def test_only_the_module_that_trains_uses_the_project() -> None:
+    """The recordings are independent of the code that is judged by them."""
+    users = set()
+    for path in PACKAGE.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if any(name.split(".")[0] == "push_predictor" or name.startswith("benchmarks.blind") for name in names):
+                users.add(path.name)
+    assert users == {"train.py"}
+
+
+def test_engines_that_are_not_installed_are_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(make, "find_spec", lambda name: None)
+    options = f"make --out {tmp_path / 'data'} --truth {tmp_path / 'truth'} --seed 1 --count 1 --engine mixed"
+    assert command.main(options.split()) == 2
+    assert "pip install '.[foreign]'" in capsys.readouterr().err
+    assert not (tmp_path / "data").exists()
+
+
+def test_training_writes_the_models_that_are_missing(
+    made: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, truth = made
+    command.main(f"train --data {data} --rows 15".split())
+    model = load_model(data / "000" / MODEL)
+    assert (model.name, model.kind, len(model.training)) == ("000", "vhgp", 15)
+    capsys.readouterr()
+    command.main(f"train --data {data} --rows 15".split())
+    assert capsys.readouterr().err == ""
+    with pytest.raises(SystemExit, match="contains no NNN/training"):
+        command.main(f"train --data {truth}".split())
+
+
+def test_mujoco_moves_the_slider_along_with_the_tip(rig: Rig) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install '.[foreign]'")
+    from benchmarks.foreign import mujoco_engine
+
+    few = recording._draw_inputs(np.random.default_rng(5), rig, 2, PushDistribution())
+    motion = mujoco_engine.simulate(rig, few.plan, few.facts, few.noise.scaled(0.0), ())
+    moved = np.linalg.norm(motion.pose[:, -1, :2] - motion.pose[:, 0, :2], axis=1)
+    assert np.all(moved > 0.2 * few.plan.travel) and np.all(moved < 1.5 * few.plan.travel)
