@@ -186,10 +186,10 @@ def _forces(wrench: Track | None, times: Array, tare: Array | None, normal: Arra
     """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left."""
     if wrench is None:
         return {}
-    inside = (wrench.time >= times[0]) & (wrench.time <= times[1])
-    if not np.any(inside):
+    begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
+    if begin >= end:
         return {}
-    force = wrench.values[inside, :2].mean(axis=0) - (np.zeros(2) if tare is None else tare)
+    force = wrench.values[begin:end, :2].mean(axis=0) - (np.zeros(2) if tare is None else tare)
     on_slider = -force  # the wrench is the force of the slider on the pusher
     left = np.array([-normal[1], normal[0]])
     return {"normal_force": float(on_slider @ normal), "tangential_force": float(on_slider @ left)}

@@ -73,7 +73,14 @@ class Track:
 
     def at(self, time: Array) -> Array:
         """Values (m, width) at times (m,), linear between samples and constant beyond them."""
-        return np.column_stack([np.interp(time, self.time, column) for column in self.values.T])
+        around = self._around(float(time.min()), float(time.max())) if len(time) else slice(None)
+        known = self.time[around]
+        return np.column_stack([np.interp(time, known, column) for column in self.values[around].T])
+
+    def _around(self, first: float, last: float) -> slice:
+        """The samples from the last at or before `first` to the first at or after `last`: few of a day's."""
+        begin = int(np.searchsorted(self.time, first, side="right")) - 1
+        return slice(max(begin, 0), int(np.searchsorted(self.time, last)) + 1)
 
     def period_known(self, final: bool) -> bool:
         """Whether the period is known, so that dropouts can be detected.
