@@ -1,0 +1,117 @@
+"""An extension counts only for what its mean brings, over the better of the models without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_up_traces import pushes, slippery
+from synthetic import noisy_pushes, square_rig
+
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.extended_model import extend
+from push_predictor.residuals.extension.held_out_gain import held_out_gain
+from push_predictor.residuals.extension.recalibration import (
+    calibrated_held_out,
+    calibrated_on,
+    uncertainty_of_effects,
+)
+from push_predictor.residuals.extension.refit import refit_base, spread_rows
+
+CONSTANT = DriverBasis("constant")
+ANALYSIS, HELD_OUT = (pushes(count, seed, slippery(0.0)) for count, seed in ((120, 3), (60, 4)))
+
+
+@pytest.fixture(scope="module")
+def deployed() -> PushModel:
+    return train_model(pushes(120, 1), square_rig(), "analytical", name="deployed")
+
+
+def overconfident(model: PushModel, factor: float) -> PushModel:
+    """The model with predicted deviations `factor` times as large."""
+    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (), np.full(3, factor))
+    return replace(model, predictor=predictor)
+
+
+def with_idle_effect(model: PushModel, variance: float) -> PushModel:
+    """The model with an effect of size zero that is uncertain."""
+    idle = Effect("contact_friction", "model_inputs", CONSTANT, np.zeros(1), np.array([[variance]]), np.ones(3))
+    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (idle,), model.predictor.scale)  # type: ignore[union-attr]
+    return replace(model, predictor=predictor)
+
+
+def spread_of(model: PushModel) -> np.ndarray:
+    return evidence_of(model, ANALYSIS).z.std(axis=0)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 4.0])
+def test_calibrated_deviations_fit_the_pushes_whatever_they_were(deployed: PushModel, factor: float) -> None:
+    found = calibrated_on(overconfident(deployed, factor), ANALYSIS)
+    z = evidence_of(found, ANALYSIS).z
+    assert np.mean(np.linalg.norm(z, axis=1) ** 2) == pytest.approx(3.0, rel=0.1)
+
+
+def test_further_covariance_takes_its_share_of_the_calibrated_deviation(deployed: PushModel) -> None:
+    plain = calibrated_on(deployed, ANALYSIS)
+    variance = np.diagonal(plain.predict_rows(ANALYSIS.inputs, ANALYSIS.duration).covariance, axis1=1, axis2=2)
+    extra = 0.36 * np.stack([np.diag(row) for row in variance])
+    narrower = calibrated_on(deployed, ANALYSIS, extra)
+    assert narrower.predictor.scale == pytest.approx(0.8 * plain.predictor.scale, rel=1e-6)  # type: ignore[union-attr]
+
+
+def test_uncertainty_of_an_effect_of_zero_is_no_gain(deployed: PushModel) -> None:
+    """Against an overconfident refit the widened interval alone would look like a gain."""
+    refit = overconfident(deployed, 0.5)
+    found = held_out_gain(refit, refit, with_idle_effect(refit, 0.05), ANALYSIS, HELD_OUT)
+    assert found.nlpd.high > 0.0
+    assert found.nmse.value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_real_effect_is_a_gain_over_both_models(deployed: PushModel) -> None:
+    changed, later = pushes(120, 5, slippery(0.06)), pushes(60, 6, slippery(0.06))
+    refit = refit_base(deployed, changed)
+    linear = DriverBasis("linear", ("elapsed_time",), (0.0,), (1000.0,))
+    after = extend(
+        refit,
+        evidence_of(deployed, changed),
+        [candidate(evidence_of(deployed, changed), "contact_friction", "elapsed_time", linear)],
+    )
+    found = held_out_gain(deployed, refit, after, changed, later)
+    assert found.nlpd.high < 0.0 and found.nmse.high < 0.0
+
+
+def test_the_gain_is_over_the_better_model(deployed: PushModel) -> None:
+    """A refit that is far off is no reference: what beats it need not beat the deployed model."""
+    far_off = train_model(pushes(120, 7, slippery(0.6)), square_rig(), "vhgp", name="far off")
+    found = held_out_gain(deployed, far_off, with_idle_effect(overconfident(deployed, 1.0), 1e-6), ANALYSIS, HELD_OUT)
+    assert found.reference == "deployed" and found.nlpd.high > -0.05
+    turned = held_out_gain(far_off, deployed, with_idle_effect(overconfident(deployed, 1.0), 1e-6), ANALYSIS, HELD_OUT)
+    assert turned.reference == "refit"
+
+
+def test_held_out_calibration_does_not_take_the_fit_for_the_noise() -> None:
+    model = train_model(noisy_pushes(40), square_rig(), "gp", name="learned")
+    found = calibrated_held_out(model)
+    mean, covariance, _ = found.held_out_moments()
+    square = (found.training.outcomes - mean) ** 2 / np.diagonal(covariance, axis1=1, axis2=2)
+    assert square.mean(axis=0) == pytest.approx(np.ones(3), rel=1e-6)
+
+
+def test_uncertainty_of_a_model_without_effects_is_zero(deployed: PushModel) -> None:
+    assert not uncertainty_of_effects(deployed, ANALYSIS).any()
+
+
+def test_a_refit_takes_as_many_rows_as_the_model_had_within_bounds() -> None:
+    small = train_model(noisy_pushes(40), square_rig(), "gp", name="small")  # 120 rows
+    many = noisy_pushes(1200)
+    assert len(spread_rows(small, many)) == 300
+    large = replace(small, training=noisy_pushes(700))
+    assert len(spread_rows(large, many)) == 500
+    assert len(spread_rows(large, many).pushes) > 330

@@ -1,0 +1,125 @@
+"""What a search may trust: inputs inside training, and a contact gap whose noise is not that of the outcome."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import square_pushes, square_rig
+
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
+from push_predictor.residuals.evidence.input_shift import input_shift
+from push_predictor.residuals.evidence.instrument import GAP, with_instrument
+from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.types import Array
+
+
+def trained(table: PushTable, kind: str = "analytical") -> PushModel:
+    return train_model(table, square_rig(), kind, name="deployed", options=TrainingOptions())
+
+
+@pytest.fixture(scope="module")
+def known() -> PushTable:
+    return square_pushes(60)[0]
+
+
+def with_inputs(table: PushTable, column: int, values: Array) -> PushTable:
+    inputs = table.inputs.copy()
+    inputs[:, column] = values
+    return replace(table, inputs=inputs)
+
+
+def test_pushes_like_those_of_training_are_no_shift(known: PushTable) -> None:
+    shift = input_shift(trained(known), known)
+    assert shift.inputs == () and not shift.outside.any()
+
+
+@pytest.mark.parametrize("factor, shifted", [(1.1, False), (0.9, False), (1.4, True), (0.5, True)])
+def test_speeds_beyond_the_margin_are_a_shift(known: PushTable, factor: float, shifted: bool) -> None:
+    one_speed = with_inputs(known, 0, np.full(len(known), 0.02))
+    shift = input_shift(trained(one_speed), with_inputs(known, 0, np.full(len(known), 0.02 * factor)))
+    assert [each.covariate for each in shift.inputs] == (["velocity"] if shifted else [])
+    assert shift.outside.all() == shifted
+    if shifted:
+        assert shift.inputs[0].share_outside == 1.0
+        assert shift.inputs[0].training == (0.02, 0.02) and shift.inputs[0].now == pytest.approx((0.02 * factor,) * 2)
+
+
+def test_a_few_windows_outside_are_no_shift(known: PushTable) -> None:
+    speeds = np.full(len(known), 0.02)
+    speeds[: len(known) // 25] = 0.1
+    model = trained(with_inputs(known, 0, np.full(len(known), 0.02)))
+    assert input_shift(model, with_inputs(known, 0, speeds)).inputs == ()
+
+
+def test_the_most_shifted_input_comes_first(known: PushTable) -> None:
+    narrow = known.take(np.abs(known.inputs[:, 2]) < 0.3)
+    new = with_inputs(known, 0, np.where(np.arange(len(known)) % 10 == 0, 3.0, 1.0) * narrow.inputs[:, 0].max())
+    shift = input_shift(trained(narrow), new)
+    assert [each.covariate for each in shift.inputs] == ["angle", "velocity"]
+    assert shift.inputs[0].share_outside > shift.inputs[1].share_outside >= 0.05
+
+
+def test_contacts_far_from_all_of_training_are_a_shift_and_symmetric_ones_are_not(known: PushTable) -> None:
+    left = known.take(np.mod(4.0 * known.inputs[:, 1], 1.0) < 0.5)
+    model = trained(left)
+    other_side = with_inputs(left, 1, np.mod(left.inputs[:, 1] + 0.25, 1.0))
+    assert input_shift(model, other_side).inputs == ()
+    (shift,) = input_shift(model, with_inputs(left, 1, np.mod(left.inputs[:, 1] + 0.125, 1.0))).inputs
+    assert shift.covariate == "contact" and shift.share_outside > 0.3
+
+
+def test_predicted_deviations_grow_with_the_travel_beyond_training(known: PushTable) -> None:
+    slow = with_inputs(known, 0, np.full(len(known), 0.02))
+    fast = with_inputs(known, 0, np.full(len(known), 0.06))
+    model = trained(slow)
+    evidence = evidence_of(model, fast)
+    wider = widened(evidence, model.training, input_shift(model, fast))
+    assert wider.z == pytest.approx(evidence.z / 3.0)
+    same = evidence_of(model, slow)
+    assert widened(same, model.training, input_shift(model, slow)) is same
+
+
+def test_a_learned_model_is_trained_again_about_mechanics_and_an_analytical_one_stays(known: PushTable) -> None:
+    analytical, learned = trained(known), trained(known, "gp")
+    assert about_mechanics(analytical) is analytical
+    informed = about_mechanics(learned)
+    assert not informed.predictor.absorbs and len(informed.training) == len(learned.training)
+
+
+# --- the instrument of the contact gap ---------------------------------------------------------------------------
+
+
+def gaps(values: list[float], push: list[str]) -> PushTable:
+    n = len(values)
+    return PushTable(
+        np.full((n, 3), 0.02), np.full(n, 0.2), np.zeros((n, 3)), np.array(push), {GAP: np.array(values, dtype=float)}
+    )
+
+
+def test_the_gap_is_that_of_the_pushs_other_windows_but_not_of_the_next() -> None:
+    found = with_instrument(gaps([1.0, 2.0, 4.0, 8.0], ["a"] * 4)).covariates[GAP]
+    assert found == pytest.approx([(4.0 + 8.0) / 2, (1.0 + 8.0) / 2, (1.0 + 2.0) / 2, (1.0 + 2.0 + 4.0) / 3])
+
+
+def test_pushes_do_not_mix_and_a_window_without_others_gets_the_mean() -> None:
+    found = with_instrument(gaps([1.0, 2.0, 4.0, 9.0, 5.0], ["a", "a", "a", "b", "b"])).covariates[GAP]
+    assert found == pytest.approx([4.0, 1.0, 1.5, np.mean([4.0, 1.0, 1.5, 9.0]), 9.0])
+
+
+def test_without_other_windows_the_gap_is_no_covariate() -> None:
+    assert GAP not in with_instrument(gaps([1.0, 2.0, 3.0], ["a", "b", "c"])).covariates
+
+
+def test_noise_that_gap_and_outcome_share_is_gone_from_the_instrument() -> None:
+    rng = np.random.default_rng(3)
+    sample = rng.normal(size=(400, 6))  # of the tracker, at the windows' starts and ends
+    push = np.repeat([f"{k}" for k in range(400)], 5)
+    gap, outcome = sample[:, :5].ravel(), (sample[:, 1:] - sample[:, :-1]).ravel()
+    found = with_instrument(gaps(gap.tolist(), push.tolist())).covariates[GAP]
+    assert np.corrcoef(gap, outcome)[0, 1] < -0.5
+    assert abs(np.corrcoef(found, outcome)[0, 1]) < 0.06
