@@ -1,37 +1,60 @@
-"""Time of one prediction of an extended model in the server's process, effect by effect.
+"""Time of one prediction of an extended model in the server's process: effects computed, and from a table.
 
     python -m benchmarks.models.extended_latency [--pushes N] [--seed K]
 
-No ROS. The base is a GP of 300 simulated windows. Every push is predicted by the tabulated base, by the tabulated
-extended model, and by the latter with array code for its effects (as before scalar code), in turns, so that all share
-the machine's load. Ratio: to the base's prediction in the same run. Apart: largest difference of a mean between scalar
-code and the model itself, in predicted standard deviations.
+No ROS. The base is a GP of 300 simulated windows, alone or about mechanics, or the analytical model. Every push is
+predicted by the tabulated base, by the extended model with computed effects (before) and with a table of them (now),
+in turns, so that all share the machine's load. Ratio: before to now. Apart: differences of means between both, in
+predicted standard deviations; those of covariances, relative, as tables are judged. Build: CPU time of the table.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
 from benchmarks.models.made_up_models import (
+    DRIFT,
     analytical_model,
     base_model,
     drifting_effect,
     extended_model,
+    informed_model,
     made_up_table,
+    spread_effect,
 )
-from push_predictor.models.mechanisms import Push
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import Moments
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.tabulated.tabulated_model import tabulate
+from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
 Ask = Callable[[Array, Array, Mapping[str, Array]], Prediction]
+
+ALWAYS = DriverBasis("constant")
+LATER = DriverBasis("step", ("elapsed_time",), place=500.0)
+AROUND = DriverBasis("periodic", ("slider_heading",))
+MAP = DriverBasis("map", ("slider_x", "slider_y"), (0.0, 0.0), (0.1, 0.1))
+EFFECTS: dict[str, tuple[Effect, ...]] = {
+    "friction, constant": (spread_effect("contact_friction", ALWAYS),),
+    "friction, step": (spread_effect("contact_friction", LATER),),
+    "friction, linear": (spread_effect("contact_friction", DRIFT),),
+    "friction, map": (spread_effect("contact_friction", MAP, 0.4),),
+    "friction, periodic": (spread_effect("contact_friction", AROUND),),
+    "centre, linear": (spread_effect("centre_of_friction", DRIFT),),
+    "grain of the table": (spread_effect("anisotropic_friction", ALWAYS),),
+    "centre, step; friction, linear": (
+        spread_effect("centre_of_friction", LATER),
+        spread_effect("contact_friction", DRIFT),
+    ),
+    "polynomial, linear": (drifting_effect(None, *np.full(18, 0.1)),),
+}
 
 
 def main() -> None:
@@ -40,38 +63,29 @@ def main() -> None:
     parser.add_argument("--pushes", type=int, default=300, help="of each model (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of the pushes (default 1)")
     options = parser.parse_args()
-    base, table = base_model(), made_up_table(options.pushes, options.seed)
-    friction, centre = drifting_effect("contact_friction", 0.05), drifting_effect("centre_of_friction", 1e-3, 1e-3)
-    models = {
-        "contact_friction": extended_model(base, friction),
-        "centre_of_friction": extended_model(base, centre),
-        "both": extended_model(base, friction, centre),
-        "generic": extended_model(base, drifting_effect(None, *np.full(18, 0.1))),
-        "anisotropic_friction": extended_model(base, drifting_effect("anisotropic_friction", 0.1, 0.05)),
-        "analytical, no effect": analytical_model(base),
-    }
-    print(f"{'p50, us':24s}{'base':>8s}{'before':>8s}{'now':>8s}{'ratio':>8s}{'was':>8s}{'apart':>10s}")
-    for name, model in models.items():
-        first, before, now = _times([tabulate(base).predict_rows, _before(model), tabulate(model).predict_rows], table)
-        print(
-            f"{name:24s}{first:8.0f}{before:8.0f}{now:8.0f}{now / first:8.1f}{before / first:8.1f}"
-            f"{_apart(model, table):10.1e}"
-        )
+    learnt, table = base_model(), made_up_table(options.pushes, options.seed)
+    bases = {"GP": learnt, "GP about mechanics": informed_model(learnt), "analytical": analytical_model(learnt)}
+    print(
+        "| base | effects | base, us | before, us | now, us | ratio "
+        "| means apart: median | 99 % | covariances: 99 % | build, s |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name, base in bases.items():
+        for effects, acting in EFFECTS.items():
+            print(f"| {name} | {effects} | {_row(base, extended_model(base, *acting), table)} |", flush=True)
 
 
-def _before(model: PushModel) -> Ask:
-    """Predictions by the tabulated base and array code for the effects."""
-    predictor = model.predictor
-    if not predictor.effects:
-        return model.predict_rows
-    base = tabulate(model.base)
-
-    def predict_rows(inputs: Array, duration: Array, covariates: Mapping[str, Array]) -> Prediction:
-        found = base.predict_rows(inputs, duration)
-        moments = Moments(found.mean, found.covariance, found.process_covariance)
-        return Prediction(*predictor.with_effects(moments, Push(inputs, duration, covariates)), found.in_domain)
-
-    return predict_rows
+def _row(base: PushModel, model: PushModel, table: PushTable) -> str:
+    computed, start = tabulate(model), process_time()
+    tabled = with_effect_table(computed)
+    build = process_time() - start
+    plain, before, now = _times([m.predict_rows for m in (tabulate(base), computed, tabled)], table)
+    times = f"{plain:.0f} | {before:.0f} | {now:.0f} | {before / now:.1f}"
+    if tabled.effects is None:
+        return f"{times} | no table | | | {build:.1f}"
+    of_mean, of_covariance = _apart(computed, tabled, table)
+    apart = f"{np.median(of_mean):.4f} | {np.quantile(of_mean, 0.99):.3f}"
+    return f"{times} | {apart} | {100.0 * np.quantile(of_covariance, 0.99):.1f} % | {build:.1f}"
 
 
 def _times(asks: list[Ask], table: PushTable) -> list[float]:
@@ -86,15 +100,11 @@ def _times(asks: list[Ask], table: PushTable) -> list[float]:
     return [float(np.median(taken)) * 1e6 for taken in times]
 
 
-def _apart(model: PushModel, table: PushTable) -> float:
-    """Largest difference of a mean between scalar and array code over single pushes, in standard deviations."""
-    tabulated, before, apart = tabulate(model), _before(model), 0.0
-    for k in range(len(table)):
-        row = table.take(np.arange(k, k + 1))
-        ours, theirs = (ask(row.inputs, row.duration, row.covariates) for ask in (tabulated.predict_rows, before))
-        sd = np.sqrt(np.diagonal(theirs.covariance[0]))
-        apart = max(apart, float(np.max(np.abs(ours.mean - theirs.mean) / sd)))
-    return apart
+def _apart(computed: TabulatedModel, tabled: TabulatedModel, table: PushTable) -> tuple[Array, Array]:
+    """Per push, the largest difference of a mean, in standard deviations, and the relative one of the covariance."""
+    ours, theirs = (model.predict_rows(table.inputs, table.duration, table.covariates) for model in (tabled, computed))
+    of_mean = (np.abs(ours.mean - theirs.mean) / theirs.std).max(axis=1)
+    return np.asarray(of_mean), relative_error(ours.covariance, theirs.covariance)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.driver_basis import DriverBasis, columns_of
+from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.predictors import ExtendedPredictor
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.parameters import BY_NAME
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 
@@ -26,6 +29,7 @@ def made_up_table(count: int, seed: int) -> PushTable:
     duration = np.full(count, 0.2)
     outcomes = square_physics().displacement(inputs, duration) + rng.normal(size=(count, 3)) * [1e-4, 1e-4, 3e-3]
     covariates = {"elapsed_time": np.linspace(0.0, 1000.0, count), "slider_heading": rng.uniform(-np.pi, np.pi, count)}
+    covariates |= {name: rng.uniform(-0.1, 0.1, count) for name in ("slider_x", "slider_y")}
     return PushTable(inputs, duration, outcomes, np.array([f"p{k}" for k in range(count)]), covariates)
 
 
@@ -47,6 +51,23 @@ def base_model() -> PushModel:
 def analytical_model(base: PushModel) -> PushModel:
     """The analytical model of the same windows."""
     return train_model(base.training, square_rig(), "analytical", name="analytical")
+
+
+def informed_model(base: PushModel) -> PushModel:
+    """A GP of the same windows about mechanics with the square's pressure and a shifted centre."""
+    mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
+    fitted = FittedMechanics(mechanics, {"contact_friction": 0.28, "centre_x": 0.001})
+    options = TrainingOptions(about=MechanicsMean(fitted, 0.004))
+    return train_model(base.training, square_rig(), "gp", name="informed", options=options)
+
+
+def spread_effect(mechanism: str, basis: DriverBasis, size: float = 1.0) -> Effect:
+    """An exact effect of alternating signs, known to 10 %; size: in usual spreads of the parameters."""
+    width = columns_of(basis)
+    spreads = np.repeat([BY_NAME[name].spread for name in mechanism_named(mechanism).quantities], width)
+    coefficients = size * spreads * np.where(np.arange(len(spreads)) % 2, -1.0, 1.0)
+    covariance = np.diag(0.1 * np.abs(coefficients)) ** 2
+    return Effect(mechanism, "any", basis, coefficients, covariance, np.array([0.02, 0.02, 0.5]), exact=True)
 
 
 def drifting_effect(mechanism: str | None, *size: float) -> Effect:

@@ -17,7 +17,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean
+from push_predictor.models.predictors import ExtendedPredictor, MechanicsMean, MechanicsPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated import effect_table_build
@@ -39,7 +39,7 @@ OUTCOME = np.array([0.02, 0.02, 0.5])
 @pytest.fixture(autouse=True)
 def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     """A third of the usual work; tables that are a little too coarse are used nevertheless."""
-    monkeypatch.setattr(effect_table_build, "MOST_WORK", 70_000)
+    monkeypatch.setattr(effect_table_build, "WORK", (70_000,))
     monkeypatch.setattr(effect_table_build, "COARSEST", 0.0)
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.5)
     monkeypatch.setattr(effect_table_build, "COVARIANCE_TOLERANCE", 0.3)
@@ -69,15 +69,15 @@ CASES = {
 
 @cache
 def base(kind: str) -> PushModel:
-    """About nothing, about mechanics with a shifted centre, or the analytical model alone."""
+    """About nothing, about mechanics with a shifted centre, these mechanics alone, or the analytical model."""
     rows = pushes(60)
-    if kind == "analytical":
-        return train_model(rows, square_rig(), "analytical", name=kind)
-    options = TrainingOptions()
-    if kind == "about mechanics":
-        mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
-        fitted = FittedMechanics(mechanics, {"contact_friction": 0.25, "centre_x": 0.003})
-        options = TrainingOptions(about=MechanicsMean(fitted, 0.004))
+    mechanics = PushMechanics(square_rig().outline, square_rig().pusher_radius)
+    fitted = FittedMechanics(mechanics, {"contact_friction": 0.25, "centre_x": 0.003})
+    if kind in ("analytical", "fitted"):
+        model = train_model(rows, square_rig(), "analytical", name=kind)
+        covariance = np.diag(np.array([1e-4, 1e-4, 3e-3]) ** 2)
+        return model if kind == "analytical" else replace(model, predictor=MechanicsPredictor(fitted, covariance))
+    options = TrainingOptions(about=MechanicsMean(fitted, 0.004)) if kind == "about mechanics" else TrainingOptions()
     return train_model(rows, square_rig(), "gp", name=kind, options=options)
 
 
@@ -114,8 +114,15 @@ def assert_equal(one: Prediction, other: Prediction, **precision: float) -> None
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), **(precision or {"rtol": 1e-12}))
 
 
-@pytest.mark.parametrize("kind", ["about nothing", "about mechanics", "analytical"])
-@pytest.mark.parametrize("case", ["step and linear", "linear"])
+@pytest.mark.parametrize(
+    ("kind", "case"),
+    [
+        *[("about nothing", case) for case in ("linear", "step and linear")],
+        *[("about mechanics", case) for case in ("linear", "step and linear")],
+        *[("analytical", case) for case in ("linear", "step and linear")],
+        ("fitted", "linear"),
+    ],
+)
 def test_table_is_close_to_the_exact_effects(kind: str, case: str) -> None:
     assert_close(kind, case)
 
@@ -165,6 +172,7 @@ def with_covariate(rows: PushTable, name: str, values: Array) -> PushTable:
 
 OUTSIDE = {
     "angle": lambda rows: with_inputs(rows, 2, 1.1),
+    "angle to the right": lambda rows: with_inputs(rows, 2, -1.1),
     "speed": lambda rows: with_inputs(rows, 0, 0.03),
     "covariate": lambda rows: with_covariate(rows, "elapsed_time", np.full(len(rows), 2000.0)),
 }
@@ -230,6 +238,36 @@ def test_an_effect_of_size_zero_leaves_the_base_its_mean() -> None:
     assert np.abs(widened[~later]).max() < 1e-12 and np.median(widened[later]) > 1e-7
 
 
+def test_covariance_that_effects_share_is_in_the_table() -> None:
+    plain = extended("analytical", *CASES["constant"], effect("contact_friction", DRIFT))
+    assert isinstance(plain.predictor, ExtendedPredictor)
+    shared = replace(plain.predictor, cross={(0, 1): np.array([[-0.9 * 0.015**2]])})
+    computed = tabulate(replace(plain, predictor=shared))
+    table, rows = with_effect_table(computed), inside()
+    assert table.effects is not None
+    found, exact, apart = (predicted(model, rows) for model in (table, computed, tabulate(plain)))
+    difference = relative_error(apart.covariance, exact.covariance)
+    assert np.quantile(relative_error(found.covariance, exact.covariance), 0.9) < 0.1 * np.quantile(difference, 0.9)
+
+
+def test_covariate_beyond_the_training_is_out_of_domain_even_where_the_table_has_its_change() -> None:
+    _, table = both("analytical", "step and linear")
+    step = with_effect_table(tabulate(extended("analytical", effect("contact_friction", LATER))))
+    late = with_covariate(inside(8), "elapsed_time", np.full(len(inside(8)), 2000.0))
+    found = predicted(step, late)
+    assert not found.in_domain.any() and not single(step, late).in_domain[0]
+    assert predicted(table, inside(8)).in_domain.all()
+
+
+def test_changes_end_at_the_largest_that_a_rig_can_have() -> None:
+    large = replace(effect("pressure_spread", LATER), coefficients=np.array([-1.6]))  # where -1.0 is possible
+    computed = tabulate(extended("analytical", large))
+    table, rows = with_effect_table(computed), inside()
+    assert table.effects is not None, table.how
+    found, exact = predicted(table, rows), predicted(computed, rows)
+    assert np.quantile(np.abs(found.mean - exact.mean) / exact.std, 0.95) < 0.1
+
+
 def test_before_a_step_the_prediction_is_that_of_the_base() -> None:
     table = with_effect_table(tabulate(extended("analytical", effect("contact_friction", LATER))))
     rows = inside()
@@ -272,7 +310,18 @@ def test_inaccurate_table_is_refused_with_its_errors(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 1e-6)
     table = with_effect_table(tabulate(extended("analytical", *CASES["constant"])))
     assert table.effects is None
-    assert "too far off" in table.how and "standard deviations" in table.how
+    assert "effects: exact; a table of" in table.how and "standard deviations" in table.how
+
+
+def test_a_finer_table_is_tried_where_a_coarse_one_is_inaccurate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(effect_table_build, "WORK", (3_000, 70_000))
+    monkeypatch.setattr(effect_table_build, "MEAN_TOLERANCE", 0.15)
+    found = with_effect_table(tabulate(extended("analytical", *CASES["linear"])))
+    monkeypatch.setattr(effect_table_build, "WORK", (3_000,))
+    assert found.effects is not None and found.effects.knots > 30_000
+    assert with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).effects is None
+    monkeypatch.setattr(effect_table_build, "COARSEST", 9.0)
+    assert "too many knots" in with_effect_table(tabulate(extended("analytical", *CASES["linear"]))).how
 
 
 def test_mechanics_that_depend_on_the_recording_have_no_table() -> None:

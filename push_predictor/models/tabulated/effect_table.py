@@ -197,9 +197,9 @@ class EffectTable:
     slopes: TensorSpline
 
     @property
-    def anchored(self) -> bool:
-        """See EffectSource."""
-        return self.source.anchored
+    def knots(self) -> int:
+        """Number of knots of both splines."""
+        return self.moved.knots + self.slopes.knots
 
     def located(self, push: Push) -> Located:
         """Where n pushes, with all covariates that the effects need, lie in the table."""

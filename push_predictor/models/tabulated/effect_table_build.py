@@ -21,7 +21,7 @@ CELLS = {"place": 40.0, "angle": 80.0, "heading": 16.0, "change": 10.0}
 SPEED_CELLS = 3  # displacement per speed is nearly a parabola of the speed
 FEWEST_CELLS, FINEST = 4, 2.0  # cells of an axis; factor on CELLS
 COARSEST = 0.2  # factor on CELLS, below which a table is not tried
-MOST_WORK = 200_000  # integrations for a table: some microseconds each
+WORK = (200_000, 800_000)  # integrations for a table, some microseconds each; tried in turn
 ONE_SPEED = 1.02  # ratio of the largest to the smallest speed, up to which they count as one
 ANYWHERE = 0.37  # of the perimeter: how far a circle is turned to see whether that matters
 PROBES = 64  # random pushes that show which axes matter
@@ -36,22 +36,26 @@ def build_effect_table(model: PushModel) -> tuple[EffectTable | None, str]:
     predictor, rows = model.predictor, model.training
     assert isinstance(predictor, ExtendedPredictor)
     if RECORDING in predictor.needs:
-        return None, "the mechanics depend on the recording"
+        return None, "exact: the mechanics depend on the recording"
     if not len(rows):
-        return None, "there are no training pushes"
+        return None, "exact: there are no training pushes"
     source = EffectSource(predictor, model.usual_duration)
     push = predictor.completed(Push(rows.inputs, rows.duration, rows.covariates))
     change = change_axes(*source.changes(push))
     if change is None:
-        return None, "the changes take too many values"
-    table, how = _Builder.of(source, push, change).table()
-    if table is None:
-        return None, how
-    of_mean, of_covariance = table_errors(model, table)
-    how = f"{how}, means to {of_mean:.2g} standard deviations, covariances to {100.0 * of_covariance:.2g} %"
-    if of_mean > MEAN_TOLERANCE or of_covariance > COVARIANCE_TOLERANCE:
-        return None, f"a {how}; too far off"
-    return table, how
+        return None, "exact: the changes take too many values"
+    builder, how = _Builder.of(source, push, change), ""
+    for work in WORK:
+        if (table := builder.table(work)) is None:
+            how += "; a table would need too many knots"
+            continue
+        of_mean, of_covariance = table_errors(model, table)
+        found = f"table of {table.knots} knots, means to {of_mean:.2g} standard deviations"
+        found += f", covariances to {100.0 * of_covariance:.2g} %"
+        if of_mean <= MEAN_TOLERANCE and of_covariance <= COVARIANCE_TOLERANCE:
+            return table, found
+        how += f"; a {found}"
+    return None, f"exact{how}"
 
 
 def table_errors(model: PushModel, table: EffectTable) -> tuple[float, float]:
@@ -135,16 +139,15 @@ class _Builder:
         heading = rng.uniform(-np.pi, np.pi, PROBES)
         return rng.uniform(low, high, (PROBES, 3)), heading, self.change.changes(level, places)
 
-    def table(self) -> tuple[EffectTable | None, str]:
-        """The finest table that is not too much work."""
+    def table(self, work: int) -> EffectTable | None:
+        """The finest table for this work; None if it would be too coarse to try."""
         parameters = max(len(self.source.names), 1)
-        moved, slopes = self._factor(MOST_WORK, 1), self._factor(MOST_WORK, 2 * parameters)
+        moved, slopes = self._factor(work, 1), self._factor(work, 2 * parameters)
         if slopes < COARSEST:
-            return None, "they depend on too much"
+            return None
         splines = self._spline(self._axes(moved), self._moved), self._spline(self._axes(slopes), self.source.slopes)
         axes = self.place, self.change, self.angles, self.speeds, self.by_speed, self.by_heading, self.any_duration
-        table = EffectTable(self.source, *axes, *splines)
-        return table, f"table of {splines[0].knots + splines[1].knots} knots"
+        return EffectTable(self.source, *axes, *splines)
 
     def _spline(self, axes: list[Axis], values: Callable[[Array, Array, Array], Array]) -> TensorSpline:
         boxes = self.place.edges * len(self.change.levels)

@@ -18,12 +18,40 @@ from push_predictor.types import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
-class TabulatedDomain:
+class FeatureBox:
     """The box of features, from low (F,) to high (F,), of PushModel.in_domain, margin included."""
 
     chart: Chart
     low: Array
     high: Array
+
+    def located(self, push: Sequence[float]) -> tuple[float, int] | None:
+        """Place and box of one push in the domain, in plain numbers; else None."""
+        velocity, contact, angle = push
+        place, box = self.chart.place_one(contact)
+        features = (velocity, *self.chart.place_features(place, box), angle)
+        for feature, (low, high) in zip(features, self._bounds, strict=True):
+            if not low <= feature <= high:
+                return None
+        return place, box
+
+    @cached_property
+    def _bounds(self) -> list[tuple[float, float]]:
+        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
+
+
+def feature_box(model: PushModel) -> FeatureBox:
+    """The box of a model's training rows."""
+    features = push_features(model.rig.outline, model.training.inputs)
+    least, most = features.min(axis=0), features.max(axis=0)
+    margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
+    return FeatureBox(push_chart(model.rig.outline), least - margin, most + margin)
+
+
+@dataclass(frozen=True, eq=False)
+class TabulatedDomain(FeatureBox):
+    """The domain with its table."""
+
     table: PredictionTable
 
     def predict(self, inputs: Array) -> tuple[BoolArray, Prediction | None]:
@@ -39,19 +67,12 @@ class TabulatedDomain:
 
     def predict_one(self, push: Sequence[float]) -> Prediction | None:
         """The prediction for one push in the domain, in plain numbers, several times as fast; else None."""
-        velocity, contact, angle = push
-        place, box = self.chart.place_one(contact)
-        features = (velocity, *self.chart.place_features(place, box), angle)
-        for feature, (low, high) in zip(features, self._bounds, strict=True):
-            if not low <= feature <= high:
-                return None
-        numbers = np.array(self.table.moments_one((velocity, place, angle), box))
+        if (located := self.located(push)) is None:
+            return None
+        place, box = located
+        numbers = np.array(self.table.moments_one((push[0], place, push[2]), box))
         covariance, process_covariance = numbers[3:].reshape(2, 1, 3, 3)
         return Prediction(numbers[None, :3], covariance, process_covariance, np.array([True]))
-
-    @cached_property
-    def _bounds(self) -> list[tuple[float, float]]:
-        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
 
 def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refinement: float = 1.0) -> TabulatedDomain:
@@ -59,7 +80,5 @@ def tabulated_domain(model: PushModel, predictor: GaussianProcessPredictor, refi
     inputs, chart = model.training.inputs, push_chart(model.rig.outline)
     low, high = inputs.min(axis=0), inputs.max(axis=0)
     low[1], high[1] = chart.place_range(chart.place(inputs[:, 1])[0])
-    features = push_features(model.rig.outline, inputs)
-    least, most = features.min(axis=0), features.max(axis=0)
-    margin = DOMAIN_MARGIN + 1e-6 * np.abs(most)
-    return TabulatedDomain(chart, least - margin, most + margin, tabulate(predictor, chart, low, high, refinement))
+    box = feature_box(model)
+    return TabulatedDomain(chart, box.low, box.high, tabulate(predictor, chart, low, high, refinement))

@@ -35,7 +35,7 @@ from push_predictor.models.tabulated.effect_table_build import build_effect_tabl
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.single_effects import SingleEffects
 from push_predictor.models.tabulated.table_accuracy import relative_error
-from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain, tabulated_domain
+from push_predictor.models.tabulated.tabulated_domain import FeatureBox, TabulatedDomain, feature_box, tabulated_domain
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
@@ -108,9 +108,7 @@ class TabulatedModel:
 
     def _shifted(self, push: Push, shift: Shift) -> Prediction:
         """Predictions from what the base adds to a table of effects, and the shift in that table."""
-        assert self.effects is not None
-        rest, scale = self._added(push), self.effects.source.predictor.scale
-        factor = np.outer(scale, scale)
+        rest, factor = self._added(push), self._factor
         return Prediction(
             rest.mean + shift.mean,
             rest.covariance * factor + shift.covariance,
@@ -147,6 +145,21 @@ class TabulatedModel:
         return _without_mean(self.model.base)
 
     @cached_property
+    def _factor(self) -> Array:
+        """Factor (3, 3) on the base's covariances."""
+        assert self.effects is not None
+        return np.outer(self.effects.source.predictor.scale, self.effects.source.predictor.scale)
+
+    @cached_property
+    def _box(self) -> FeatureBox:
+        return feature_box(self.model)
+
+    def _in_domain(self, inputs: Array) -> BoolArray:
+        if len(inputs) > 1:
+            return self.model.in_domain(inputs)
+        return np.array([self._box.located(inputs[0].tolist()) is not None])
+
+    @cached_property
     def _single_effects(self) -> SingleEffects:
         assert self.effects is not None
         return SingleEffects(self.effects)
@@ -156,7 +169,7 @@ class TabulatedModel:
         predictor, n = self.model.predictor.base, len(push.inputs)
         if isinstance(predictor, AnalyticalPredictor | MechanicsPredictor):
             covariance = np.broadcast_to(predictor.covariance, (n, 3, 3))
-            return Prediction(np.zeros((n, 3)), covariance, covariance, self.model.in_domain(push.inputs))
+            return Prediction(np.zeros((n, 3)), covariance, covariance, self._in_domain(push.inputs))
         if self.domain is None:
             learnt = self._residual.predict_rows(push.inputs, push.duration, push.covariates)
         else:
