@@ -11,7 +11,7 @@ recording. The new one has an effect drawn from benchmarks/blind/effects.py, non
 was drawn goes to a separate folder, which `run` does not receive. oracle: the gain of a model with the true mechanism,
 driver and form. removed: like run, on the recordings with an effect of the library, each traced without the mechanism
 that acts in it, so that it must come back as unknown. run, oracle and removed continue an interrupted run. Results and
-truth of a number are JSON files NNN.json.
+truth of a number are JSON files NNN.json. run, oracle and score also accept what `python -m benchmarks.foreign` made.
 """
 
 from __future__ import annotations

@@ -6,8 +6,9 @@ The registry is separate: nothing in push_predictor.residuals reads it, and it r
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Kind:
     sizes: tuple[float, float, float]
     acts: Acts
     drivers: tuple[str, ...] = ("constant",)
-    constant: tuple[str, ...] = ("model_inputs",)
+    constant: tuple[str, ...] = ("model_inputs", "session")
     only_smaller: float = np.inf
     alone: float = 1.0
 
@@ -79,7 +80,8 @@ class Driver:
 class Drawn:
     """An effect as drawn: the truth about a recording.
 
-    course: linear, saturating, step or the driver's own. place: of a step, in the unit of the driver.
+    course: linear, saturating, step or the driver's own. place: of a step, in the unit of the driver. act: what
+    changes, with that of the second effect if there are two.
     """
 
     kind: str
@@ -93,6 +95,12 @@ class Drawn:
     course: str = ""
     place: float | None = None
     act: Changes | Faults = field(default_factory=Changes, compare=False, repr=False)
+    second: Drawn | None = None
+
+    def described(self) -> dict[str, Any]:
+        """The truth for its file; of a second effect under the key `second`."""
+        facts = {name: value for name, value in vars(self).items() if name not in ("act", "second")}
+        return {**facts, "second": self.second.described() if self.second else None}
 
 
 def draw(kind: Kind, size: str, world: World) -> Drawn:
@@ -111,6 +119,23 @@ def draw(kind: Kind, size: str, world: World) -> Drawn:
     )  # fmt: skip
 
 
+def with_second(first: Drawn, world: World) -> Drawn:
+    """An effect of the library and another one that changes other properties of the rig."""
+    acting = _laws(first.act)
+    for place in world.rng.permutation(len(IN_LIBRARY)):
+        other = draw(IN_LIBRARY[place], str(world.rng.choice(SIZES)), world)
+        laws = _laws(other.act)
+        if not acting.keys() & laws.keys():
+            return replace(first, act=Changes(**acting, **laws), second=other)
+    raise AssertionError("the library changes several properties")
+
+
+def _laws(act: Changes | Faults) -> dict[str, Any]:
+    """The changed properties of the rig by their names in Changes."""
+    assert isinstance(act, Changes)  # the library has no errors of measurement
+    return {name: law for name, law in vars(act).items() if callable(law)}
+
+
 def undisturbed() -> Drawn:
     """No effect: the recording is like the training recording."""
     return Drawn("none", "none", (), (), "constant", "none", 0.0, "")
@@ -120,13 +145,14 @@ def _strength(driver: Driver, world: World) -> tuple[Strength, str, float | None
     """Strength of an effect at a moment, 0 to 1 over the recording; its course; the place of a step."""
     if driver.name in SPECIAL:
         return SPECIAL[driver.name](world), driver.name, None
-    values = world.conditions.values[driver.name]
+    name = "push_index" if driver.name == "onset" else driver.name
+    values = world.conditions.values[name]
     low, high = float(values.min()), float(values.max())
-    shape = str(world.rng.choice(["linear", "linear", "saturating", "step"] if driver.form == "linear" else ["linear"]))
+    shape = str(world.rng.choice(COURSES.get(driver.form, ("linear",))))
     place = low + float(world.rng.uniform(0.3, 0.7)) * (high - low)
 
     def strength(moment: Moment) -> Array:
-        value = moment.conditions.values[driver.name]
+        value = moment.conditions.values[name]
         share = (value - low) / max(high - low, 1e-12)
         return np.asarray(SHAPES[shape](share) if shape != "step" else (value >= place).astype(np.float64))
 
@@ -160,6 +186,7 @@ SHAPES: Mapping[str, Callable[[Array], Array]] = {
     "linear": lambda share: share,
     "saturating": lambda share: (1.0 - np.exp(-4.0 * share)) / (1.0 - np.exp(-4.0)),
 }
+COURSES = {"linear": ("linear", "linear", "saturating", "step"), "step": ("step",)}  # of a form, by their shares
 SPECIAL: Mapping[str, Callable[[World], Strength]] = {
     "constant": _always,
     "edge": _on_an_edge,
@@ -173,6 +200,7 @@ DRIVERS = {
         Driver("slid_distance", ("slid_distance",), "linear"),
         Driver("elapsed_time", ("elapsed_time",), "linear"),
         Driver("push_index", ("push_index",), "linear"),
+        Driver("onset", ("push_index", "elapsed_time", "slid_distance"), "step"),
         Driver("dwell_time", ("dwell_time",), "linear"),
         Driver("velocity", ("velocity",), "quadratic"),
         Driver(TEMPERATURE, (f"topic:/{TEMPERATURE}",), "linear"),
@@ -321,38 +349,40 @@ def _unit(world: World) -> Array:
     return np.array([np.cos(turn), np.sin(turn)])
 
 
-SIDES = ("edge", "model_inputs")
-HEADED = ("push_heading", "slider_heading")
+SIDES = ("edge", "model_inputs", "session")
+HEADED = ("push_heading", "slider_heading", "session")
 IN_LIBRARY = (
     Kind("contact_friction", ("contact_friction",), "motion", "1", (0.1, 0.25, 0.5), _rod,
-         ("constant", *DRIFTS, *DRIFTS, "dwell_time", "velocity", "edge", "place", "push_heading"), only_smaller=0.2),
-    Kind("pressure_spread", ("pressure_spread",), "motion", "1", (0.7, 1.5, 2.5), _spread, ("constant", *DRIFTS)),
+         ("constant", "onset", "onset", *DRIFTS, *DRIFTS, "dwell_time", "velocity", "edge", "place", "push_heading"),
+         only_smaller=0.2),
+    Kind("pressure_spread", ("pressure_spread",), "motion", "1", (0.7, 1.5, 2.5), _spread,
+         ("constant", "onset", *DRIFTS)),
     Kind("centre_of_friction", ("centre_of_friction",), "motion", "m", (0.005, 0.012, 0.024), _shifted,
-         ("constant", *DRIFTS), SIDES, alone=0.6),
+         ("constant", "onset", *DRIFTS), SIDES, alone=0.6),
     Kind("anisotropic_friction", ("anisotropic_friction",), "motion", "1", (0.2, 0.45, 0.75), _grain,
-         ("constant", "constant", *DRIFTS), HEADED, alone=0.3),
+         ("constant", "constant", "onset", *DRIFTS), HEADED, alone=0.3),
     Kind("body_anisotropy", ("body_anisotropy",), "motion", "1", (0.2, 0.45, 0.75), _runners,
-         ("constant", "constant", *DRIFTS), SIDES, alone=0.4),
+         ("constant", "constant", "onset", *DRIFTS), SIDES, alone=0.4),
     Kind("tilted_surface", ("tilted_surface",), "motion", "N/N", (0.025, 0.05, 0.1), _tilt,
-         ("constant", "constant", *DRIFTS), HEADED, alone=0.25),
+         ("constant", "constant", "onset", *DRIFTS), HEADED, alone=0.25),
 )  # fmt: skip
 OUTSIDE = (
     Kind("breakaway", (None, "contact_friction"), "motion", "1", (0.1, 0.2, 0.4), _breakaway,
          constant=("dwell_time", "time_since_contact")),
     Kind("worn_spot", (None, "contact_friction"), "motion", "1", (0.1, 0.15, 0.22), _worn_spot,
-         constant=("contact", "edge", "model_inputs"), only_smaller=0.22),
+         constant=("contact", "edge", "model_inputs", "session"), only_smaller=0.22),
     Kind("cable", (None, "tilted_surface"), "motion", "N/N at 0.1 m", (0.1, 0.2, 0.4), _cable,
          constant=("slider_x", "slider_y")),
     Kind("twisted_cable", (None,), "motion", "N/N", (0.05, 0.12, 0.3), _twisted_cable),
     Kind("bending_rod", (None, "tool_offset"), "motion", "m at full friction", (3e-4, 1e-3, 3e-3), _bending,
-         constant=("model_inputs", "contact", "angle", "contact_gap", "edge")),
+         constant=("model_inputs", "session", "contact", "angle", "contact_gap", "edge")),
 )  # fmt: skip
 WRENCH_ONLY = (
     Kind("surface_friction", ("surface_friction",), "wrench", "1", (0.1, 0.2, 0.4), _slippery_table,
          ("constant", *DRIFTS)),
     Kind("ballast", ("surface_friction",), "wrench", "kg", (0.1, 0.2, 0.4), _ballast),
     Kind("viscous_drag", ("surface_friction", None), "wrench", "N/N at 20 mm/s", (0.2, 0.5, 1.5), _viscous,
-         constant=("velocity", "model_inputs")),
+         constant=("velocity", "model_inputs", "session")),
 )  # fmt: skip
 MEASUREMENT = (
     Kind("clock_offset", ("clock_offset",), "measurement", "s", (0.005, 0.015, 0.04), _late_clock),

@@ -25,7 +25,7 @@ from push_predictor.residuals.extension.refit import refit_base
 def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> dict[str, float] | None:
     """NLPD after minus refit on the held-out pushes: value, low, high; None if the mean of the motion is unchanged.
 
-    A mechanism outside the library becomes the generic response to the true driver.
+    A mechanism outside the library becomes the generic response to the true driver. Of two effects both are given.
     """
     if truth["channel"] != "motion":
         return None
@@ -34,7 +34,8 @@ def oracle_gain(recording: Path, model_path: Path, truth: Mapping[str, Any]) -> 
     analysis, rest = table.take(~held_out), table.take(held_out)
     refit = refit_base(model, analysis)
     evidence = evidence_of(model, analysis)
-    after = extend(refit, evidence, [candidate(evidence, *true_term(truth, analysis))])
+    effects = [effect for effect in (truth, truth.get("second")) if effect]
+    after = extend(refit, evidence, [candidate(evidence, *true_term(effect, analysis)) for effect in effects])
     nlpd = gain(refit, after, rest)[1]
     return {"value": nlpd.value, "low": nlpd.low, "high": nlpd.high}
 
@@ -52,7 +53,7 @@ def true_basis(truth: Mapping[str, Any], table: PushTable) -> DriverBasis:
     driver, basis = truth["covariates"][0], truth["form"]
     if basis == "constant" and (driver not in table.covariates or truth["names"][0] is not None):
         return DriverBasis("constant")
-    if basis == "map" or driver == "slider_x":
+    if driver in ("slider_x", "slider_y"):
         return two_dimensional(table)
     values = table.covariates[driver]
     if basis == "category" or driver == "edge":
@@ -65,6 +66,6 @@ def true_basis(truth: Mapping[str, Any], table: PushTable) -> DriverBasis:
 
 
 def _smooth(truth: Mapping[str, Any]) -> str:
-    if truth["course"] == "saturating":
+    if "saturating" in (truth.get("course"), truth["form"]):
         return "logarithmic"
-    return "quadratic" if truth["form"] in ("constant", "quadratic") else "linear"
+    return "quadratic" if truth["form"] in ("constant", "quadratic", "map") else "linear"

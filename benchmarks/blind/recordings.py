@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blind.effects import GROUPS, HUMIDITY, SIZES, TEMPERATURE, Drawn, World, draw, undisturbed
+from benchmarks.blind.effects import GROUPS, HUMIDITY, SIZES, TEMPERATURE, Drawn, World, draw, undisturbed, with_second
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
@@ -28,6 +28,7 @@ SPEEDS = (0.01, 0.02, 0.03)  # m/s, slow enough that inertia hardly counts
 WINDOWS, WINDOW = (3.2, 4.4), 0.2  # windows a push, s
 TURN_SPREAD, PLACE_SPREAD = 3.0, 0.05  # rad, m: sliders have all headings
 MEAN_PAUSE, LONG_BREAKS, LONG_BREAK = 0.6, 2, 40.0  # s: they separate time, push count and dwell time
+TWO_EFFECTS = 0.26  # share of the library's group with a second effect: a fifth of all effects on the motion
 MODEL = "model.json"
 
 
@@ -61,8 +62,8 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     options = TrainingOptions(n_train=rows, seed=seed, mean=size.mean)
     save_model(train_model(table, rig, size.kind, name=f"{number:03d}", options=options), folder / MODEL)
     known = {"number": number, "group": group, "seed": seed, "shape": plain.slider.name, "surface": plain.table.name}
-    effect = {key: value for key, value in asdict(replace(drawn, act=Changes())).items() if key != "act"}
-    (truth / f"{number:03d}.json").write_text(json.dumps({**known, "pushes": len(later.pushes), **effect}, indent=1))
+    known |= {"friction": plain.table.friction, "pushes": len(later.pushes)}
+    (truth / f"{number:03d}.json").write_text(json.dumps({**known, **drawn.described()}, indent=1))
     return drawn
 
 
@@ -127,4 +128,5 @@ def drawn_for(spec: SimulationSpec, group: str, rng: np.random.Generator) -> Dra
         return undisturbed()
     world = World(spec.slider.outline, spec.slider.mass * GRAVITY, spec.table.friction, conditions(spec), rng)
     kinds = GROUPS[group]
-    return draw(kinds[int(rng.integers(len(kinds)))], str(rng.choice(SIZES)), world)
+    drawn = draw(kinds[int(rng.integers(len(kinds)))], str(rng.choice(SIZES)), world)
+    return with_second(drawn, world) if group == "library" and rng.random() < TWO_EFFECTS else drawn
