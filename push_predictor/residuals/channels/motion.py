@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
@@ -22,10 +21,11 @@ from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.experiment import separating_pushes
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
+from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.types import Array, BoolArray
 
-NOT_ZERO = 0.01  # p above which an effect among others may be zero
+MOSTLY = 0.5  # share inside training's inputs from which a constant effect is more than extrapolation
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
@@ -77,8 +77,9 @@ def motion_effects(
     inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    candidates = [c for c in candidates_of(evidence, names, inputs) if known.all() or not _of_inputs_alone(c)]
-    found = _needed(search(evidence, candidates, inputs, share, seed, baseline=baseline), evidence)
+    candidates = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
+    found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
+    found = replace(found, terms=needed_terms(found.terms, evidence))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None
@@ -100,32 +101,17 @@ def motion_effects(
     )
 
 
-def _needed(found: SearchResult, evidence: Evidence) -> SearchResult:
-    """The search without terms whose effect may be zero once all are fitted together, the least certain first."""
-    terms = [term for term in found.terms if not term.own]
-    while len(terms) > 1:
-        effects, _ = estimated_effects(evidence, [term.best for term in terms])
-        p_values = [_p_of_zero(effect.coefficients, effect.covariance) for effect in effects]
-        if max(p_values) <= NOT_ZERO:
-            break
-        del terms[int(np.argmax(p_values))]
-    return replace(found, terms=tuple(term for term in found.terms if term.own or term in terms))
-
-
-def _p_of_zero(coefficients: Array, covariance: Array) -> float:
-    """Probability of coefficients (p,) at least as far from zero, if the effect were zero."""
-    square = float(coefficients @ np.linalg.pinv(covariance, hermitian=True) @ coefficients)
-    return float(chdtrc(len(coefficients), square))
-
-
 def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
     if not np.isfinite(spread.detectable):
         return {}
     return {"noise": {"value": spread.detectable, "unit": "times training", "covariate": SESSION}}
 
 
-def _of_inputs_alone(candidate: Candidate) -> bool:
-    return candidate.mechanism is None and candidate.kind == "constant"
+def _separable(candidate: Candidate, inside: float) -> bool:
+    """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
+    if candidate.basis.name != "constant" or inside == 1.0:
+        return True
+    return inside >= MOSTLY and candidate.mechanism is not None
 
 
 def _spread(

@@ -1,7 +1,7 @@
 """The variance channel: covariates that the noise of the outcomes depends on, after effects on the mean.
 
-The test uses ranks of the squared residuals, so that a few outlying pushes decide nothing. The inputs are regressed out
-as in the search on the mean.
+The test uses squared residuals, bounded so that a few outlying pushes decide nothing. The inputs are regressed out as
+in the search on the mean.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
-from push_predictor.normal_scores import normal_scores
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
@@ -24,6 +23,8 @@ from push_predictor.residuals.selection.screening import Scores, Screened, block
 from push_predictor.types import Array
 
 TINY = 1e-12
+MOST = 9.0  # of a square: three standard deviations
+MAD_TO_SD = 1.4826
 ALL = "all"
 MATERIAL = 1.2  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
 QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
@@ -112,8 +113,8 @@ def _tested(
     baseline: Baseline | None,
 ) -> VarianceFinding:
     controls = inputs_basis(model, evidence.table).columns
-    size = _log_squares(Residualizer(controls)(z))
-    trials = [t for name, basis in _bases(evidence, names) for t in _along(evidence, size, controls, name, basis)]
+    residual = Residualizer(controls)(z)
+    trials = [t for name, basis in _bases(evidence, names) for t in _along(evidence, residual, controls, name, basis)]
     there = 0
     if baseline is not None:
         constant = _constant(model, evidence, z, baseline)
@@ -129,32 +130,38 @@ def _tested(
 
 
 def _detectable(threshold: float, evidence: Evidence, z: Array, baseline: Baseline) -> float:
-    """The ratio of standard deviations whose logarithm exceeds the threshold with 80 % probability."""
+    """The ratio of standard deviations whose squares exceed the threshold with 80 % probability."""
     square = 0.0
     for residual, block in ((z, evidence.block), (baseline.evidence.z, baseline.evidence.block)):
-        size = _log_squares(residual).mean(axis=1)
-        of_block = sums_by(block, (size - size.mean())[:, None])[:, 0]
+        size = _bounded_squares(residual).mean(axis=1)
+        of_block = sums_by(block, (size / size.mean() - 1.0)[:, None])[:, 0]
         square += float(np.sum(of_block**2)) / len(size) ** 2
-    return max(MATERIAL, float(np.exp(0.5 * (threshold + QUANTILE) * np.sqrt(square))))
+    return max(MATERIAL, float(np.sqrt(1.0 + (threshold + QUANTILE) * np.sqrt(square))))
 
 
 def _log_squares(residual: Array) -> Array:
     return np.asarray(np.log(residual**2 + TINY))
 
 
+def _bounded_squares(residual: Array) -> Array:
+    """Squares (n, 3) in units of each output's robust variance, at most MOST."""
+    unit = MAD_TO_SD * np.median(np.abs(residual), axis=0)
+    return np.asarray(np.minimum((residual / np.maximum(unit, TINY)) ** 2, MOST))
+
+
 def _bases(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, DriverBasis]]:
     return [(name, basis) for name, basis in screening_bases(evidence.table, names) if name not in LOCAL]
 
 
-def _along(evidence: Evidence, size: Array, controls: Array, name: str, basis: DriverBasis) -> list[_Trial]:
+def _along(evidence: Evidence, residual: Array, controls: Array, name: str, basis: DriverBasis) -> list[_Trial]:
     """One covariate against the variance of each output, and of all outputs."""
-    values = basis.values(evidence.table.covariates, len(size))
-    ranks, block = normal_scores(size), evidence.block
+    values = basis.values(evidence.table.covariates, len(residual))
+    size, squares, block = _log_squares(residual), _bounded_squares(residual), evidence.block
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
     trials = []
     for output, on in _outputs(len(values)):
-        scores = block_scores(ranks, on[:, :, None] * values[:, None, :], controls, block)
+        scores = block_scores(squares, on[:, :, None] * values[:, None, :], controls, block)
         ratio = float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum()))))
         trials.append(_Trial(name, basis, output, scores, ratio))
     return trials
@@ -166,12 +173,12 @@ def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline
     controls = inputs_basis(model, _inputs_of(tables)).columns
     # Not residualised: errors of the base enter both parts alike, but regression would not remove them alike.
     parts = (_log_squares(z), _log_squares(baseline.evidence.z))
-    z, new = normal_scores(np.vstack(parts)), np.arange(len(controls)) < len(z)
+    squares, new = _bounded_squares(np.vstack([z, baseline.evidence.z])), np.arange(len(controls)) < len(z)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
     for output, on in _outputs(len(controls)):
-        scores = block_scores(z, (on * new[:, None])[:, :, None], controls, block)
+        scores = block_scores(squares, (on * new[:, None])[:, :, None], controls, block)
         strength = float(np.prod(ratio ** (on[0] / on[0].sum())))
         trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
     return trials

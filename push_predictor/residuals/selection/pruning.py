@@ -1,0 +1,36 @@
+"""Effects that an exact fit of the others makes superfluous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import chdtrc
+
+from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.evidence.standardised import Evidence
+from push_predictor.residuals.selection.term_choice import SelectedTerm
+from push_predictor.types import Array
+
+NOT_ZERO = 0.01  # p above which an effect among others may be zero
+
+
+def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[SelectedTerm, ...]:
+    """The terms without those whose effect may be zero once all are fitted together, the least certain dropped first.
+
+    Terms that a refit of the base learns stay.
+    """
+    fitted = [term for term in terms if not term.own]
+    while len(fitted) > 1:
+        effects, _ = estimated_effects(evidence, [term.best for term in fitted])
+        p_values = [_p_of_zero(effect.coefficients, effect.covariance) for effect in effects]
+        if max(p_values) <= NOT_ZERO:
+            break
+        del fitted[int(np.argmax(p_values))]
+    return tuple(term for term in terms if term.own or any(term is kept for kept in fitted))
+
+
+def _p_of_zero(coefficients: Array, covariance: Array) -> float:
+    """Probability of coefficients (p,) at least as far from zero, if the effect were zero."""
+    square = float(coefficients @ np.linalg.pinv(covariance, hermitian=True) @ coefficients)
+    return float(chdtrc(len(coefficients), square))

@@ -1,0 +1,107 @@
+"""The screen keeps its level with few pushes, and an obvious effect is still found; no effect is named twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_up_traces import DRIFT, planted, pushes, slippery
+from synthetic import square_rig
+
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.candidate import candidate
+from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.channels.motion import motion_effects
+from push_predictor.residuals.evidence.drivers import standard_basis
+from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.forward_selection import SearchResult, search
+from push_predictor.residuals.selection.naming import Naming
+from push_predictor.residuals.selection.pruning import needed_terms
+from push_predictor.residuals.selection.term_choice import SelectedTerm
+
+BLOCKS, ROWS = 40, 3  # a block
+
+
+@pytest.fixture(scope="module")
+def deployed() -> PushModel:
+    return train_model(pushes(120, 1), square_rig(), "analytical", name="deployed")
+
+
+def searched(model: PushModel, table: PushTable, names: list[str], alpha: float = 0.01) -> SearchResult:
+    evidence, inputs = evidence_of(model, table), inputs_basis(model, table)
+    baseline = baseline_of(model, evidence.mechanics)
+    return search(evidence, candidates_of(evidence, names, inputs), inputs, alpha, baseline=baseline)
+
+
+def test_block_scores_have_the_variance_of_the_observed_score_whatever_was_projected_off() -> None:
+    rng = np.random.default_rng(5)
+    n, block = BLOCKS * ROWS, np.repeat(np.arange(BLOCKS), ROWS)
+    residualizer = Residualizer(rng.normal(size=(n, 6)))
+    of_pushes = np.repeat(rng.normal(size=(BLOCKS, 3, 46)), ROWS, axis=0) + 0.3 * rng.normal(size=(n, 3, 46))
+    basis = np.linalg.qr(residualizer(of_pushes).reshape(3 * n, -1))[0]
+    nuisance, column = basis[:, :45], basis[:, 45].reshape(n, 3)
+    total, rows = [], []
+    for _ in range(500):
+        apart = residualizer.blocks(rng.normal(size=(n, 3)), block).orthogonal_to(nuisance)
+        total.append(float(np.sum(column * apart.residual)))
+        rows.append(float(np.sum(sums_by(block, np.sum(column * apart.adjusted, axis=1)[:, None]) ** 2)))
+    assert np.mean(rows) == pytest.approx(np.mean(np.square(total)), rel=0.18)
+
+
+def test_nothing_is_found_in_few_pushes_without_an_effect_more_often_than_alpha(deployed: PushModel) -> None:
+    """Twelve recordings of 40 pushes at level 0.2: if that is the rate, seven or more have a probability of 0.4 %."""
+    count = 0
+    for seed in range(20, 32):
+        found = searched(deployed, pushes(40, seed), ["elapsed_time", "slider_heading", "edge"], alpha=0.2)
+        count += bool(found.terms)
+    assert count < 7
+
+
+def test_an_obvious_effect_in_few_pushes_does_not_hide_itself(deployed: PushModel) -> None:
+    found = searched(deployed, pushes(60, 2, slippery(0.1)), ["elapsed_time", "slider_x"], alpha=0.004)
+    assert found.terms[0].best.label == ("contact_friction", "elapsed_time")
+    assert found.terms[0].p_value < 0.002
+
+
+def test_a_few_pushes_far_off_are_not_obvious(deployed: PushModel) -> None:
+    """Two pushes with an outlying covariate and outlying outcomes gain much, and prove little."""
+    table = pushes(60, 3)
+    odd = np.isin(table.push_id, [f"3-{k}" for k in (7, 31)])
+    covariates = {**table.covariates, "topic:/odd": np.where(odd, 30.0, 0.0) + np.sin(np.arange(len(table)))}
+    outcomes = table.outcomes + np.where(odd, 1.0, 0.0)[:, None] * [0.0006, 0.0006, 0.02]
+    assert not searched(deployed, replace(table, covariates=covariates, outcomes=outcomes), ["topic:/odd"]).terms
+
+
+def chosen(evidence: Evidence, mechanism: str, covariate: str, *, own: bool = False) -> SelectedTerm:
+    basis = standard_basis("linear", covariate, evidence.table.covariates[covariate])
+    nothing, naming = np.zeros((len(evidence.table), 3)), Naming((covariate,), (mechanism,), True, 0.0)
+    best = candidate(evidence, mechanism, covariate, basis)
+    return SelectedTerm(best, (), 0.001, np.zeros(1), nothing, 0.5, naming, own)
+
+
+def test_an_effect_that_may_be_zero_beside_another_is_dropped_and_one_of_the_bases_inputs_stays(
+    deployed: PushModel,
+) -> None:
+    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06)))
+    acting, idle = chosen(evidence, "contact_friction", "elapsed_time"), chosen(evidence, "inertia", "slider_x")
+    own = chosen(evidence, "inertia", "slider_x", own=True)
+    assert needed_terms([idle, acting], evidence) == (acting,)
+    assert needed_terms([own, acting], evidence) == (own, acting)
+    assert needed_terms([idle], evidence) == (idle,)
+
+
+@pytest.mark.parametrize("before, session", [(0.0, True), (-0.12, False)])
+def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
+    always = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), -0.12)
+    earlier = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), before)
+    table = pushes(150, 1, earlier) if before else pushes(150, 1)
+    model = train_model(table, square_rig(), "analytical", name="deployed")
+    found = motion_effects(model, evidence_of(model, pushes(120, 8, always)), 0.01, ["elapsed_time"])
+    (term,) = found.terms
+    assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
