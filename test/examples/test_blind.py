@@ -330,6 +330,9 @@ def test_a_fifth_of_the_effects_on_the_motion_have_a_second_one() -> None:
         record = one.described()
         assert "act" not in record and record["kind"] != record["second"]["kind"]
         assert {"kind", "names", "covariates", "form", "size", "value", "unit", "place"} <= record["second"].keys()
+    whole = push_outcomes(replace(spec, changes=both[0].act)).outcomes
+    assert both[0].second is not None and isinstance(both[0].second.act, Changes)
+    assert not np.array_equal(whole, push_outcomes(replace(spec, changes=both[0].second.act)).outcomes)
     assert all(not drawn_for(spec, "outside", np.random.default_rng(seed)).second for seed in range(20))
 
 
