@@ -266,6 +266,8 @@ def test_changes_end_at_the_largest_that_a_rig_can_have() -> None:
     assert table.effects is not None, table.how
     found, exact = predicted(table, rows), predicted(computed, rows)
     assert np.quantile(np.abs(found.mean - exact.mean) / exact.std, 0.95) < 0.1
+    largest = predicted(extended("analytical", replace(large, coefficients=np.array([-1.0]))), rows)
+    np.testing.assert_allclose(exact.mean, largest.mean, atol=1e-12)
 
 
 def test_before_a_step_the_prediction_is_that_of_the_base() -> None:
