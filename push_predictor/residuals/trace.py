@@ -29,7 +29,7 @@ from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, Wre
 from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
 from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
 from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
-from push_predictor.residuals.evidence.instrument import with_instrument
+from push_predictor.residuals.evidence.instrument import GAP, with_instrument
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again, load_evidence, previous_residual
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
@@ -145,7 +145,11 @@ class _Context:
         every = widened(evidence_of(searched, loaded.table), model.training, shift)
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
-        held = held_out_rows(table)
+        held, usable = held_out_rows(table), with_instrument(table)
+        if GAP in (covariates or ()) and GAP not in usable.covariates:
+            raise RequestError(
+                "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"
+            )
         return cls(
             deployed=model,
             model=searched,
@@ -154,7 +158,7 @@ class _Context:
             covariates=None if covariates is None else tuple(covariates),
             seed=seed,
             windows=table.take(~held),
-            evidence=replace(every.take(~held), table=with_instrument(table).take(~held)),
+            evidence=replace(every.take(~held), table=usable.take(~held)),
             inside=~shift.outside[~held],
             held_out=table.take(held),
             shifted=shift.inputs,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
@@ -19,7 +20,7 @@ from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.reporting.wording import worth_sentence
-from push_predictor.residuals.trace import trace
+from push_predictor.residuals.trace import search_channels, trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
@@ -103,6 +104,14 @@ def test_effect_in_the_models_own_inputs_is_reported_and_left_to_a_refit() -> No
     refit, before = (sum(result[model]["nlpd"].values()) for model in ("refit", "before"))
     assert refit < before
     assert "Retraining on the new pushes fixes this." in worth_sentence(found)
+
+
+def test_the_gap_of_pushes_of_one_window_is_rejected_by_name() -> None:
+    whole = faultless()
+    _, first = np.unique(whole.table.push_id, return_index=True)
+    single = LoadedData(whole.table.take(np.sort(first)), None, whole.rig)
+    with pytest.raises(RequestError, match=r"contact_gap.*pushes of several windows"):
+        search_channels(learnt(), single, covariates=["contact_gap"])
 
 
 def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> None:
