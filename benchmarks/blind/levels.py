@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +22,13 @@ from benchmarks.blind.scores import wilson
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MEANS
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.trace import Searched, search_channels
 from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.spec import SimulationSpec
 
 ALPHAS = (0.2, 0.05, 0.01)
 TRAINING = 500  # pushes
@@ -63,7 +65,18 @@ def table_of(folder: Path) -> str:
     return "\n".join(lines)
 
 
-def _of_rig(options: argparse.Namespace, number: int) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class TrainedRig:
+    """A simulated rig, the model trained on its first recording, and the generator of its later ones."""
+
+    plain: SimulationSpec
+    rig: Rig
+    model: PushModel
+    rng: np.random.Generator
+
+
+def trained_rig(options: argparse.Namespace, number: int) -> TrainedRig:
+    """Draw a rig by options.seed and number, and train options.base on options.rows windows of its pushes."""
     rng = np.random.default_rng([options.seed, number])
     plain = rig_of(rng, f"{number:03d}", TRAINING)
     training = simulate(replace(plain, name="training"))
@@ -72,14 +85,23 @@ def _of_rig(options: argparse.Namespace, number: int) -> dict[str, Any]:
     trained = TrainingOptions(n_train=min(options.rows, len(table)), seed=options.seed, mean=options.mean,
                               fit=options.base == "analytical")  # fmt: skip
     model = train_model(table, training.rig, options.base, name=plain.name, options=trained)
-    streams = []
-    for pushes in options.pushes:
-        for _ in range(options.streams):
-            later = simulate(replace(later_spec(plain, rng, pushes), name="new"))
-            loaded = LoadedData(cut_again([later], training.rig), None, training.rig)
-            base = f"{options.base}, {options.mean}"
-            streams.append({"base": base, "pushes": pushes, "found": _found(model, loaded)})
-    return {"rig": number, "shape": plain.slider.name, "surface": plain.table.name, "streams": streams}
+    return TrainedRig(plain, training.rig, model, rng)
+
+
+def later_windows(rig: TrainedRig, pushes: int) -> LoadedData:
+    """The windows of a later recording, in which nothing has changed."""
+    later = simulate(replace(later_spec(rig.plain, rig.rng, pushes), name="new"))
+    return LoadedData(cut_again([later], rig.rig), None, rig.rig)
+
+
+def _of_rig(options: argparse.Namespace, number: int) -> dict[str, Any]:
+    rig, base = trained_rig(options, number), f"{options.base}, {options.mean}"
+    streams = [
+        {"base": base, "pushes": pushes, "found": _found(rig.model, later_windows(rig, pushes))}
+        for pushes in options.pushes
+        for _ in range(options.streams)
+    ]
+    return {"rig": number, "shape": rig.plain.slider.name, "surface": rig.plain.table.name, "streams": streams}
 
 
 def _found(model: PushModel, loaded: LoadedData) -> dict[str, list[str]]:

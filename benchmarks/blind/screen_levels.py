@@ -1,0 +1,112 @@
+"""The level of the screen for effects on the motion, on real designs with made-up noise.
+
+    python -m benchmarks.blind.screen_levels --pushes 60 150 --rigs 5 --draws 40 [--base vhgp|analytical] [--json FILE]
+
+Inputs, covariates, candidates and the training windows are those of simulated recordings; the standardised residuals
+are drawn, half of their variance common to the windows of a push, with a spread of its own for each push. Nothing can
+be found but by chance. The table gives how often the smallest family-wise p value was at most alpha.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.blind.levels import ALPHAS, later_windows, trained_rig
+from benchmarks.blind.scores import wilson
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train_learnt import MEANS
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
+from push_predictor.residuals.evidence.instrument import with_instrument
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.selection.baseline import Baseline, baseline_of
+from push_predictor.residuals.selection.forward_selection import ForwardSelection
+from push_predictor.residuals.selection.term_choice import TermChoice
+from push_predictor.types import Array
+
+UNEVEN = 0.4  # standard deviation of the logarithm of a push's spread
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, and write the p values to the file of --json."""
+    options = _parser().parse_args(arguments)
+    found: dict[int, list[float]] = {pushes: [] for pushes in options.pushes}
+    for number in range(options.rigs):
+        rig = trained_rig(options, number)
+        for pushes in options.pushes:
+            design = _design(rig.model, later_windows(rig, pushes).table)
+            found[pushes] += list(_smallest(design, rig.rng, options.draws))
+    if options.json:
+        options.json.write_text(json.dumps(found))
+    print(_table(f"{options.base}, {options.mean}" if options.base != "analytical" else options.base, found))
+    return 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    evidence: Evidence
+    inputs: InputsBasis
+    baseline: Baseline
+    candidates: tuple[Candidate, ...]
+
+
+def _design(model: PushModel, table: PushTable) -> _Design:
+    analysis = with_instrument(table).take(~held_out_rows(table))
+    evidence, inputs = evidence_of(model, analysis), inputs_basis(model, analysis)
+    candidates = tuple(candidates_of(evidence, None, inputs))
+    return _Design(evidence, inputs, baseline_of(model, evidence.mechanics), candidates)
+
+
+def _smallest(design: _Design, rng: np.random.Generator, draws: int) -> Iterator[float]:
+    """The smallest family-wise p value of each draw of the noise."""
+    choice = TermChoice(design.evidence, design.candidates, design.inputs, 0)
+    for _ in range(draws):
+        before = design.baseline.evidence
+        z = _noise(rng, before.table)
+        residual = np.asarray(np.linalg.solve(before.whitener, z[:, :, None])[:, :, 0], dtype=np.float64)
+        redrawn = replace(before, residual=residual)
+        selection = ForwardSelection(choice, max(ALPHAS), replace(design.baseline, evidence=redrawn))
+        yield float(selection.screened(_noise(rng, design.evidence.table)).p_value.min())
+
+
+def _noise(rng: np.random.Generator, table: PushTable) -> Array:
+    """Residuals (n, 3): half of the variance common to a push, times a spread of the push."""
+    pushes, push = np.unique(table.push_id, return_inverse=True)
+    common, own = rng.standard_normal((len(pushes), 3))[push], rng.standard_normal((len(table), 3))
+    spread = np.exp(UNEVEN * rng.standard_normal((len(pushes), 1)))[push]
+    return np.asarray(np.sqrt(0.5) * (common + own) * spread)
+
+
+def _table(base: str, found: dict[int, list[float]]) -> str:
+    lines = ["| base | pushes | alpha | p at most alpha | 95 % interval |", "| --- | --- | --- | --- | --- |"]
+    for pushes, p_values in found.items():
+        for alpha in ALPHAS:
+            count = int(np.sum(np.array(p_values) <= alpha))
+            low, high = wilson(count, len(p_values))
+            interval = f"{100 * low:.1f} to {100 * high:.1f} %"
+            lines.append(f"| {base} | {pushes} | {alpha} | {count} of {len(p_values)} | {interval} |")
+    return "\n".join(lines)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--base", default="vhgp", choices=("vhgp", "gp", "analytical"))
+    parser.add_argument("--mean", default="mechanics", choices=MEANS, help="of a learnt model (default %(default)s)")
+    parser.add_argument("--pushes", type=int, nargs="+", default=[60, 150])
+    for name, default in (("rigs", 5), ("draws", 40), ("rows", 300), ("seed", 78)):
+        parser.add_argument(f"--{name}", type=int, default=default, help="(default %(default)s)")
+    parser.add_argument("--json", type=Path)
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
