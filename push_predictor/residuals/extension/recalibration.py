@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import ExtendedPredictor
@@ -12,7 +13,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
-LEAST = 0.25  # share of the mean square that may be put down to other uncertainty
+LEAST = 0.1  # of the factor without other uncertainty
 
 
 def calibrated_on(model: PushModel, table: PushTable, extra: Array | None = None) -> PushModel:
@@ -36,13 +37,26 @@ def uncertainty_of_effects(model: PushModel, table: PushTable) -> Array:
 
 
 def _scaled(model: PushModel, table: PushTable, mean: Array, covariance: Array, extra: Array | None) -> PushModel:
-    """E[r^2 / v] = s^2 + E[(extra + of effects) / v], v the variance by the base alone."""
+    """The base's deviations scaled by the factors of largest likelihood, the other uncertainty as it is."""
     predictor = model.predictor
     of_effects = uncertainty_of_effects(model, table)
     own = np.diagonal(covariance - of_effects, axis1=1, axis2=2)
     other = np.diagonal(of_effects + (0.0 if extra is None else extra), axis1=1, axis2=2)
-    square = np.mean((table.outcomes - mean) ** 2 / own, axis=0)
-    factor = np.sqrt(np.maximum(square - np.mean(other / own, axis=0), LEAST * square))
+    square = (table.outcomes - mean) ** 2
+    factor = np.array([_likeliest(*columns) for columns in zip(square.T, own.T, other.T, strict=True)])
     if isinstance(predictor, ExtendedPredictor):
         return replace(model, predictor=replace(predictor, scale=predictor.scale * factor))
     return replace(model, predictor=ExtendedPredictor(predictor.base, predictor.physics, (), factor))
+
+
+def _likeliest(square: Array, own: Array, other: Array) -> float:
+    """The factor s of largest likelihood for squares (n,) with the variance s^2 own + other."""
+    alone = float(np.sqrt(np.mean(square / own)))
+    if not other.any():
+        return alone
+
+    def cost(share: float) -> float:
+        variance = (share * alone) ** 2 * own + other
+        return float(np.sum(np.log(variance) + square / variance))
+
+    return alone * float(minimize_scalar(cost, bounds=(LEAST, 1.0), method="bounded", options={"xatol": 1e-4}).x)
