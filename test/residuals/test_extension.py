@@ -81,6 +81,15 @@ def test_uncertainty_of_an_effect_of_zero_is_no_gain(deployed: PushModel) -> Non
     assert found.nmse.value == pytest.approx(0.0, abs=1e-12)
 
 
+def test_wider_intervals_in_noisier_pushes_are_no_gain_either(deployed: PushModel) -> None:
+    """The held-out pushes are noisier than those before, so that any added uncertainty helps."""
+    model = overconfident(deployed, 1.0)
+    mean = model.predict_rows(HELD_OUT.inputs, HELD_OUT.duration).mean
+    noisier = replace(HELD_OUT, outcomes=mean + 3.0 * (HELD_OUT.outcomes - mean))
+    found = held_out_gain(model, model, calibrated_on(with_idle_effect(model, 0.05), ANALYSIS), ANALYSIS, noisier)
+    assert found.nlpd.high > -1e-3
+
+
 def test_a_real_effect_is_a_gain_over_both_models(deployed: PushModel) -> None:
     changed, later = pushes(120, 5, slippery(0.06)), pushes(60, 6, slippery(0.06))
     refit = refit_base(deployed, changed)
