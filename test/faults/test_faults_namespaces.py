@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from ros_harness import acquaint, call, free_domain, node_process, ros_context, wait_until
+from ros_harness import START_TIMEOUT, acquaint, call, free_domain, node_process, ros_context, wait_until
 from std_msgs.msg import String
 from validator_bench import CIRCLE, HEXAGON, WRITTEN, assert_same_as_offline, replaying
 
@@ -77,10 +77,11 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
         for cell in CELLS:
             acquaint(node, f"{cell}/push_validator")  # whose first residuals would else be lost
             acquaint(node, f"{cell}/push_replay")
+            acquaint(node, f"{cell}/push_predictor")  # so that no request below is sent twice
             call(node.create_client(Resume, f"{cell}/push_replay/resume"), Resume.Request())
         for k in range(40):
             for cell, client in clients.items():
-                found.answers[cell].append(call(client, _request(k)))
+                found.answers[cell].append(call(client, _request(k), patience=START_TIMEOUT))
         for process in processes:
             process.wait_for_text(WRITTEN, 120.0)
         assert wait_until(lambda: len(found.diagnostics) >= 6 and all(_counted(found, cell) for cell in CELLS)), {
