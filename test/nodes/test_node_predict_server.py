@@ -196,7 +196,7 @@ def test_single_push_is_answered_during_a_long_batch(server):
     while not batch.done() and answered < 100_000:
         assert server.push().success
         answered += 1
-    assert batch.done() and answered > 5  # after the batch, only one or two would be answered
+    assert batch.done() and answered > 2  # if pushes waited for the batch, one or two would be answered, at any pace
     assert len(batch.result().in_domain) == 50_000
 
 
