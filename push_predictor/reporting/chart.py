@@ -5,6 +5,7 @@ The colours of the kinds are in templates/style.css.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -59,16 +60,16 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Mark:
+class Mark(ABC):
     """What a chart shows; kind: its colour; name: in the legend, none if empty."""
 
     kind: str
     name: str = field(default="", kw_only=True)
     swatch = "dot"
 
+    @abstractmethod
     def shapes(self, frame: Frame) -> Iterator[Shape]:
         """The SVG elements of the mark."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from push_predictor.types import Array
 Verdict = Literal[
     "none", "effect", "driver_only", "mechanism_only", "wrench_only", "measurement", "variance", "input_shift"
 ]
+Reference = Literal["deployed", "refit"]  # the model without the effects with which a gain compares
 CHANNELS: dict[Verdict, str] = {
     "none": "none",
     "effect": "motion",
@@ -116,7 +117,7 @@ class Trace:
     held_out: HeldOut
     gain_nmse: Gain
     gain_nlpd: Gain
-    gain_over: Literal["deployed", "refit"]
+    gain_over: Reference
     extended: PushModel | None
     tested: tuple[Tested, ...]
     minimum_detectable: Mapping[str, Mapping[str, Any]]

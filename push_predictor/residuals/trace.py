@@ -36,7 +36,7 @@ from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
-from push_predictor.residuals.extension.recalibration import calibrated_held_out
+from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
@@ -255,7 +255,7 @@ def _of_measurement(context: _Context, corrected: _Corrected) -> Trace:
     """The trace of a measurement error: the deployed model, unchanged, on corrected windows where there are streams."""
     model, measured = context.model, corrected.finding
     first, cut = measured.errors[0], corrected.evidence is not None
-    refit = calibrated_held_out(refit_base(model, context.evidence.table))
+    refit = held_out_windows(refit_base(model, context.evidence.table)).calibrated()
     return Trace(
         verdict="measurement",
         kind="mean",
@@ -333,7 +333,7 @@ def _extension(context: _Context, motion: MotionFinding) -> _Extension:
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(estimated_effects(evidence, [t.best])[0][0] if t.own else next(added) for t in motion.terms)
     gain = held_out_gain(model, refit, after, evidence.table, context.held_out) if after else None
-    return _Extension(calibrated_held_out(refit), after, effects, gain)
+    return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)
 
 
 def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[ShiftedInput]) -> Verdict:

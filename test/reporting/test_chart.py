@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ from push_predictor.reporting.chart import (
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 286.0, 30.0, 188.0  # the plot area of a small chart
 
 
-def chart(*marks: Mark, **other: object) -> Chart:
-    return Chart("a chart", "Time (s)", "Size (mm)", (0.0, 10.0), (0.0, 1.0), marks, size=SMALL, **other)  # type: ignore[arg-type]
+def chart(*marks: Mark, **other: Any) -> Chart:
+    return Chart("a chart", "Time (s)", "Size (mm)", (0.0, 10.0), (0.0, 1.0), marks, size=SMALL, **other)
 
 
 def dots(*points: tuple[float, float]) -> Dots:

@@ -19,8 +19,8 @@ from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import held_out_gain
 from push_predictor.residuals.extension.recalibration import (
-    calibrated_held_out,
-    calibrated_on,
+    held_out_windows,
+    new_windows,
     uncertainty_of_effects,
 )
 from push_predictor.residuals.extension.refit import refit_base, spread_rows
@@ -43,34 +43,36 @@ def overconfident(model: PushModel, factor: float) -> PushModel:
 def with_idle_effect(model: PushModel, variance: float) -> PushModel:
     """The model with an effect of size zero that is uncertain."""
     idle = Effect("contact_friction", "model_inputs", CONSTANT, np.zeros(1), np.array([[variance]]), np.ones(3))
-    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (idle,), model.predictor.scale)  # type: ignore[union-attr]
+    predictor = ExtendedPredictor(model.predictor.base, model.predictor.physics, (idle,), scale_of(model))
     return replace(model, predictor=predictor)
 
 
-def spread_of(model: PushModel) -> np.ndarray:
-    return evidence_of(model, ANALYSIS).z.std(axis=0)
+def scale_of(model: PushModel) -> np.ndarray:
+    """Factor (3,) on the base's deviations."""
+    assert isinstance(model.predictor, ExtendedPredictor)
+    return model.predictor.scale
 
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 4.0])
 def test_calibrated_deviations_fit_the_pushes_whatever_they_were(deployed: PushModel, factor: float) -> None:
-    found = calibrated_on(overconfident(deployed, factor), ANALYSIS)
+    found = new_windows(overconfident(deployed, factor), ANALYSIS).calibrated()
     z = evidence_of(found, ANALYSIS).z
     assert np.mean(np.linalg.norm(z, axis=1) ** 2) == pytest.approx(3.0, rel=0.1)
 
 
 def test_further_covariance_takes_its_share_of_the_calibrated_deviation(deployed: PushModel) -> None:
-    plain = calibrated_on(deployed, ANALYSIS)
+    plain = new_windows(deployed, ANALYSIS).calibrated()
     variance = np.diagonal(plain.predict_rows(ANALYSIS.inputs, ANALYSIS.duration).covariance, axis1=1, axis2=2)
     extra = 0.36 * np.stack([np.diag(row) for row in variance])
-    narrower = calibrated_on(deployed, ANALYSIS, extra)
-    assert narrower.predictor.scale == pytest.approx(0.8 * plain.predictor.scale, rel=1e-3)  # type: ignore[union-attr]
+    narrower = new_windows(deployed, ANALYSIS).calibrated(extra)
+    assert scale_of(narrower) == pytest.approx(0.8 * scale_of(plain), rel=1e-3)
 
 
 def test_the_uncertainty_of_a_models_own_effects_is_not_scaled(deployed: PushModel) -> None:
     """Only the base's deviation is: with what the effects add, the whole fits the pushes."""
-    found = calibrated_on(with_idle_effect(overconfident(deployed, 1.0), 0.01), ANALYSIS)
+    found = new_windows(with_idle_effect(overconfident(deployed, 1.0), 0.01), ANALYSIS).calibrated()
     assert np.mean(np.sum(evidence_of(found, ANALYSIS).z ** 2, axis=1)) == pytest.approx(3.0, rel=0.2)
-    assert np.all(found.predictor.scale < calibrated_on(deployed, ANALYSIS).predictor.scale)  # type: ignore[union-attr]
+    assert np.all(scale_of(found) < scale_of(new_windows(deployed, ANALYSIS).calibrated()))
 
 
 def test_uncertainty_of_an_effect_of_zero_is_no_gain(deployed: PushModel) -> None:
@@ -86,7 +88,9 @@ def test_wider_intervals_in_noisier_pushes_are_no_gain_either(deployed: PushMode
     model = overconfident(deployed, 1.0)
     mean = model.predict_rows(HELD_OUT.inputs, HELD_OUT.duration).mean
     noisier = replace(HELD_OUT, outcomes=mean + 3.0 * (HELD_OUT.outcomes - mean))
-    found = held_out_gain(model, model, calibrated_on(with_idle_effect(model, 0.05), ANALYSIS), ANALYSIS, noisier)
+    found = held_out_gain(
+        model, model, new_windows(with_idle_effect(model, 0.05), ANALYSIS).calibrated(), ANALYSIS, noisier
+    )
     assert found.nlpd.high > -1e-3
 
 
@@ -114,7 +118,7 @@ def test_the_gain_is_over_the_better_model(deployed: PushModel) -> None:
 
 def test_held_out_calibration_does_not_take_the_fit_for_the_noise() -> None:
     model = train_model(noisy_pushes(40), square_rig(), "gp", name="learned")
-    found = calibrated_held_out(model)
+    found = held_out_windows(model).calibrated()
     mean, covariance, _ = found.held_out_moments()
     square = (found.training.outcomes - mean) ** 2 / np.diagonal(covariance, axis1=1, axis2=2)
     assert square.mean(axis=0) == pytest.approx(np.ones(3), rel=1e-6)

@@ -14,20 +14,20 @@ import numpy as np
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
+from push_predictor.residuals.channels.contrast import MAD_TO_SD
 from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline
+from push_predictor.residuals.selection.power import QUANTILE
 from push_predictor.residuals.selection.screening import Scores, Screened, block_scores, screen
 from push_predictor.types import Array
 
 TINY = 1e-12
 MOST = 9.0  # of a square: three standard deviations
-MAD_TO_SD = 1.4826
 ALL = "all"
 MATERIAL = 1.2  # least ratio to training that counts: a base that saw few pushes misjudges its own noise a little
-QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
 
 
 @dataclass(frozen=True, eq=False)

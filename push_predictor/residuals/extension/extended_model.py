@@ -17,7 +17,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.extension.recalibration import calibrated_held_out
+from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import spread_rows, with_predictor
 
 
@@ -37,8 +37,8 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
         shift, _ = predictor.shift(Push(table.inputs, table.duration, table.covariates))
         trained = retrain_model(base.base, replace(table, outcomes=table.outcomes - shift))
         of_trained = predictor.with_base(trained.predictor.base)
-        return calibrated_held_out(with_predictor(trained, table, of_trained))
-    return calibrated_held_out(with_predictor(base, table, predictor))
+        return held_out_windows(with_predictor(trained, table, of_trained)).calibrated()
+    return held_out_windows(with_predictor(base, table, predictor)).calibrated()
 
 
 def _with_effects(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
@@ -11,14 +10,13 @@ from push_predictor.evaluation.validation import Comparison, compare
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.extension.recalibration import (
-    calibrated_held_out,
-    calibrated_on,
+    Unseen,
+    held_out_windows,
+    new_windows,
     uncertainty_of_effects,
 )
-from push_predictor.residuals.outcome import Gain
+from push_predictor.residuals.outcome import Gain, Reference
 from push_predictor.types import Array
-
-Reference = Literal["deployed", "refit"]
 
 
 @dataclass(frozen=True)
@@ -38,17 +36,19 @@ def held_out_gain(
     An effect of size zero with its uncertainty improves an overconfident model too. So the predicted deviations of both
     references fit pushes that they did not see, with the uncertainty of the effects added and without it.
     """
-    there, here = (uncertainty_of_effects(after, table) for table in (held_out, analysis))
-    in_refit = uncertainty_of_effects(after, refit.training)
-    references: list[tuple[Reference, PushModel, PushModel]] = [
-        ("deployed", calibrated_on(deployed, analysis), calibrated_on(deployed, analysis, here)),
-        ("refit", calibrated_held_out(refit), calibrated_held_out(refit, in_refit)),
-    ]
-    mean = deployed.training_mean
+    there, mean = uncertainty_of_effects(after, held_out), deployed.training_mean
+    references: dict[Reference, Unseen] = {
+        "deployed": new_windows(deployed, analysis),
+        "refit": held_out_windows(refit),
+    }
     found, scored = [], compared(after, held_out, mean)
-    for name, plain, widened in references:
+    for name, unseen in references.items():
+        widened = unseen.calibrated(uncertainty_of_effects(after, unseen.table))
         first = compared(widened, held_out, mean)
-        alike = (compared(plain, held_out, mean), replace(first, covariance=first.covariance + there))
+        alike = (
+            compared(unseen.calibrated(), held_out, mean),
+            replace(first, covariance=first.covariance + there),
+        )
         nmse = _difference(alike[0], scored, total_nmse)
         found += [HeldOutGain(name, nmse, _difference(each, scored, total_nlpd)) for each in alike]
     return max(found, key=lambda each: each.nlpd.high)

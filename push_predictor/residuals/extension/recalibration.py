@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -16,37 +16,46 @@ from push_predictor.types import Array
 LEAST = 0.1  # of the factor without other uncertainty
 
 
-def calibrated_on(model: PushModel, table: PushTable, extra: Array | None = None) -> PushModel:
-    """The model with deviations that fit a table it was not trained on; extra (n, 3, 3): further covariance there."""
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """A model's predictions of n windows that it did not see: mean (n, 3) and covariance (n, 3, 3) in their table."""
+
+    model: PushModel
+    table: PushTable
+    mean: Array
+    covariance: Array
+
+    def calibrated(self, extra: Array | None = None) -> PushModel:
+        """The model with the base's deviations scaled by the factors of largest likelihood.
+
+        extra (n, 3, 3): further covariance of these windows. The uncertainty of the effects stays as it is.
+        """
+        model, predictor = self.model, self.model.predictor
+        of_effects = uncertainty_of_effects(model, self.table)
+        own = np.diagonal(self.covariance - of_effects, axis1=1, axis2=2)
+        other = np.diagonal(of_effects + (0.0 if extra is None else extra), axis1=1, axis2=2)
+        square = (self.table.outcomes - self.mean) ** 2
+        factor = np.array([_likeliest(*columns) for columns in zip(square.T, own.T, other.T, strict=True)])
+        if isinstance(predictor, ExtendedPredictor):
+            return replace(model, predictor=replace(predictor, scale=predictor.scale * factor))
+        return replace(model, predictor=ExtendedPredictor(predictor.base, predictor.physics, (), factor))
+
+
+def new_windows(model: PushModel, table: PushTable) -> Unseen:
+    """Predictions of a table that the model was not trained on."""
     prediction = model.predict_rows(table.inputs, table.duration, table.covariates)
-    return _scaled(model, table, prediction.mean, prediction.covariance, extra)
+    return Unseen(model, table, prediction.mean, prediction.covariance)
 
 
-def calibrated_held_out(model: PushModel, extra: Array | None = None) -> PushModel:
-    """The model with deviations that fit its training windows, each predicted without its push.
-
-    extra (n, 3, 3): further covariance at the training windows.
-    """
+def held_out_windows(model: PushModel) -> Unseen:
+    """Predictions of the model's training windows, each without its push."""
     mean, covariance, _ = model.held_out_moments()
-    return _scaled(model, model.training, mean, covariance, extra)
+    return Unseen(model, model.training, mean, covariance)
 
 
 def uncertainty_of_effects(model: PushModel, table: PushTable) -> Array:
     """Covariance (n, 3, 3) of a table's outcomes that comes from the effects of a model."""
     return model.predictor.shift(Push(table.inputs, table.duration, table.covariates)).covariance
-
-
-def _scaled(model: PushModel, table: PushTable, mean: Array, covariance: Array, extra: Array | None) -> PushModel:
-    """The base's deviations scaled by the factors of largest likelihood, the other uncertainty as it is."""
-    predictor = model.predictor
-    of_effects = uncertainty_of_effects(model, table)
-    own = np.diagonal(covariance - of_effects, axis1=1, axis2=2)
-    other = np.diagonal(of_effects + (0.0 if extra is None else extra), axis1=1, axis2=2)
-    square = (table.outcomes - mean) ** 2
-    factor = np.array([_likeliest(*columns) for columns in zip(square.T, own.T, other.T, strict=True)])
-    if isinstance(predictor, ExtendedPredictor):
-        return replace(model, predictor=replace(predictor, scale=predictor.scale * factor))
-    return replace(model, predictor=ExtendedPredictor(predictor.base, predictor.physics, (), factor))
 
 
 def _likeliest(square: Array, own: Array, other: Array) -> float:
