@@ -12,7 +12,7 @@ from push_predictor.evaluation.validation import Comparison, compare, comparison
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
 from push_predictor.models.supports import on_supports
-from push_predictor.models.tabulated.tabulated_model import tabulate, with_effect_table
+from push_predictor.models.tabulated.tabulated_model import as_served
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
@@ -78,7 +78,7 @@ def validate_recording(
     windows, table = recorded_windows(model, path, rig, report)
     model = on_supports(model, rig or recording_rig(path), {})
     check_table(model, table)
-    prediction = with_effect_table(tabulate(model)).predict_rows(table.inputs, table.duration, table.covariates)
+    prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
 from push_predictor.models.store.model_file import is_model_file, load_model
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate, with_effect_table
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, as_served
 from push_predictor.resources import DEFAULT_MODEL, share_path
 from push_predictor.types import Array
 
@@ -135,7 +135,7 @@ def _tabulated(path: Path) -> TabulatedModel:
     """The model of a file, ready to predict. Raises ModelFileError, even if the numbers in the file make it fail."""
     model = load_model(path)
     try:
-        tabulated = with_effect_table(tabulate(model))
+        tabulated = as_served(model)
         # The first prediction fills caches; no request should wait for that.
         first = model.examples(1)
         tabulated.predict_rows(first.inputs, first.duration, first.covariates)

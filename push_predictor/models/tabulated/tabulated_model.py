@@ -219,6 +219,11 @@ def tabulate(model: PushModel) -> TabulatedModel:
     return TabulatedModel(model, f"exact: {how}too far off")
 
 
+def as_served(model: PushModel) -> TabulatedModel:
+    """The model as the server predicts with it: with the tables of its base and of its effects."""
+    return with_effect_table(tabulate(model))
+
+
 def with_effect_table(tabulated: TabulatedModel) -> TabulatedModel:
     """The same with a table of its effects, if it has effects and the table is accurate; takes some seconds."""
     if not tabulated.model.predictor.effects:
