@@ -282,20 +282,43 @@ class TestBasis:
         assert searched(learnt, table).terms[0].best.basis.name == "linear"
 
 
+def test_what_a_polynomial_leaves_of_an_unknown_effect_is_no_effect_of_its_own() -> None:
+    table = pushes(200, 310)
+    lopsided = 1.5 * NOISE[0] * (1.0 + np.cos(table.covariates["slider_heading"]))
+    pulled = replace(table, outcomes=table.outcomes + np.outer(lopsided, [1.0, 0.0, 0.0]))
+    found = searched(ANALYTICAL, pulled, mechanisms=())
+    assert [term.best.label for term in found.terms] == [(None, "slider_heading")]
+    left = found.candidates[int(np.argmin(found.last.p_value))]
+    assert found.last.p_value.min() <= 0.01
+    assert left.label == (None, "model_inputs")
+
+
+def louder_to_the_right(n: int, seed: int) -> PushTable:
+    """Pushes whose noise grows with the place along x."""
+    table = pushes(n, seed)
+    clean = PHYSICS.displacement(table.inputs, table.duration)
+    factor = np.exp(0.5 * table.covariates["slider_x"] / 0.03)
+    return replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
+
+
 class TestVariance:
     @pytest.mark.slow
     def test_variance_that_grows_with_a_covariate_is_not_a_mean_effect(self, learnt) -> None:
-        table = pushes(200, 400)
-        warm = table.covariates["topic:/temperature"]
-        factor = np.exp(0.5 * (warm - warm.mean()) / warm.std())
-        clean = PHYSICS.displacement(table.inputs, table.duration)
-        louder = replace(table, outcomes=clean + factor[:, None] * (table.outcomes - clean))
+        louder = louder_to_the_right(200, 400)
         found = searched(learnt, louder)
         evidence = evidence_of(learnt, louder, PHYSICS)
         noise = variance_effects(learnt, evidence, found.unexplained, 0.01, baseline=baseline(learnt))
         assert not found.terms
-        assert noise.found[0].covariate == "topic:/temperature"
+        assert noise.found[0].covariate == "slider_x"
         assert noise.found[0].ratio > 2.0
+
+    @pytest.mark.slow
+    def test_variance_that_grew_with_the_covariate_in_training_too_is_not_reported(self) -> None:
+        model = train_model(louder_to_the_right(150, 403), RIG, "gp", name="uneven")
+        evidence = evidence_of(model, louder_to_the_right(200, 404), PHYSICS)
+        assert not variance_effects(model, evidence, evidence.z, 0.01, baseline=baseline(model)).found
+        alone = variance_effects(model, evidence, evidence.z, 0.01).found
+        assert [effect.covariate for effect in alone] == ["slider_x"]
 
     def test_variance_as_in_training_is_not_reported(self, learnt) -> None:
         table = pushes(200, 401)

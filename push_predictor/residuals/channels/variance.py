@@ -1,7 +1,7 @@
 """The variance channel: covariates that the noise of the outcomes depends on, after effects on the mean.
 
 The test uses squared residuals, bounded so that a few outlying pushes decide nothing. The inputs are regressed out as
-in the search on the mean.
+in the search on the mean. With a learnt base, a relation counts only as far as it differs from that in training.
 """
 
 from __future__ import annotations
@@ -15,14 +15,21 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.channels.contrast import MAD_TO_SD
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, OF_SESSION, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.baseline import Baseline
+from push_predictor.residuals.selection.baseline import Baseline, difference
 from push_predictor.residuals.selection.power import QUANTILE
-from push_predictor.residuals.selection.screening import Scores, Screened, block_scores, screen
-from push_predictor.types import Array
+from push_predictor.residuals.selection.screening import (
+    Scores,
+    Screened,
+    block_scores,
+    raw_scores,
+    screen,
+    unit_scores,
+)
+from push_predictor.types import Array, IntArray
 
 TINY = 1e-12
 MOST = 9.0  # of a square: three standard deviations
@@ -66,6 +73,29 @@ class _Trial:
     output: str
     score: Scores
     ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Squares:
+    """Bounded squares (n, 3) of residuals after regression on the controls (n, m), with their table and blocks (n,)."""
+
+    residual: Array
+    controls: Array
+    table: PushTable
+    block: IntArray
+
+    @classmethod
+    def of(cls, model: PushModel, evidence: Evidence, z: Array) -> _Squares:
+        """The squares of residuals z (n, 3), with the model's inputs regressed out."""
+        controls = inputs_basis(model, evidence.table).columns
+        return cls(Residualizer(controls)(z), controls, evidence.table, evidence.block)
+
+    def raw_scores(self, basis: DriverBasis, on: Array) -> tuple[Scores, Array]:
+        """Block scores and information of a covariate's basis, for the variance of the outputs on (3,)."""
+        values = basis.values(self.table.covariates, len(self.residual))
+        residualizer = Residualizer(self.controls)
+        blocks = residualizer.blocks(_bounded_squares(self.residual), self.block)
+        return raw_scores(blocks, residualizer(on[None, :, None] * values[:, None, :]))
 
 
 def variance_effects(
@@ -112,9 +142,8 @@ def _tested(
     names: Sequence[str] | None,
     baseline: Baseline | None,
 ) -> VarianceFinding:
-    controls = inputs_basis(model, evidence.table).columns
-    residual = Residualizer(controls)(z)
-    trials = [t for name, basis in _bases(evidence, names) for t in _along(evidence, residual, controls, name, basis)]
+    squares = _Squares.of(model, evidence, z)
+    trials = [t for name, basis in _bases(evidence, names) for t in _along(squares, name, basis)]
     there = 0
     if baseline is not None:
         constant = _constant(model, evidence, z, baseline)
@@ -123,10 +152,32 @@ def _tested(
     if not trials:
         return VarianceFinding((), ())
     screened = screen([t.score for t in trials], seed)
-    found = _finding(trials, screened, alpha)
     if baseline is None:
-        return found
-    return replace(found, detectable=_detectable(screened.threshold(alpha), evidence, z, baseline))
+        return _finding(trials, screened, alpha)
+    detectable = _detectable(screened.threshold(alpha), evidence, z, baseline)
+    if baseline.inputs.learnt:
+        before = _Squares.of(model, baseline.evidence, baseline.evidence.z)
+        screened = _against_training(trials, screened, alpha, squares, before, seed)
+    return replace(_finding(trials, screened, alpha), detectable=detectable)
+
+
+def _against_training(
+    trials: Sequence[_Trial], screened: Screened, alpha: float, new: _Squares, before: _Squares, seed: int
+) -> Screened:
+    """Raise p of what is found along covariates of training to that of the difference from training, all at once."""
+    known = set(before.table.covariates) - {*OF_SESSION}
+    found = [
+        k
+        for k, t in enumerate(trials)
+        if screened.p_value[k] <= alpha and t.basis.drivers and known.issuperset(t.basis.drivers)
+    ]
+    if not found:
+        return screened
+    every = [(trials[k].basis, dict(_outputs())[trials[k].output]) for k in found]
+    changes = [difference(new.raw_scores(*each), before.raw_scores(*each)) for each in every]
+    p_value = screened.p_value.copy()
+    p_value[found] = np.maximum(p_value[found], screen(changes, seed).p_value)
+    return replace(screened, p_value=p_value)
 
 
 def _detectable(threshold: float, evidence: Evidence, z: Array, baseline: Baseline) -> float:
@@ -153,16 +204,16 @@ def _bases(evidence: Evidence, names: Sequence[str] | None) -> list[tuple[str, D
     return [(name, basis) for name, basis in screening_bases(evidence.table, names) if name not in LOCAL]
 
 
-def _along(evidence: Evidence, residual: Array, controls: Array, name: str, basis: DriverBasis) -> list[_Trial]:
+def _along(squares: _Squares, name: str, basis: DriverBasis) -> list[_Trial]:
     """One covariate against the variance of each output, and of all outputs."""
-    values = basis.values(evidence.table.covariates, len(residual))
-    size, squares, block = _log_squares(residual), _bounded_squares(residual), evidence.block
+    values = basis.values(squares.table.covariates, len(squares.residual))
+    size = _log_squares(squares.residual)
     slope, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(values)), values]), size, rcond=None)
     trend = np.exp(0.5 * np.ptp(values @ slope[1:], axis=0))
     trials = []
-    for output, on in _outputs(len(values)):
-        scores = block_scores(squares, on[:, :, None] * values[:, None, :], controls, block)
-        ratio = float(np.sqrt(np.prod(trend ** (2.0 * on[0] / on[0].sum()))))
+    for output, on in _outputs():
+        scores = unit_scores(*squares.raw_scores(basis, on))
+        ratio = float(np.sqrt(np.prod(trend ** (2.0 * on / on.sum()))))
         trials.append(_Trial(name, basis, output, scores, ratio))
     return trials
 
@@ -177,9 +228,9 @@ def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
-    for output, on in _outputs(len(controls)):
+    for output, on in _outputs():
         scores = block_scores(squares, (on * new[:, None])[:, :, None], controls, block)
-        strength = float(np.prod(ratio ** (on[0] / on[0].sum())))
+        strength = float(np.prod(ratio ** (on / on.sum())))
         trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
     return trials
 
@@ -194,9 +245,9 @@ def _inputs_of(tables: tuple[PushTable, PushTable]) -> PushTable:
     )
 
 
-def _outputs(n: int) -> list[tuple[str, Array]]:
-    each = [(name, np.tile(np.eye(len(OUTPUTS))[k], (n, 1))) for k, name in enumerate(OUTPUTS)]
-    return [(ALL, np.ones((n, len(OUTPUTS)))), *each]
+def _outputs() -> list[tuple[str, Array]]:
+    """Which outputs (3,) a trial concerns: all, then each."""
+    return [(ALL, np.ones(len(OUTPUTS))), *zip(OUTPUTS, np.eye(len(OUTPUTS)), strict=True)]
 
 
 def _padded(trial: _Trial, rows: int) -> _Trial:
