@@ -131,16 +131,19 @@ def trace(
     rig: Rig | AnyPath | None = None,
     seed: int = 0,
     watch: Watch | None = None,
+    experiment: AnyPath | Sequence[AnyPath] = (),
 ) -> Trace:
     """Find out why a model no longer fits new recordings: the effect it lacks, its size, and the extended model.
 
     alpha: probability of reporting any effect where there is none. covariates: those to try; all unless given.
+    experiment: recordings of the pushes that an earlier trace proposed; they are analysed and never held out.
     Raises RequestError, RecordingError, TableError or RigError.
     """
     from push_predictor.residuals.evidence.loading import load_evidence
     from push_predictor.residuals.trace import trace as trace_loaded
 
-    loaded = load_evidence(_paths(data), _rig(rig), window_options(model))
+    designed = _paths(experiment) if experiment else []
+    loaded = load_evidence(_paths(data), _rig(rig), window_options(model), experiment=designed)
     watch = watch or _print_stage
     return trace_loaded(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 

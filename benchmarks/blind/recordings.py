@@ -46,15 +46,11 @@ class Size:
 
 def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: Path) -> Drawn:
     """Simulate recording `number` of a group (none or one of GROUPS) into out/NNN, its truth into truth/NNN.json."""
-    rng = np.random.default_rng([seed, number])
-    plain = rig_of(rng, f"{number:03d}", size.training)
-    later = later_spec(plain, rng, int(rng.integers(size.least, size.most + 1)))
-    drawn = drawn_for(later, group, rng)
-    acting = {"changes": drawn.act} if isinstance(drawn.act, Changes) else {"faults": drawn.act}
+    plain, later, drawn = drawn_recording(number, group, seed, size)
     folder = out / f"{number:03d}"
     training = simulate(replace(plain, name="training"))
     folder.mkdir(parents=True, exist_ok=True)
-    write_recording(folder / "new", simulate(replace(later, name="new", **acting)))
+    write_recording(folder / "new", simulate(later))
     rig = training.rig
     assert rig is not None  # the simulator knows its rig
     table = windows_to_table(find_windows(training, rig))
@@ -65,6 +61,16 @@ def make_one(number: int, group: str, seed: int, size: Size, out: Path, truth: P
     known |= {"friction": plain.table.friction, "pushes": len(later.pushes)}
     (truth / f"{number:03d}.json").write_text(json.dumps({**known, **drawn.described()}, indent=1))
     return drawn
+
+
+def drawn_recording(number: int, group: str, seed: int, size: Size) -> tuple[SimulationSpec, SimulationSpec, Drawn]:
+    """The training recording without its effect, the later one with it, and the effect; the same in every call."""
+    rng = np.random.default_rng([seed, number])
+    plain = rig_of(rng, f"{number:03d}", size.training)
+    later = later_spec(plain, rng, int(rng.integers(size.least, size.most + 1)))
+    drawn = drawn_for(later, group, rng)
+    acting = {"changes": drawn.act} if isinstance(drawn.act, Changes) else {"faults": drawn.act}
+    return plain, replace(later, name="new", **acting), drawn
 
 
 def rig_of(rng: np.random.Generator, name: str, pushes: int) -> SimulationSpec:

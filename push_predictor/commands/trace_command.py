@@ -33,6 +33,16 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor trace bags/new --model abs.pushmodel --report trace.html --save-model extended.pushmodel",
     )
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
+    parser.add_argument(
+        "--and",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="RECORDING",
+        dest="experiment",
+        help="recording of the pushes that an earlier trace of the same data proposed; may be repeated. They are "
+        "analysed and never held out",
+    )
     parser.add_argument("--model", required=True, type=Path, metavar="MODEL", help="the deployed model")
     parser.add_argument(
         "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
@@ -62,7 +72,13 @@ def run(options: argparse.Namespace) -> None:
     rig = load_rig(options.rig) if options.rig else None
     with progress("trace"):
         found = trace_data(
-            options.data, options.model, alpha=options.alpha, covariates=names, rig=rig, seed=options.seed
+            options.data,
+            options.model,
+            alpha=options.alpha,
+            covariates=names,
+            rig=rig,
+            seed=options.seed,
+            experiment=options.experiment,
         )
     saved = False
     try:
@@ -84,7 +100,7 @@ def _check(options: argparse.Namespace) -> None:
     check_output("--save-model", options.save_model)
     if options.report is not None:
         html.check_installed("--report")
-    check_data(options.data)
+    check_data([*options.data, *options.experiment])
 
 
 def _names(text: str) -> list[str]:

@@ -30,7 +30,12 @@ from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
 from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
 from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
 from push_predictor.residuals.evidence.instrument import GAP, with_instrument
-from push_predictor.residuals.evidence.loading import LoadedData, cut_again, load_evidence, previous_residual
+from push_predictor.residuals.evidence.loading import (
+    LoadedData,
+    corrected_data,
+    load_evidence,
+    previous_residual,
+)
 from push_predictor.residuals.evidence.split import digest_of, held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.extension.effect_size import size_of
@@ -57,11 +62,17 @@ def trace_data(
     rig: Rig | None = None,
     seed: int = 0,
     watch: Watch = no_watch,
+    experiment: Sequence[Path | str] = (),
 ) -> Trace:
-    """Judge a model file on recordings or push tables that it was not trained on; see `trace`."""
+    """Judge a model file on recordings or push tables that it was not trained on; see `trace`.
+
+    experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
+    the errors before and after are of the same pushes as in that trace.
+    """
     watch("windows", 0.0)
     model = load_model(Path(model_path))
-    loaded = load_evidence([Path(path) for path in paths], rig, window_options(model))
+    data, designed = ([Path(path) for path in given] for given in (paths, experiment))
+    loaded = load_evidence(data, rig, window_options(model), experiment=designed)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 
@@ -143,9 +154,10 @@ class _Context:
         shift = input_shift(model, loaded.table)
         searched = about_mechanics(model) if shift.inputs else model
         every = widened(evidence_of(searched, loaded.table), model.training, shift)
+        every = replace(every, chosen=loaded.chosen)
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
-        held, usable = held_out_rows(table), with_instrument(table)
+        held, usable = held_out_rows(table, loaded.chosen), with_instrument(table)
         if GAP in (covariates or ()) and GAP not in usable.covariates:
             raise RequestError(
                 "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"
@@ -219,9 +231,10 @@ def _corrected(context: _Context, measured: MeasurementFinding) -> _Corrected:
     recordings = list(context.loaded.recordings)
     for error in measured.errors:
         recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
-    table = cut_again(recordings, context.loaded.rig, window_options(context.model))
-    held = held_out_rows(table)
-    return _Corrected(measured, evidence_of(context.model, table.take(~held)), table.take(held))
+    again = corrected_data(context.loaded, recordings, window_options(context.model))
+    held = held_out_rows(again.table, again.chosen)
+    analysis, held_out = again.table.take(~held), again.table.take(held)
+    return _Corrected(measured, replace(evidence_of(context.model, analysis), chosen=again.chosen), held_out)
 
 
 def _explains_residuals(context: _Context, corrected: _Corrected) -> bool:
@@ -316,7 +329,7 @@ def _of_motion(context: _Context, found: Searched) -> Trace:
         tested=(tested[0] + _family_wise(measured.tested if measured else (), "measurement") + tested[1]),
         minimum_detectable=motion.minimum_detectable,
         remaining=motion.remaining,
-        experiment=motion.experiment,
+        experiment=motion.experiment.pushes,
         alpha=context.alpha,
         input_shift=context.shifted,
         notes=notes_of(context.loaded, motion, measured, forces),

@@ -38,6 +38,7 @@ class SimulationSpec:
     contact_friction: mean coefficient. acceleration: of the robot, m/s^2. place_spread (m), turn_spread (rad):
     standard deviations of the slider's pose before a push. changes: effects in addition to the plain rig; faults:
     measurement errors. topics: recorded scalars by name. pauses (n,): waiting time before each push, s; None: none.
+    start (n, 3): poses of the slider before each push, NaN where they are drawn; None: all are drawn.
     """
 
     shape: str | Slider
@@ -56,6 +57,7 @@ class SimulationSpec:
     faults: Faults = FAULTLESS
     topics: Mapping[str, Topic] = field(default_factory=dict)
     pauses: Array | None = None
+    start: Array | None = None
 
     @property
     def slider(self) -> Slider:
@@ -125,4 +127,5 @@ def _contact_noise(spec: SimulationSpec, knots: int) -> PushNoise:
 def start_poses(spec: SimulationSpec) -> Array:
     """Poses of the slider before each push: (n, 3) x, y in m, heading in rad."""
     spread = np.array([spec.place_spread, spec.place_spread, spec.turn_spread])
-    return np.asarray(spread * spec.rng(1).standard_normal((len(spec.pushes), 3)))
+    drawn = np.asarray(spread * spec.rng(1).standard_normal((len(spec.pushes), 3)))
+    return drawn if spec.start is None else np.where(np.isnan(spec.start), drawn, spec.start)

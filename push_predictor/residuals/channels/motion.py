@@ -18,7 +18,7 @@ from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_b
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.experiment import separating_pushes
+from push_predictor.residuals.selection.experiment import Experiment, separating_pushes
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.pruning import needed_terms
@@ -51,13 +51,13 @@ class MotionFinding:
     deviation: Array | None
     minimum_detectable: Mapping[str, Mapping[str, Any]]
     remaining: Label | None
-    experiment: tuple[Mapping[str, float], ...]
+    experiment: Experiment
     variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
 
 
-NO_MOTION = MotionFinding((), (), (), (), None, {}, None, (), (), (), ())
+NO_MOTION = MotionFinding((), (), (), (), None, {}, None, Experiment(), (), (), ())
 
 
 def motion_effects(
@@ -94,7 +94,7 @@ def motion_effects(
             **_detectable_noise(spread),
         },
         remaining=_remaining(found, share),
-        experiment=_experiment(first, evidence, inputs),
+        experiment=_experiment(first, evidence, inputs, model, inside),
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
@@ -159,12 +159,15 @@ def _unchanged(found: SearchResult) -> tuple[Label, ...]:
     return tuple(candidate.label for candidate in reversed(strongest.values()))
 
 
-def _experiment(first: SelectedTerm | None, evidence: Evidence, inputs: InputsBasis) -> tuple[Mapping[str, float], ...]:
+def _experiment(
+    first: SelectedTerm | None, evidence: Evidence, inputs: InputsBasis, model: PushModel, inside: BoolArray | None
+) -> Experiment:
     """Pushes that would separate the rivals of the first term, one rival per covariate, each fitted to these data."""
     if first is None:
-        return ()
+        return Experiment()
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
     controls = inputs.columns if inputs.absorbs else None
-    return separating_pushes(evidence, [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()])
+    fitted = [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()]
+    return separating_pushes(evidence, fitted, model.training, inside)

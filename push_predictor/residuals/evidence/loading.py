@@ -13,7 +13,7 @@ from push_predictor.recordings.load import distinct_pushes, load_rig_for
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
-from push_predictor.recordings.table import INPUTS, PushTable, concatenate
+from push_predictor.recordings.table import INPUTS, PushTable, concatenate, empty_table
 from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
@@ -29,37 +29,54 @@ class LoadedData:
     """Windows in order of time, the recordings they were cut from, and the rig.
 
     recordings: None where a push table was given. dropped: covariates that some rows lack, each with the reason.
+    chosen: pushes of a designed experiment; the trace never holds them out. designed: the numbers of its recordings.
     """
 
     table: PushTable
     recordings: tuple[Recording, ...] | None
     rig: Rig
     dropped: dict[str, str] = field(default_factory=dict)
+    chosen: frozenset[str] = frozenset()
+    designed: frozenset[int] = frozenset()
 
 
 def load_evidence(
-    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions()
+    paths: Sequence[Path],
+    rig: Rig | None = None,
+    options: WindowOptions = WindowOptions(),
+    *,
+    experiment: Sequence[Path] = (),
 ) -> LoadedData:
     """Load recordings and push tables; rig overrides theirs.
 
-    Raises RecordingError (also if no file contains a window), TableError or RigError.
+    experiment: recordings of pushes that an earlier trace proposed. They continue the recordings before them, with the
+    same number, so that the experiment adds no covariate `recording` of its own. Raises RecordingError (also if no file
+    contains a window, or one is given twice), TableError or RigError.
     """
-    rig = rig or load_rig_for(paths)
-    bags = [path for path in paths if is_recording(Path(path))]
-    recordings = sorted((read_recording(Path(path), rig=rig) for path in bags), key=_first_stamp)
-    files = [Path(path) for path in paths if not is_recording(Path(path))]
-    tables = [*_cut(recordings, rig, options), *(_read(path, rig) for path in files)]
-    if not any(map(len, tables)):
-        raise RecordingError(f"{', '.join(map(str, paths))}: no push was found, give recordings of pushes")
-    names = [*(recording.name for recording in recordings), *(path.name for path in files)]
-    table, dropped = _joined(distinct_pushes(names, tables))
-    return LoadedData(table, None if files else tuple(recordings), rig, dropped)
+    every = [Path(path) for path in (*paths, *experiment)]
+    designed = {Path(path).resolve() for path in experiment}
+    if twice := designed & {Path(path).resolve() for path in paths}:
+        raise RecordingError(f"{min(twice)}: given as data and as experiment, give it once")
+    rig = rig or load_rig_for(every)
+    bags = [(path.resolve() in designed, read_recording(path, rig=rig)) for path in every if is_recording(path)]
+    bags.sort(key=lambda bag: _first_stamp(bag[1]))
+    files = [path for path in every if not is_recording(path)]
+    tables = [(path.resolve() in designed, path.name, _read(path, rig)) for path in files]
+    found = _loaded(bags, tables, rig, options)
+    if not len(found.table):
+        raise RecordingError(f"{', '.join(map(str, every))}: no push was found, give recordings of pushes")
+    return found
 
 
 def cut_again(recordings: Sequence[Recording], rig: Rig, options: WindowOptions = WindowOptions()) -> PushTable:
     """Cut the windows of recordings, in order of time, after a correction of their streams or the rig."""
-    tables = _cut(recordings, rig, options)
-    return _joined(distinct_pushes([recording.name for recording in recordings], tables))[0]
+    return _loaded([(False, recording) for recording in recordings], [], rig, options).table
+
+
+def corrected_data(loaded: LoadedData, recordings: Sequence[Recording], options: WindowOptions) -> LoadedData:
+    """The same data after a correction of their recordings' streams, in the same order."""
+    bags = [(number in loaded.designed, recording) for number, recording in enumerate(recordings)]
+    return _loaded(bags, [], loaded.rig, options)
 
 
 def with_inputs(table: PushTable) -> PushTable:
@@ -80,6 +97,32 @@ def previous_residual(table: PushTable, z: Array) -> Array:
     of_push[push] = recording
     follows = np.concatenate([[False], of_push[1:] == of_push[:-1]])
     return np.asarray(np.where(follows, np.roll(mean, 1), 0.0)[push])
+
+
+def _loaded(
+    bags: Sequence[tuple[bool, Recording]],
+    files: Sequence[tuple[bool, str, PushTable]],
+    rig: Rig,
+    options: WindowOptions,
+) -> LoadedData:
+    """Recordings in order of time, then tables with their names; each with whether it is a designed experiment."""
+    recordings = tuple(recording for _, recording in bags)
+    designed = [*(of for of, _ in bags), *(of for of, _, _ in files)]
+    names = [*(recording.name for recording in recordings), *(name for _, name, _ in files)]
+    cut = [*_cut(recordings, rig, options), *(table for _, _, table in files)]
+    if not any(map(len, cut)):
+        return LoadedData(empty_table(), None if files else recordings, rig)
+    tables = distinct_pushes(names, cut)
+    table, dropped = _joined(tables, designed)
+    chosen = frozenset(push for of, each in zip(designed, tables, strict=True) if of for push in each.pushes)
+    return LoadedData(
+        table,
+        None if files else recordings,
+        rig,
+        dropped,
+        chosen,
+        frozenset(number for number, (of, _) in enumerate(bags) if of),
+    )
 
 
 def _first_stamp(recording: Recording) -> int:
@@ -121,10 +164,13 @@ def _read(path: Path, rig: Rig) -> PushTable:
     return replace(table, covariates={"edge": edge, **table.covariates})
 
 
-def _joined(tables: Sequence[PushTable]) -> tuple[PushTable, dict[str, str]]:
-    """One table with the number of each row's recording, and the covariates that some rows lack."""
-    full = [(number, table) for number, table in enumerate(tables) if len(table)]
-    numbered = [_numbered(number, table) for number, table in full]
+def _joined(tables: Sequence[PushTable], designed: Sequence[bool]) -> tuple[PushTable, dict[str, str]]:
+    """One table with the number of each row's recording, and the covariates that some rows lack.
+
+    A designed experiment has the number of the recording that it continues.
+    """
+    numbers = np.maximum(np.cumsum(~np.asarray(designed)) - 1, 0).tolist()
+    numbered = [_numbered(number, table) for number, table in zip(numbers, tables, strict=True) if len(table)]
     table = _indexed(concatenate(numbered))
     dropped = {}
     names = dict.fromkeys(name for part in numbered for name in part.covariates if name != "push_index")

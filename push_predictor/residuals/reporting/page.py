@@ -44,8 +44,10 @@ UNNAMED = (
     "Here no mechanism does. A tested mechanism can be significant because it resembles the pattern."
 )
 EXPERIMENT = (
-    "Make the pushes below, with the covariates set as the table shows. There the predictions of the rivals differ "
-    "most. Each push is in these data, at other values of the covariates."
+    "Make the pushes below in this order, with the covariates set as the table shows. There the predictions of the "
+    "rivals differ most. Each push is in these data, at other values of the covariates. Elapsed time, push count and "
+    "distance slid only grow: rest, or push, until they reach the first row. Then trace again: add --and and the new "
+    "recording to the command."
 )
 
 

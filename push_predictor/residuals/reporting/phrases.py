@@ -66,6 +66,7 @@ COVARIATES: dict[str, str] = {
     "tangential_force": "tangential force",
     "previous_residual": "the residual of the previous push",
     "recording": "recording",
+    "travel": "length of the push",
     SESSION: "the session (since training)",
     CONSTANT: "nothing (constant)",
 }
@@ -150,7 +151,7 @@ def capitalised(text: str) -> str:
 
 def unit_of(covariate: str) -> str:
     """The unit of a covariate, empty if none is known."""
-    return UNITS.get(covariate, "")
+    return "m" if covariate == "travel" else UNITS.get(covariate, "")
 
 
 def shown_unit_of(covariate: str) -> tuple[float, str]:

@@ -1,0 +1,108 @@
+"""What the operator of a rig can set for further pushes, and what only continues.
+
+Pose of the slider, dwell time and recorded topics can be set. Time, push count and distance slid only grow: time in a
+rest, and distance faster than the count in long pushes. Everything else, such as the gap at the contact, is not set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.recordings.table import INPUTS, PushTable
+from push_predictor.residuals.evidence.standardised import push_order
+from push_predictor.types import Array
+
+TIME, COUNT, DISTANCE = GROWING = ("elapsed_time", "push_index", "slid_distance")
+PLACED = ("slider_x", "slider_y", "dwell_time")
+TOPIC = "topic:"
+ENDS = (0.05, 0.95)  # quantiles of the recorded values between which a covariate is set
+TURNS = 4  # headings of the slider that are tried
+REST = 0.5  # of the session so far: a longer rest would extrapolate further
+LONG_PUSH = 0.08  # m, about the length of a slider: few contacts last longer
+
+
+def is_set(name: str) -> bool:
+    """Whether an operator can choose the value of a covariate freely; the inputs are part of the push itself."""
+    return name in PLACED or name in HEADINGS or name.startswith(TOPIC)
+
+
+def is_proposed(name: str) -> bool:
+    """Whether a proposed push states a value of this covariate."""
+    return is_set(name) or name in GROWING
+
+
+def settings(session: PushTable, rows: PushTable, drivers: Sequence[str], count: int) -> list[dict[str, Array]]:
+    """Covariates (n,) of these n rows of a session, pushed again after it, in each combination of what can be set.
+
+    Drivers that can be set are at the low or the high end of the session's values, the slider at TURNS headings. Those
+    that only grow have their values in the middle of `count` further pushes.
+    """
+    free = [name for name in drivers if is_set(name) and name not in HEADINGS]
+    choices: list[list[dict[str, Array]]] = [_ends(session, name, len(rows)) for name in free]
+    if any(name in HEADINGS for name in drivers):
+        choices.append(_turned(rows))
+    later = continued(session, drivers, count)
+    base = {**rows.covariates, **{name: np.full(len(rows), values[count // 2]) for name, values in later.items()}}
+    return [{**base, **{k: v for part in chosen for k, v in part.items()}} for chosen in product(*choices)]
+
+
+def continued(session: PushTable, drivers: Sequence[str], count: int) -> dict[str, Array]:
+    """Values (count,) of the covariates that only grow, at further pushes made after a session.
+
+    With time and another of them among the drivers, a rest comes first. With count and distance among them, the pushes
+    are long.
+    """
+    travel = travel_of(session, drivers)
+    steps = {TIME: _per_push(session, TIME), COUNT: 1.0, DISTANCE: travel or _per_push(session, DISTANCE)}
+    rested = TIME in drivers and bool({COUNT, DISTANCE} & set(drivers))
+    begin = {TIME: REST * float(np.ptp(session.covariates[TIME]))} if rested else {}
+    return {
+        name: float(session.covariates[name].max()) + begin.get(name, 0.0) + step * np.arange(1.0, count + 1.0)
+        for name, step in steps.items()
+        if name in session.covariates
+    }
+
+
+def travel_of(session: PushTable, drivers: Sequence[str]) -> float | None:
+    """The distance (m) that each further push should slide, None where it does not matter."""
+    if not {COUNT, DISTANCE} <= set(drivers):
+        return None
+    return max(LONG_PUSH, _per_push(session, DISTANCE))
+
+
+def lengthening(session: PushTable, drivers: Sequence[str]) -> float:
+    """How many times longer the further pushes are than these."""
+    usual, travel = _per_push(session, DISTANCE), travel_of(session, drivers)
+    return 1.0 if travel is None or usual <= 0.0 else travel / usual
+
+
+def proposed(covariates: Mapping[str, Array], drivers: Sequence[str], row: int) -> dict[str, float]:
+    """What to set for one push: the drivers that can be, and the slider's heading if it is known."""
+    names = dict.fromkeys(name for name in drivers if name not in INPUTS and is_proposed(name))
+    if "slider_heading" in covariates:
+        names["slider_heading"] = None
+    return {name: float(covariates[name][row]) for name in names}
+
+
+def _ends(session: PushTable, name: str, count: int) -> list[dict[str, Array]]:
+    return [{name: np.full(count, value)} for value in np.quantile(session.covariates[name], ENDS)]
+
+
+def _turned(rows: PushTable) -> list[dict[str, Array]]:
+    """The slider at several headings; the direction of the push in the world turns with it."""
+    own = [name for name in HEADINGS if name in rows.covariates]
+    turns = 2.0 * np.pi * np.arange(TURNS) / TURNS - rows.covariates[own[0]][:, None]
+    return [{name: wrap_angle(rows.covariates[name] + by) for name in own} for by in turns.T]
+
+
+def _per_push(session: PushTable, name: str) -> float:
+    """Mean increase of a covariate from push to push; 0 if it is not recorded."""
+    if name not in session.covariates:
+        return 0.0
+    count = session.covariates.get(COUNT, push_order(session))
+    return float(np.ptp(session.covariates[name])) / max(float(np.ptp(count)), 1.0)

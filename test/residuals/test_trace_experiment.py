@@ -1,0 +1,154 @@
+"""Pushes that a trace proposes to separate rivals, and how the recording of such pushes is taken in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_up_traces import planted, pushes, slippery
+from synthetic import square_rig
+
+from push_predictor.geometry.frames import wrap_angle
+from push_predictor.models.effects.driver_basis import DriverBasis
+from push_predictor.models.effects.effect import Effect
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.train import train_model
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.selection.experiment import APART, PUSHES, Experiment, separating_pushes
+
+SESSION = pushes(120, 2)
+SLID = 0.01 * SESSION.covariates["push_index"]  # m
+WARMTH = 20.0 + 0.005 * SESSION.covariates["elapsed_time"]
+TABLE = replace(SESSION, covariates={**SESSION.covariates, "slid_distance": SLID, "topic:/warmth": WARMTH})
+TRAINING = pushes(60, 1)
+
+
+@pytest.fixture(scope="module")
+def model() -> PushModel:
+    return train_model(TRAINING, square_rig(), "analytical", name="deployed")
+
+
+@pytest.fixture(scope="module")
+def evidence(model: PushModel) -> Evidence:
+    return evidence_of(model, TABLE)
+
+
+def along(name: str, size: float = 0.05) -> Effect:
+    """A contact friction that changes linearly with a covariate, by `size` per standard deviation."""
+    values = TABLE.covariates[name]
+    basis = DriverBasis("linear", (name,), (float(values.mean()),), (float(values.std()),))
+    return planted("contact_friction", name, basis, size)
+
+
+def step(name: str, place: float) -> Effect:
+    """A contact friction that changes at once."""
+    return planted("contact_friction", name, DriverBasis("step", (name,), place=place), 0.1)
+
+
+def column(found: Experiment, name: str) -> np.ndarray:
+    return np.array([push[name] for push in found.pushes])
+
+
+class TestProposedPushes:
+    def test_are_twenty_different_pushes_spread_over_the_inputs(self, evidence: Evidence) -> None:
+        found = separating_pushes(evidence, [along("elapsed_time"), along("topic:/warmth")], TRAINING)
+        assert len(found.pushes) == PUSHES and not found.inseparable
+        contact, angle = column(found, "contact"), column(found, "angle")
+        assert len(set(zip(contact, angle, strict=True))) == PUSHES
+        away = np.abs(contact[:, None] - contact)
+        away = np.hypot(np.minimum(away, 1.0 - away), (angle[:, None] - angle) / (np.pi / 2.0))
+        np.fill_diagonal(away, np.inf)
+        assert np.median(away.min(axis=1)) > 0.3 * APART
+        assert len({int(4.0 * place) for place in contact}) == 4  # all sides
+
+    def test_stay_within_the_inputs_of_training(self, evidence: Evidence) -> None:
+        narrow = TRAINING.take(np.abs(TRAINING.inputs[:, 2]) < 0.3)
+        found = separating_pushes(evidence, [along("elapsed_time"), along("topic:/warmth")], narrow)
+        assert found.pushes and np.abs(column(found, "angle")).max() <= np.abs(narrow.inputs[:, 2]).max()
+        inside = TABLE.inputs[:, 1] < 0.5
+        found = separating_pushes(evidence, [along("elapsed_time"), along("topic:/warmth")], TRAINING, inside)
+        assert found.pushes and column(found, "contact").max() < 0.5
+
+    def test_of_a_topic_and_time_set_the_topic_to_both_ends_while_time_goes_on(self, evidence: Evidence) -> None:
+        found = separating_pushes(evidence, [along("elapsed_time"), along("topic:/warmth")], TRAINING)
+        warmth, time = column(found, "topic:/warmth"), column(found, "elapsed_time")
+        low, high = np.quantile(WARMTH, [0.05, 0.95])
+        assert set(warmth) <= {low, high} and low in warmth
+        assert time[0] > TABLE.covariates["elapsed_time"].max() and np.all(np.diff(time) > 0.0)
+        assert time[0] < 1.1 * TABLE.covariates["elapsed_time"].max()  # no rest is needed
+
+    def test_of_time_and_count_come_after_a_rest(self, evidence: Evidence) -> None:
+        found = separating_pushes(evidence, [along("elapsed_time"), along("push_index")], TRAINING)
+        time, count = column(found, "elapsed_time"), column(found, "push_index")
+        assert time[0] > 1.4 * TABLE.covariates["elapsed_time"].max()
+        assert np.array_equal(count, 119.0 + np.arange(1.0, PUSHES + 1.0))
+        assert not any("travel" in push for push in found.pushes)
+
+    def test_of_count_and_distance_are_long(self, evidence: Evidence) -> None:
+        found = separating_pushes(evidence, [along("slid_distance", 0.1), along("push_index", 0.1)], TRAINING)
+        assert np.allclose(column(found, "travel"), 0.08)
+        assert np.allclose(np.diff(column(found, "slid_distance")), 0.08)
+
+    def test_of_headings_turn_the_slider_and_the_push_with_it(self, model: PushModel) -> None:
+        basis = DriverBasis("periodic", ("slider_heading",))
+        other = DriverBasis("periodic", ("push_heading",))
+        rivals = [planted("contact_friction", b.drivers[0], b, 0.05, 0.05) for b in (basis, other)]
+        found = separating_pushes(evidence_of(model, TABLE), rivals, TRAINING)
+        normal = square_rig().outline.inward_normal(column(found, "contact"))
+        away = wrap_angle(
+            column(found, "push_heading")
+            - column(found, "slider_heading")
+            - np.arctan2(normal[:, 1], normal[:, 0])
+            - column(found, "angle")
+        )
+        assert np.abs(away).max() < 1e-9
+        assert len(set(np.round(column(found, "slider_heading"), 6))) > 1
+
+    def test_do_not_set_what_no_operator_can(self, model: PushModel) -> None:
+        gap = np.random.default_rng(0).normal(0.0, 1e-4, len(TABLE))
+        covariates = {**TABLE.covariates, "contact_gap": gap, "previous_residual": gap[::-1].copy()}
+        of_gap, of_residual = (
+            planted("contact_friction", name, DriverBasis("linear", (name,), (0.0,), (1e-4,)), 0.05)
+            for name in ("contact_gap", "previous_residual")
+        )
+        known = evidence_of(model, replace(TABLE, covariates=covariates))
+        found = separating_pushes(known, [along("topic:/warmth"), of_gap, of_residual], TRAINING)
+        assert found.pushes
+        assert all(not {"contact_gap", "previous_residual"} & set(push) for push in found.pushes)
+
+    def test_are_none_for_rivals_that_nothing_separates(self, evidence: Evidence) -> None:
+        """A step in the past: whichever covariate it depends on, it stays."""
+        found = separating_pushes(evidence, [step("elapsed_time", 500.0), step("push_index", 59.5)], TRAINING)
+        assert found.pushes == () and found.inseparable == ("push_index",)
+
+    def test_are_for_the_rivals_that_can_be_separated(self, evidence: Evidence) -> None:
+        rivals = [step("elapsed_time", 500.0), step("push_index", 59.5), along("topic:/warmth")]
+        found = separating_pushes(evidence, rivals, TRAINING)
+        assert found.inseparable == ("push_index",)
+        assert found.pushes and all("push_index" not in push for push in found.pushes)
+
+    def test_are_none_without_a_rival(self, evidence: Evidence) -> None:
+        assert separating_pushes(evidence, [slippery(0.05)], TRAINING).pushes == ()
+
+
+class TestPushesOfAnExperiment:
+    CHOSEN = frozenset(TABLE.pushes[-20:])
+
+    def test_are_never_held_out_and_leave_the_split_of_the_others_alone(self) -> None:
+        chosen = np.isin(TABLE.push_id, sorted(self.CHOSEN))
+        held = held_out_rows(TABLE, self.CHOSEN)
+        assert held.any() and not held[chosen].any()
+        assert np.array_equal(held[~chosen], held_out_rows(TABLE.take(~chosen)))
+
+    def test_are_blocks_of_their_own(self, evidence: Evidence) -> None:
+        table = pushes(420, 3)
+        later = frozenset(table.pushes[-20:])
+        shaped = replace(Evidence(table, table.outcomes, np.tile(np.eye(3), (len(table), 1, 1)), evidence.mechanics))
+        block = replace(shaped, chosen=later).block
+        chosen = np.isin(table.push_id, sorted(later))
+        assert len(set(block[chosen])) == 20 and not set(block[chosen]) & set(block[~chosen])
+        assert len(set(block[~chosen])) == 100
+        taken = replace(shaped, chosen=later).take(chosen)
+        assert len(set(taken.block)) == 20
