@@ -174,28 +174,30 @@ class Outline:
         return bool(np.allclose(image, np.roll(self.vertices, -(len(image) // order), axis=0), atol=SAME_LENGTH))
 
     def _project_polygon(self, points: Array) -> Projection:
-        along, squared = self._edges
-        offset = points[:, None, :] - self.vertices[None]
-        fraction = np.minimum(np.maximum(np.einsum("nej,ej->ne", offset, along) / squared, 0.0), 1.0)
-        away = offset - fraction[..., None] * along
-        distance = np.einsum("nej,nej->ne", away, away)
-        rows = np.arange(len(points))
-        edge = np.argmin(distance, axis=1)
-        share, away = fraction[rows, edge], away[rows, edge]
-        length = np.sqrt(distance[rows, edge])
-        inside = self._contains(points)
+        # By edge first and by coordinate: arrays of n numbers in a row, where those of two would be slow.
+        (x, y), (x0, y0), (along_x, along_y) = points.T, self.vertices.T[..., None], self._edges[0].T[..., None]
+        offset_x, offset_y = x - x0, y - y0
+        fraction = (offset_x * along_x + offset_y * along_y) / self._edges[1][:, None]
+        fraction = np.minimum(np.maximum(fraction, 0.0), 1.0)
+        away_x, away_y = offset_x - fraction * along_x, offset_y - fraction * along_y
+        distance = away_x * away_x + away_y * away_y
+        edge, rows = np.argmin(distance, axis=0), np.arange(len(points))
+        share, length = fraction[edge, rows], np.sqrt(distance[edge, rows])
+        away = np.stack([away_x[edge, rows], away_y[edge, rows]], axis=1)
+        inside = self._contains(offset_x, offset_y)
         at_vertex = ((share <= 0.0) | (share >= 1.0)) & ~inside & (length > 0.0)
         radial = away / np.maximum(length, 1e-300)[:, None]
         normal = np.where(at_vertex[:, None], radial, self._edge_normals[edge])
         contact = self.contact_on_edge(edge, share)
         return Projection(contact, points - away, normal, np.where(inside, -length, length), at_vertex)
 
-    def _contains(self, points: Array) -> BoolArray:
-        x, y = points[:, :1], points[:, 1:]
-        (x0, y0), (along, rise) = self.vertices.T, self._edges[0].T
-        crosses = (y0 > y) != (self._ends[:, 1] > y)
-        right_of = x < x0 + (y - y0) * along / np.where(rise == 0.0, 1.0, rise)
-        return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=1))
+    def _contains(self, offset_x: Array, offset_y: Array) -> BoolArray:
+        """Which of n points lie inside; offsets (V, n) of each from the vertices."""
+        along, rise = self._edges[0].T[..., None]
+        below = offset_y < 0.0
+        crosses = below != np.concatenate([below[1:], below[:1]])
+        right_of = offset_x < offset_y * (along / np.where(rise == 0.0, 1.0, rise))
+        return np.asarray(np.logical_xor.reduce(crosses & right_of, axis=0))
 
     # --- circles and ellipses -----------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, mechanism_named
-from push_predictor.models.effects.exact import Mechanics, joint, joint_shift
+from push_predictor.models.effects.exact import Mechanics, joint, joint_shift, undisturbed
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -117,6 +117,18 @@ def test_designs_are_derivatives_where_the_effects_act(name: str) -> None:
         )
         difference = (more - less) / (0.6 * spread[k])
         assert size_of(design[:, :, k] - difference) < 0.15 * size_of(difference)
+
+
+@pytest.mark.parametrize("name", ["contact_friction", "body_anisotropy", "inertia"])
+def test_a_known_displacement_without_effects_is_taken_instead_of_computed(name: str) -> None:
+    on, push = square(), made(12, 5)
+    acting = effect(name, *np.full(len(mechanism_named(name).parameters), 0.2))
+    known = undisturbed(on, push)
+    found, expected = joint(on, [acting], push, unchanged=known), joint(on, [acting], push)
+    np.testing.assert_allclose(found.shift, expected.shift, atol=1e-10)
+    np.testing.assert_allclose(found.designs[0], expected.designs[0], atol=1e-9)
+    elsewhere = joint(on, [acting], push, derivatives=False, unchanged=known + 1.0)
+    np.testing.assert_allclose(elsewhere.shift, expected.shift - 1.0, atol=1e-10)
 
 
 def test_a_parameter_stays_within_its_plausible_range() -> None:

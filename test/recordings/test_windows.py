@@ -179,9 +179,9 @@ def test_tare_is_the_mean_of_the_last_readings_before_the_push(gap: float) -> No
     segmenter = PushSegmenter(WindowOptions())
     rest = ContactSample(0, 0.0, gap, 0.0, 0.0, np.zeros(2), 0.0, False, False, False, False)
     for k, force in enumerate([*np.full(20, 1.0), *np.linspace(1.0, 2.0, TARE_SAMPLES)]):
-        segmenter.step(replace(rest, stamp=4_000_000 * k, time=0.004 * k, force=np.array([force, 0.0])))
-    pushing = replace(rest, gap=0.0005, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
-    segmenter.step(replace(pushing, stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
+        segmenter.step(rest._replace(stamp=4_000_000 * k, time=0.004 * k, force=np.array([force, 0.0])))
+    pushing = rest._replace(gap=0.0005, force=np.array([5.0, 0.0]), speed=0.02, at_speed=True)
+    segmenter.step(pushing._replace(stamp=4_000_000 * (k + 1), time=0.004 * (k + 1)))
     assert segmenter.push is not None and segmenter.push.tare is not None
     np.testing.assert_allclose(segmenter.push.tare, [1.5, 0.0])
 

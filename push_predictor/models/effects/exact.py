@@ -61,15 +61,35 @@ def joint_shift(mechanics: Mechanics, effects: Sequence[Effect], push: Push) -> 
     return joint(mechanics, effects, push, derivatives=False).shift
 
 
-def joint(mechanics: Mechanics, effects: Sequence[Effect], push: Push, *, derivatives: bool = True) -> JointShift:
-    """The shift by all effects together, and where they act its derivatives by their coefficients."""
-    exact, fitted = [effect for effect in effects if effect.exact], mechanics.fitted
-    changes, n = changes_of(exact, push), len(push.inputs)
+def undisturbed(mechanics: Mechanics, push: Push) -> Array:
+    """Displacements (n, 3) by the mechanics without effects."""
+    return np.asarray(displaced(mechanics.fitted, [{}], push)[0])
+
+
+def joint(
+    mechanics: Mechanics,
+    effects: Sequence[Effect],
+    push: Push,
+    *,
+    derivatives: bool = True,
+    unchanged: Array | None = None,
+) -> JointShift:
+    """The shift by all effects together, and where they act its derivatives by their coefficients.
+
+    unchanged (n, 3): what `undisturbed` returns, where it is known from before.
+    """
+    exact, n = [effect for effect in effects if effect.exact], len(push.inputs)
+    changes = changes_of(exact, push)
     ends = {name: _ends(name, change) for name, change in changes.items()} if derivatives else {}
     tried = [{**changes, name: end} for name, both in ends.items() for end in both]
-    moved = displaced(fitted, [changes, {}, *tried], push) if exact else np.zeros((2, n, 3))
+    if not exact:
+        moved = np.zeros((2, n, 3))
+    elif unchanged is None:
+        moved = displaced(mechanics.fitted, [{}, changes, *tried], push)
+    else:
+        moved = np.concatenate([unchanged[None], displaced(mechanics.fitted, [changes, *tried], push)])
     of_parameter = _slopes(ends, moved[2:])
-    shift, designs = moved[0] - moved[1], []
+    shift, designs = moved[1] - moved[0], []
     for effect in effects:
         if not effect.exact:
             design = effect.design(mechanics.physics, push)

@@ -89,11 +89,12 @@ def cut_window(rig: Rig, tracks: SensorTracks, interval: Interval, push: PushCon
     slid: distance (m) that the slider has been pushed so far.
     """
     times = interval.seconds
-    pose, pose_after = tracks.slider.at(times)[:, [0, 1, 3]]
+    poses = tracks.slider.at(times)[:, [0, 1, 3]]
+    pose, pose_after = poses
     command = _command(rig, pusher_motion(tracks.pusher, float(times[0])), pose, push.last_edge)
     if not (abs(command.angle) < np.pi / 2.0 and command.speed > 0.0):
         return "not_a_push"
-    if fault := _motion_fault(rig, tracks, times):
+    if fault := _motion_fault(rig, poses, tracks.pusher.at(times)[:, :2]):
         return fault
     moved = rotate(pose_after[:2] - pose[:2], np.array(-command.heading))
     return PushWindow(
@@ -128,9 +129,8 @@ def _command(rig: Rig, pusher: PusherMotion, pose: Array, last_edge: int | None)
     return _Command(edge, contact, gap, normal, heading, angle, float(np.hypot(*pusher.velocity)))
 
 
-def _motion_fault(rig: Rig, tracks: SensorTracks, times: Array) -> str:
-    """The fault of a motion between two times (2,) s that no push explains, empty without one."""
-    poses, tips = tracks.slider.at(times)[:, [0, 1, 3]], tracks.pusher.at(times)[:, :2]
+def _motion_fault(rig: Rig, poses: Array, tips: Array) -> str:
+    """The fault of a motion that no push explains, empty without one: poses (2, 3) and tips (2, 2) at both ends."""
     driven, moved = np.hypot(*(tips[1] - tips[0])), np.hypot(*(poses[1] - poses[0])[:2])
     before, after = rig.outline.project(to_body(tips, poses)).distance
     if before - after > max(ENTERED, ENTERED_SHARE * driven):

@@ -126,10 +126,12 @@ class PushSegmenter:
         return self._complete(sample.stamp)
 
     def _complete(self, until: int) -> list[tuple[int, int]]:
+        if self._start is None:
+            return []
         length = round(self.options.duration * 1e9)
         stride = round((self.options.stride or self.options.duration) * 1e9)
         done = []
-        while self._start is not None and self._start + length <= until:
+        while self._start + length <= until:
             done.append((self._start, self._start + length))
             self._start += stride
         return done

@@ -131,9 +131,9 @@ class _Problem:
 
     def linearised(self, coefficients: Array) -> _Linearised:
         """The problem about these coefficients."""
-        together = joint(
-            self.evidence.mechanics, (*self.evidence.effects, *self.effects(coefficients)), self.evidence.push
-        )
+        evidence, effects = self.evidence, (*self.evidence.effects, *self.effects(coefficients))
+        unchanged = evidence.undisturbed if any(effect.exact for effect in effects) else None
+        together = joint(evidence.mechanics, effects, evidence.push, unchanged=unchanged)
         whitener, count = self.evidence.whitener, len(self.evidence.effects)
         shift = np.einsum("nij,nj->ni", whitener, together.shift - self._before)
         columns = np.einsum("nij,njp->nip", whitener, np.concatenate(together.designs[count:], axis=2))

@@ -75,5 +75,7 @@ def _orthonormal(columns: Array, residualizer: Residualizer) -> Array | None:
     if not kept.any():
         return None
     residual = residualizer(columns).reshape(before.shape)[:, kept] / size[kept]
-    vectors, values, _ = np.linalg.svd(residual, full_matrices=False)
-    return np.asarray(vectors[:, values > FELT]) if values[0] > FELT else None
+    # Of the products: a tenth of the time of a singular value decomposition, and exact enough for values above FELT.
+    squares, turn = np.linalg.eigh(residual.T @ residual)
+    felt = squares > FELT**2
+    return np.asarray(residual @ turn[:, felt] / np.sqrt(squares[felt])) if felt.any() else None

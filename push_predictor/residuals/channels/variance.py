@@ -22,14 +22,13 @@ from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference
 from push_predictor.residuals.selection.power import QUANTILE
 from push_predictor.residuals.selection.screening import (
+    Controlled,
     Scores,
     Screened,
-    block_scores,
-    raw_scores,
     screen,
     unit_scores,
 )
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 TINY = 1e-12
 MOST = 9.0  # of a square: three standard deviations
@@ -77,25 +76,23 @@ class _Trial:
 
 @dataclass(frozen=True, eq=False)
 class _Squares:
-    """Bounded squares (n, 3) of residuals after regression on the controls (n, m), with their table and blocks (n,)."""
+    """Residuals (n, 3) after regression on the model's inputs, with their table and their bounded squares."""
 
     residual: Array
-    controls: Array
     table: PushTable
-    block: IntArray
+    bounded: Controlled
 
     @classmethod
     def of(cls, model: PushModel, evidence: Evidence, z: Array) -> _Squares:
         """The squares of residuals z (n, 3), with the model's inputs regressed out."""
         controls = inputs_basis(model, evidence.table).columns
-        return cls(Residualizer(controls)(z), controls, evidence.table, evidence.block)
+        residual = Residualizer(controls)(z)
+        return cls(residual, evidence.table, Controlled.of(_bounded_squares(residual), controls, evidence.block))
 
     def raw_scores(self, basis: DriverBasis, on: Array) -> tuple[Scores, Array]:
         """Block scores and information of a covariate's basis, for the variance of the outputs on (3,)."""
         values = basis.values(self.table.covariates, len(self.residual))
-        residualizer = Residualizer(self.controls)
-        blocks = residualizer.blocks(_bounded_squares(self.residual), self.block)
-        return raw_scores(blocks, residualizer(on[None, :, None] * values[:, None, :]))
+        return self.bounded.raw_scores(on[None, :, None] * values[:, None, :])
 
 
 def variance_effects(
@@ -224,12 +221,13 @@ def _constant(model: PushModel, evidence: Evidence, z: Array, baseline: Baseline
     controls = inputs_basis(model, _inputs_of(tables)).columns
     # Not residualised: errors of the base enter both parts alike, but regression would not remove them alike.
     parts = (_log_squares(z), _log_squares(baseline.evidence.z))
-    squares, new = _bounded_squares(np.vstack([z, baseline.evidence.z])), np.arange(len(controls)) < len(z)
+    new = np.arange(len(controls)) < len(z)
     block = np.concatenate([evidence.block, evidence.block.max() + 1 + baseline.evidence.block])
+    squares = Controlled.of(_bounded_squares(np.vstack([z, baseline.evidence.z])), controls, block)
     ratio = np.exp(0.5 * (parts[0].mean(axis=0) - parts[1].mean(axis=0)))
     trials = []
     for output, on in _outputs():
-        scores = block_scores(squares, (on * new[:, None])[:, :, None], controls, block)
+        scores = squares.unit_scores((on * new[:, None])[:, :, None])
         strength = float(np.prod(ratio ** (on / on.sum())))
         trials.append(_Trial(CONSTANT, DriverBasis("constant"), output, scores, strength))
     return trials

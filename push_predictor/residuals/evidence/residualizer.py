@@ -71,12 +71,15 @@ def _unshrunk(columns: Array, values: Array) -> Array:
 
 def sums_by(block: IntArray, values: Array) -> Array:
     """Sums (b, p) of values (n, p) over the blocks, in ascending order of their numbers."""
-    numbers, index = np.unique(block, return_inverse=True)
-    sums = np.zeros((len(numbers), values.shape[1]))
-    np.add.at(sums, index, values)
-    return sums
+    order = np.argsort(block, kind="stable")
+    return np.asarray(np.add.reduceat(values[order], _starts(block[order])))
 
 
 def _rows_of(block: IntArray) -> list[IntArray]:
     order = np.argsort(block, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(block[order])) + 1)
+    return np.split(order, _starts(block[order])[1:])
+
+
+def _starts(ordered: IntArray) -> IntArray:
+    """Where the numbers of blocks (n,), in ascending order, change; first 0."""
+    return np.concatenate([[0], np.flatnonzero(np.diff(ordered)) + 1])

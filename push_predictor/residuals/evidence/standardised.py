@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect, generic_responses, mechanism_named
-from push_predictor.models.effects.exact import Mechanics
+from push_predictor.models.effects.exact import Mechanics, undisturbed
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import mechanics_of
 from push_predictor.models.mechanisms import Push
@@ -55,6 +55,11 @@ class Evidence:
     def block(self) -> IntArray:
         """Block number (n,): neighbouring pushes share one; see blocks_of."""
         return blocks_of(self.table, self.chosen)
+
+    @cached_property
+    def undisturbed(self) -> Array:
+        """Displacements (n, 3) by the mechanics without effects, from which shifts of effects are counted."""
+        return undisturbed(self.mechanics, self.push)
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import get_args
 
 import numpy as np
 
@@ -18,12 +19,12 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
-from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for, inputs_basis
+from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
 from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.loading import previous_residual, with_inputs
-from push_predictor.residuals.evidence.residualizer import Residualizer
+from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
-from push_predictor.residuals.selection.screening import TINY, Scores, raw_scores
+from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, raw_scores
 from push_predictor.types import Array
 
 
@@ -65,9 +66,24 @@ class Baseline:
             values=candidate.basis.values(evidence.table.covariates, len(response)),
             nuisance=self._nuisance.of_change(*candidate.label, candidate.basis, candidate.kind),
         )
-        residualizer = Residualizer(controls_for(candidate.kind, self.inputs))
-        blocks = residualizer.blocks(evidence.z, evidence.block).orthogonal_to(in_training.nuisance)
-        return raw_scores(blocks, residualizer(in_training.columns))
+        columns = self._seen[candidate.kind].residualizer(in_training.columns)
+        return raw_scores(self._blocks(candidate.kind, in_training.nuisance), columns)
+
+    def _blocks(self, kind: Kind, nuisance: Array | None) -> ResidualBlocks:
+        """The residuals as a kind of candidate sees them; many candidates share one array of nuisance columns."""
+        key = kind, id(nuisance)
+        if key not in self._known_blocks:
+            self._known_blocks[key] = self._seen[kind].blocks.orthogonal_to(nuisance)
+        return self._known_blocks[key]
+
+    @cached_property
+    def _seen(self) -> dict[Kind, Controlled]:
+        z, block = self.evidence.z, self.evidence.block
+        return {kind: Controlled.of(z, controls_for(kind, self.inputs), block) for kind in get_args(Kind)}
+
+    @cached_property
+    def _known_blocks(self) -> dict[tuple[Kind, int], ResidualBlocks]:
+        return {}
 
     def _response(self, mechanism: str | None) -> Array:
         if mechanism not in self._responses:

@@ -16,7 +16,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import ExactFit
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.selection.screening import TINY
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
 FOLDS = 5
 
@@ -59,14 +59,7 @@ def folds_of(block: IntArray) -> IntArray:
 def fit(flat: Array, residual: Array, block: IntArray | None = None) -> Array:
     """Least-squares coefficients (p,) of columns (n, 3, p) for residuals (n, 3); shrunk if blocks are given."""
     numbers = np.arange(len(residual)) if block is None else block
-    x = flat.reshape(-1, flat.shape[2])
-    scores, information = sums_by(numbers, np.einsum("nkp,nk->np", flat, residual)), x.T @ x
-    values, vectors = np.linalg.eigh(information)
-    keep = values > TINY * max(values[-1], np.finfo(float).tiny)
-    root = vectors[:, keep] / np.sqrt(values[keep])
-    each = scores @ root
-    estimate = each.sum(axis=0)
-    return np.asarray(root @ (estimate * (1.0 if block is None else _james_stein(estimate, each))))
+    return _coefficients(_scores(flat, residual, numbers), _information(flat), shrunk=block is not None)
 
 
 def judged_exactly(exact: ExactFit, z: Array, residualizer: Residualizer, block: IntArray) -> Judged:
@@ -78,21 +71,50 @@ def judged_exactly(exact: ExactFit, z: Array, residualizer: Residualizer, block:
 
 
 def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:
-    """Gain per block: log density of the residuals after minus before, each output with its own variance."""
-    gains = np.zeros(len(residual))
-    folds = folds_of(block)
-    for fold in range(FOLDS):
-        test = folds == fold
-        if test.any() and not test.all():
-            gains[test] = _gain(residual, flat, block, test)
+    """Gain per block: log density of the residuals after minus before, each output with its own variance.
+
+    A fold's fit needs only sums over the other folds: these are those over all rows without the fold's own.
+    """
+    every, of_block = folds_of(block), folds_of(np.unique(block))
+    used, fold = np.unique(every, return_inverse=True)
+    if len(used) < 2:
+        return np.zeros(len(of_block))
+    scores, own = _scores(flat, residual, block), [_information(flat[fold == k]) for k in range(len(used))]
+    total = np.sum(own, axis=0)
+    fits = [_coefficients(scores[of_block != k], total - part, shrunk=True) for k, part in zip(used, own, strict=True)]
+    after = residual - np.stack([_fitted(flat, coefficients) for coefficients in fits])  # (folds, n, 3)
+    rest = (fold != np.arange(len(used))[:, None]).astype(np.float64)
+    rest /= rest.sum(axis=1, keepdims=True)
+    old, new = rest @ residual**2, np.stack([mean @ square for mean, square in zip(rest, after**2, strict=True)])
+    held_out = after[fold, np.arange(len(fold))]
+    gains = _log_density(held_out, new[fold]) - _log_density(residual, old[fold])
     return sums_by(block, gains[:, None])[:, 0]
 
 
-def _gain(residual: Array, flat: Array, block: IntArray, test: BoolArray) -> Array:
-    rest = ~test
-    after = residual - flat @ fit(flat[rest], residual[rest], block[rest])
-    old, new = (np.mean(r[rest] ** 2, axis=0) for r in (residual, after))
-    return _log_density(after[test], new) - _log_density(residual[test], old)
+def _scores(flat: Array, residual: Array, block: IntArray) -> Array:
+    """Sums (b, p) over each block of columns (n, 3, p) times residuals (n, 3)."""
+    return sums_by(block, np.einsum("nkp,nk->np", flat, residual))
+
+
+def _fitted(flat: Array, coefficients: Array) -> Array:
+    """Sum (n, 3) of columns (n, 3, p) times coefficients (p,)."""
+    return np.asarray(flat.reshape(-1, len(coefficients)) @ coefficients).reshape(len(flat), 3)
+
+
+def _information(flat: Array) -> Array:
+    """Products (p, p) of columns (n, 3, p)."""
+    x = flat.reshape(-1, flat.shape[2])
+    return np.asarray(x.T @ x)
+
+
+def _coefficients(scores: Array, information: Array, *, shrunk: bool) -> Array:
+    """Coefficients (p,) from the blocks' scores (b, p) and the columns' information (p, p)."""
+    values, vectors = np.linalg.eigh(information)
+    keep = values > TINY * max(values[-1], np.finfo(float).tiny)
+    root = vectors[:, keep] / np.sqrt(values[keep])
+    each = scores @ root
+    estimate = each.sum(axis=0)
+    return np.asarray(root @ (estimate * (_james_stein(estimate, each) if shrunk else 1.0)))
 
 
 def _james_stein(estimate: Array, each: Array) -> float:

@@ -12,11 +12,11 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import HEADED, SIDES
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, controls_for
-from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
+from push_predictor.residuals.evidence.residualizer import sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.selection.baseline import Baseline, difference
 from push_predictor.residuals.selection.forward_selection import SearchResult
-from push_predictor.residuals.selection.screening import TINY, Scores, moments, raw_scores, unit_scores
+from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, moments, raw_scores, unit_scores
 from push_predictor.types import Array, IntArray
 
 QUANTILE = 0.8416  # of the standard normal distribution, for a power of 80 %
@@ -47,7 +47,9 @@ def minimum_detectable(
     strongest = driven[0].covariate if driven else None
     chosen = [c for c in found.candidates if c.mechanism is not None and _is_reported(c, strongest)]
     threshold = found.first.threshold(alpha)
-    sizes = [(c, _size(c, found.unexplained, evidence, inputs, threshold, baseline)) for c in chosen]
+    kinds = {c.kind for c in chosen}
+    seen = {kind: Controlled.of(found.unexplained, controls_for(kind, inputs), evidence.block) for kind in kinds}
+    sizes = [(c, _size(c, seen[c.kind], threshold, baseline)) for c in chosen]
     return [
         Detectable(str(c.mechanism), c.covariate, value, mechanism_named(str(c.mechanism)).parameters[0].unit)
         for c, value in sizes
@@ -72,18 +74,10 @@ def _is_reported(candidate: Candidate, strongest: str | None) -> bool:
     return constant or (candidate.covariate == strongest and candidate.basis.name == "linear")
 
 
-def _size(
-    candidate: Candidate,
-    z: Array,
-    evidence: Evidence,
-    inputs: InputsBasis,
-    threshold: float,
-    baseline: Baseline | None,
-) -> float:
+def _size(candidate: Candidate, seen: Controlled, threshold: float, baseline: Baseline | None) -> float:
     """Norm of the coefficients, in units of the parameter, at which the power is 80 %."""
-    residualizer = Residualizer(controls_for(candidate.kind, inputs))
-    columns = residualizer(candidate.columns)
-    raw = raw_scores(residualizer.blocks(z, evidence.block), columns)
+    columns = seen.residualizer(candidate.columns)
+    raw = raw_scores(seen.blocks, columns)
     against = baseline is not None and (baseline.judges(candidate) or baseline.compares(candidate))
     training = baseline.scores(candidate) if baseline is not None and against else None
     scores = unit_scores(*raw) if training is None else difference(raw, training)
@@ -91,7 +85,7 @@ def _size(
     spread = sum(np.linalg.pinv(a, rcond=TINY, hermitian=True) for a in informations)
     if not scores.rows.shape[1] or not np.any(spread):
         return float("nan")
-    length = _detectable_length(scores, threshold, _unevenness(columns, evidence.block))
+    length = _detectable_length(scores, threshold, _unevenness(columns, seen.blocks.block))
     return length * float(np.sqrt(np.linalg.eigvalsh(spread)[-1]))
 
 

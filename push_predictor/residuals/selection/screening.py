@@ -73,10 +73,31 @@ def screen(scores: Sequence[Scores], seed: int = 0) -> Screened:
     return Screened(statistic, (1.0 + exceeded) / (1.0 + DRAWS), largest)
 
 
+@dataclass(frozen=True, eq=False)
+class Controlled:
+    """Residuals with controls regressed out, once for all columns that are scored on them."""
+
+    residualizer: Residualizer
+    blocks: ResidualBlocks
+
+    @staticmethod
+    def of(z: Array, controls: Array, block: IntArray) -> Controlled:
+        """Residuals z (n, 3) with the controls (n, m) regressed out."""
+        residualizer = Residualizer(controls)
+        return Controlled(residualizer, residualizer.blocks(z, block))
+
+    def raw_scores(self, columns: Array) -> tuple[Scores, Array]:
+        """Scores of columns (n, 3, p) and their information, the controls regressed out of them too."""
+        return raw_scores(self.blocks, self.residualizer(columns))
+
+    def unit_scores(self, columns: Array) -> Scores:
+        """Scores of columns (n, 3, p) in coordinates in which their information is the identity."""
+        return unit_scores(*self.raw_scores(columns))
+
+
 def block_scores(z: Array, columns: Array, controls: Array, block: IntArray) -> Scores:
     """Scores of columns (n, 3, p) for residuals z (n, 3), the controls (n, m) regressed out of both."""
-    residualizer = Residualizer(controls)
-    return unit_scores(*raw_scores(residualizer.blocks(z, block), residualizer(columns)))
+    return Controlled.of(z, controls, block).unit_scores(columns)
 
 
 def unit_scores(scores: Scores, information: Array) -> Scores:
