@@ -218,6 +218,16 @@ def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
     assert estimate.exact and abs(float(estimate.coefficients[0]) - 0.4) < 3.0 * sd < 0.1
 
 
+def test_where_pushes_of_different_angles_disagree_the_interval_is_wider(deployed: PushModel) -> None:
+    """Real mechanics err by angle: pushes of one angle, however many, do not make the size more certain."""
+    weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
+    to_one_side = weak.inputs[:, 2] > 0.0
+    mixed = replace(weak, outcomes=np.where(to_one_side[:, None], strong.outcomes, weak.outcomes))
+    estimate = found(deployed, mixed, "contact_friction", DRIFT)
+    assert 0.1 < estimate.coefficients[0] < 0.3
+    assert np.sqrt(estimate.covariance[0, 0]) > 0.1 * (0.3 - 0.1)
+
+
 def test_nothing_is_left_of_a_large_effect(deployed: PushModel) -> None:
     table, quiet = pushes(100, 5, slippery(0.4)), pushes(100, 5)
     estimate = found(deployed, table, "contact_friction", DRIFT)

@@ -3,7 +3,8 @@
 What a learnt base could express in its own inputs is regressed out of residuals and responses first (Frisch and Waugh
 1933). Effects that change parameters of the mechanics are exact, found by steps of Gauss and Newton. The covariance is
 a jackknife over blocks of pushes: it covers disturbances that neighbouring pushes share, and coefficients that depend
-on a few pushes.
+on a few pushes. No mechanics is exact: where pushes of different angles disagree about a coefficient by more, its
+interval is widened to that of a jackknife over angles.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from push_predictor.types import Array, IntArray
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
 MOST_FITTED = 600  # windows of a fit that compares candidates
+ANGLES = 8  # groups of push angles
 LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
 ENOUGH = 0.2  # nats: a step that gains less is the last
@@ -42,7 +44,10 @@ def estimated_effects(
     """
     problem = _Problem.of(evidence, candidates, own_inputs)
     found, n = problem.solved(), len(evidence.table)
-    covariance = _jackknife(found.columns, found.residual, evidence.block, found.ridge)
+    covariance = _widened(
+        _jackknife(found.columns, found.residual, evidence.block, found.ridge),
+        _jackknife(found.columns, found.residual, _angles(evidence.table.inputs[:, 2]), found.ridge),
+    )
     covariance *= n / max(n - problem.residualizer.q.shape[1], 1)
     effects = tuple(
         replace(effect, covariance=covariance[part, part])
@@ -201,6 +206,17 @@ class _Linearised:
 
     def objective(self, ridge: Array) -> float:
         return 0.5 * float(np.sum(self.residual**2) + np.sum(ridge * self.coefficients**2))
+
+
+def _angles(angle: Array) -> IntArray:
+    """Groups (n,) of windows with similar push angles, of equal size; left and right slip are apart."""
+    return np.searchsorted(np.quantile(angle, np.arange(1, ANGLES) / ANGLES), angle)
+
+
+def _widened(covariance: Array, other: Array) -> Array:
+    """A covariance (p, p) with its standard deviations raised to at least those of another."""
+    factor = np.sqrt(np.maximum(1.0, np.diag(other) / np.maximum(np.diag(covariance), np.finfo(float).tiny)))
+    return np.asarray(covariance * np.outer(factor, factor))
 
 
 def _jackknife(columns: Array, residual: Array, block: IntArray, ridge: Array) -> Array:
