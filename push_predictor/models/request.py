@@ -33,6 +33,8 @@ UNITS = {
     "contact_gap": "m",
     "normal_force": "N",
     "tangential_force": "N",
+    "free_force_x": "N",
+    "free_force_y": "N",
 }  # of the covariates that every window has; the unit of a recorded topic is its publisher's
 FARTHEST = 1.0  # m per push; the mechanics is integrated along the path, some milliseconds per centimetre
 

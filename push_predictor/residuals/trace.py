@@ -1,8 +1,8 @@
 """Trace the residual of a deployed model to an effect that the model lacks, add it, and score the model again.
 
 Channels are judged in order of trust. A measurement error is corrected before anything is concluded about the motion,
-and effects on the mean before effects on the variance; the wrench is judged by itself. The held-out pushes are opened
-once, at the end.
+and effects on the mean, of the motion and then of the force, before effects on the variance. The held-out pushes are
+opened once, at the end.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, WrenchFinding, wrench_effects
-from push_predictor.residuals.evidence.drivers import CONSTANT, SESSION
+from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
 from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
 from push_predictor.residuals.evidence.instrument import GAP, with_instrument
@@ -217,7 +217,7 @@ def _searched(context: _Context, watch: Watch) -> Searched:
     )
     watch("force", 0.6)
     forces = wrench_effects(analysis, model.training, context.evidence.physics, context.share("wrench"), seed)
-    biased = _biased(forces) if not motion.terms and not motion.variance else None
+    biased = None if motion.terms else _biased(forces, spread=bool(motion.variance))
     return Searched(measured, motion, forces, None if biased is None else _corrected(context, biased))
 
 
@@ -254,13 +254,19 @@ def _excess(evidence: Evidence) -> float:
     return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
 
 
-def _biased(forces: WrenchFinding) -> MeasurementFinding | None:
-    """A bias of the force sensor as a measurement error, though it is found on the wrench channel."""
-    first = next(iter(forces.effects), None)
+def _biased(forces: WrenchFinding, spread: bool) -> MeasurementFinding | None:
+    """A bias of the force sensor as a measurement error, though it is found on the wrench channel.
+
+    One of the sensor's zero does no harm to the windows, so it is the answer only if neither the force in contact nor
+    the spread of the outcomes changed.
+    """
+    first = next(iter(forces.effects), None if spread else forces.zero)
     if first is None or first.mechanism != WRENCH_BIAS:
         return None
     size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
-    error = MeasurementFault(first.mechanism, first.parameters, first.p_value, first.rivals, size)
+    error = MeasurementFault(
+        first.mechanism, first.parameters, first.p_value, first.rivals, size, first.covariate, first.basis
+    )
     return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)
 
 
@@ -274,7 +280,7 @@ def _of_measurement(context: _Context, corrected: _Corrected) -> Trace:
         kind="mean",
         model=context.deployed,
         effects=tuple(
-            FoundEffect(e.mechanism, CONSTANT, (), "constant", parameter, _of_trace(e.p_value, "measurement"), 0.0)
+            FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "measurement"), 0.0)
             for e in measured.errors
             for parameter in e.parameters
         ),
@@ -307,11 +313,12 @@ def _of_motion(context: _Context, found: Searched) -> Trace:
     motion, measured, forces = found.motion, found.measured, found.forces
     extension = _extension(context, motion)
     gain, after = extension.gain, extension.after or extension.refit
-    equivalent = motion.equivalent if motion.terms or motion.variance else _rival_covariates(forces)
+    verdict = _verdict(motion, forces, context.shifted)
+    equivalent = _rival_covariates(forces) if verdict == "wrench_only" else motion.equivalent
     tested = _family_wise(motion.tested, "motion"), _family_wise(forces.tested, "wrench")
     return Trace(
-        verdict=_verdict(motion, forces, context.shifted),
-        kind="mean" if motion.terms else "variance" if motion.variance else None,
+        verdict=verdict,
+        kind="mean" if motion.terms else "variance" if verdict == "variance" else None,
         model=context.deployed,
         effects=_found_effects(context, motion, forces, extension.effects),
         terms=extension.effects,
@@ -350,14 +357,18 @@ def _extension(context: _Context, motion: MotionFinding) -> _Extension:
 
 
 def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[ShiftedInput]) -> Verdict:
+    """The verdict: a mean effect, of the motion or else of the force, before one on the variance.
+
+    A force that differs also bends tip and rod differently, which can look like noise that changed a little.
+    """
     if motion.terms:
         if motion.terms[0].best.mechanism is None:
             return "driver_only"
         return "mechanism_only" if motion.equivalent else "effect"
-    if motion.variance:
-        return "variance"
     if forces.effects:
         return "wrench_only"
+    if motion.variance:
+        return "variance"
     return "input_shift" if shifted else "none"
 
 
@@ -385,7 +396,7 @@ def _found_effects(
             )
             for term, effect in zip(motion.terms, effects, strict=True)
         )
-    if motion.variance:
+    if motion.variance and not forces.effects:
         return tuple(
             FoundEffect(None, s.covariate, s.outputs, s.basis.name, None, _of_trace(s.p_value, "motion"), 0.0)
             for s in motion.variance

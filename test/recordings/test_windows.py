@@ -46,6 +46,16 @@ def test_force_on_the_slider_is_opposite_to_the_measured_wrench() -> None:
         assert window.covariates["tangential_force"] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_windows_state_what_the_sensor_read_in_free_motion_and_do_not_contain_it() -> None:
+    plain = translating_push()
+    assert plain.wrench is not None
+    biased = replace(plain, wrench=replace(plain.wrench, fx=plain.wrench.fx + 0.3, fy=plain.wrench.fy - 0.1))
+    for a, b in zip(windows_of(plain), windows_of(biased), strict=True):
+        for name, bias in (("free_force_x", 0.3), ("free_force_y", -0.1)):
+            assert b.covariates[name] - a.covariates[name] == pytest.approx(bias, abs=1e-9)
+        assert b.covariates["normal_force"] == pytest.approx(a.covariates["normal_force"], abs=1e-9)
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     shift=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),

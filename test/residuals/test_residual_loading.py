@@ -21,7 +21,7 @@ from push_predictor.residuals.evidence.loading import corrected_data, cut_again,
 OF_A_RECORDING = {
     *("elapsed_time", "push_index", "slid_distance", "slider_x", "slider_y", "slider_heading", "push_heading"),
     *("velocity", "contact", "angle", "edge", "dwell_time", "time_since_contact", "contact_gap", "normal_force"),
-    *("tangential_force", "recording"),
+    *("tangential_force", "free_force_x", "free_force_y", "recording"),
 }
 LATER = 100_000_000_000  # ns
 

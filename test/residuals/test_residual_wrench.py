@@ -138,6 +138,34 @@ def test_reports_every_candidate_tested() -> None:
     assert {("surface_friction", "model_inputs"), ("surface_friction", "topic:/hum")} <= tested
 
 
+def zeroed(table: PushTable, zero: tuple[float, float]) -> PushTable:
+    """The windows with what the sensor read before each push."""
+    noise = 0.01 * np.random.default_rng(7).standard_normal((PUSHES, 2)).repeat(WINDOWS, axis=0)
+    free = {f"free_force_{axis}": noise[:, k] + zero[k] for k, axis in enumerate("xy")}
+    return replace(table, covariates={**table.covariates, **free})
+
+
+def test_bias_in_free_motion_is_found_next_to_what_the_force_in_contact_shows() -> None:
+    biased, base = zeroed(made(2, drift=0.4), (0.3, 0.0)), zeroed(made(1), (0.0, 0.0))
+    finding = found(biased, base)
+    assert finding.zero is not None and finding.zero.mechanism == "wrench_bias"
+    assert finding.zero.parameters[0].low < 0.3 < finding.zero.parameters[0].high
+    assert [e.covariate for e in finding.effects] == ["elapsed_time"]
+    assert found(zeroed(made(2), (0.0, 0.0)), base).zero is None
+    assert ("wrench_bias", "session") in {(t.mechanism, t.covariate) for t in finding.tested}
+
+
+def test_level_is_shared_by_the_zero_and_the_force_in_contact() -> None:
+    """A table of an earlier version has no zero, and the whole level is for the force."""
+    before, after = made(2, level=0.15), zeroed(made(2, level=0.15), (0.0, 0.0))
+    alone, shared = found(before, made(1)), found(after, zeroed(made(1), (0.0, 0.0)))
+    assert alone.zero is None
+    p_values = {(t.mechanism, t.covariate): t.p_value for t in shared.tested}
+    for tried in alone.tested:
+        assert p_values[tried.mechanism, tried.covariate] >= min(1.0, 2.0 * tried.p_value)
+    assert shared.effects[0].p_value == 2.0 * alone.effects[0].p_value
+
+
 def test_windows_without_a_force_give_no_finding() -> None:
     table = made(2)
     assert found(replace(table, covariates={}), table) == found(replace(table, covariates={}), None)

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from push_predictor.errors import RequestError
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.channels.motion import NO_MOTION
+from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.outcome import Sized, Trace
@@ -63,8 +66,45 @@ def test_second_recording_of_the_same_rig_has_no_effect() -> None:
     assert trace(learnt(), faultless()).verdict == "none"
 
 
-def test_constant_bias_of_the_force_sensor_is_removed_by_zeroing() -> None:
-    assert traced(wrench_bias=(0.5, 0.0, 0.0)).verdict == "none"
+def test_constant_bias_of_the_force_sensor_is_found_in_free_motion_and_changes_nothing_else() -> None:
+    found = traced(wrench_bias=(0.5, -0.2, 0.0))
+    assert found.verdict == "measurement" and found.extended is None
+    assert [e.mechanism for e in found.effects] == ["wrench_bias"] * 2
+    for effect, truth in zip(found.effects, (0.5, -0.2), strict=True):
+        assert effect.parameter is not None
+        assert effect.parameter.value == pytest.approx(truth, abs=0.08)  # the sensor's zero is new in each session
+    held = found.held_out
+    assert np.allclose(held.before.mean, held.after.mean, atol=1e-9)  # zeroed windows do not contain the bias
+
+
+def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    lower = Sized("relative change of the force since training", -0.4, -0.42, -0.38, "1")
+    effect = WrenchEffect("surface_friction", "model_inputs", "constant", (lower,), 0.0005, ())
+    noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
+    motion = replace(NO_MOTION, variance=(noise,), equivalent=("dwell_time",))
+    monkeypatch.setattr("push_predictor.residuals.trace.motion_effects", lambda *_, **__: motion)
+    alone = trace(learnt(), faultless())
+    assert (alone.verdict, alone.kind, alone.equivalent) == ("variance", "variance", ("dwell_time",))
+    monkeypatch.setattr(
+        "push_predictor.residuals.trace.wrench_effects", lambda *_: WrenchFinding((effect,), (), 0.1, True)
+    )
+    both = trace(learnt(), faultless())
+    assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
+    assert [e.mechanism for e in both.effects] == ["surface_friction"]
+    assert any("noise of the motion changed as well" in note and "speed" in note for note in both.notes)
+
+
+def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    zero = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
+    found = WrenchFinding((), (), 0.1, True, WrenchEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
+    noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
+    monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
+    monkeypatch.setattr(
+        "push_predictor.residuals.trace.motion_effects", lambda *_, **__: replace(NO_MOTION, variance=(noise,))
+    )
+    traced = trace(learnt(), faultless())
+    assert traced.verdict == "variance"
+    assert any("+0.5 N along x" in note for note in traced.notes)
 
 
 def test_force_bias_during_contact_is_a_measurement_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -183,13 +183,17 @@ def _facing(outline: Outline, normal: Array, before: int, after: int) -> int:
 
 
 def _forces(wrench: Track | None, times: Array, tare: Array | None, normal: Array) -> dict[str, float]:
-    """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left."""
+    """Mean force of the pusher on the slider between two times (2,): along the inward normal, and to its left.
+
+    tare: what the sensor reads without contact (2,); it is subtracted, and kept to judge the sensor's bias.
+    """
     if wrench is None:
         return {}
+    zero = {} if tare is None else {"free_force_x": float(tare[0]), "free_force_y": float(tare[1])}
     begin, end = np.searchsorted(wrench.time, times[0]), np.searchsorted(wrench.time, times[1], side="right")
     if begin >= end:
-        return {}
+        return zero
     force = wrench.values[begin:end, :2].mean(axis=0) - (np.zeros(2) if tare is None else tare)
     on_slider = -force  # the wrench is the force of the slider on the pusher
     left = np.array([-normal[1], normal[0]])
-    return {"normal_force": float(on_slider @ normal), "tangential_force": float(on_slider @ left)}
+    return {"normal_force": float(on_slider @ normal), "tangential_force": float(on_slider @ left), **zero}

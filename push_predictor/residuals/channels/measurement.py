@@ -56,7 +56,8 @@ LEAST_SIZE = 1.0  # root mean square effect on the gap, in units of the gap's no
 class MeasurementFault:
     """A measurement error with its parameters (slider's stream against the robot's) and family-wise p value.
 
-    rivals: errors that fit equally well. size: root mean square effect on the gap, m (on the force, N).
+    rivals: errors that fit equally well. size: root mean square effect on the gap, m (on the force, N). covariate,
+    basis: what it depends on.
     """
 
     mechanism: str
@@ -64,6 +65,8 @@ class MeasurementFault:
     p_value: float
     rivals: tuple[str, ...]
     size: float
+    covariate: str = CONSTANT
+    basis: str = "constant"
 
     @property
     def values(self) -> tuple[float, ...]:

@@ -7,7 +7,8 @@ residuals of the motion. A bias of the sensor, constant in the world, also rotat
 direction that the model predicts. Nothing here changes the motion model.
 
 Relations that the training windows have too (a place with more friction, a topic that matters) are subtracted. The
-window finder zeroes the sensor between pushes, so a bias is visible only if it occurs during contact.
+window finder zeroes the sensor between pushes, so the force in contact shows a bias only if it occurs there alone. One
+that is always there is found from the zero itself (sensor_zero).
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ from push_predictor.residuals.channels.contrast import (
     stacked,
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, screening_bases
+from push_predictor.residuals.channels.sensor_zero import zero_shift
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, screening_bases
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.types import Array, IntArray
@@ -43,9 +45,10 @@ LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 MOST_TERMS = 3
 PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
+PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
-SESSION = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
+PROGRESS = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,17 @@ class WrenchEffect:
 
 @dataclass(frozen=True)
 class WrenchFinding:
-    """Effects found, strongest first, and all candidates tested.
+    """Effects on the force in contact, strongest first, and all candidates tested.
 
     noise: robust standard deviation of the logarithm of the force between windows. against_training: whether the
-    relations in the training windows were subtracted.
+    relations in the training windows were subtracted. zero: a bias of the sensor that the windows do not contain.
     """
 
     effects: tuple[WrenchEffect, ...]
     tested: tuple[Tested, ...]
     noise: float
     against_training: bool
+    zero: WrenchEffect | None = None
 
 
 NO_WRENCH = WrenchFinding((), (), float("nan"), False)
@@ -108,7 +112,37 @@ class _Force:
 def wrench_effects(
     table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float = 0.01, seed: int = 0
 ) -> WrenchFinding:
-    """Effects on the force of new windows that differ from the baseline (the model's training windows)."""
+    """Effects on the force of new windows that differ from the baseline (the model's training windows).
+
+    Half of alpha is for the sensor's zero, where the windows contain it.
+    """
+    zero = zero_shift(table, baseline)
+    if zero is None:
+        return _of_contact(table, baseline, physics, alpha, seed)
+    found = _of_contact(table, baseline, physics, alpha / PARTS, seed)
+    shifted = WrenchEffect(WRENCH_BIAS, zero.covariate, zero.basis, zero.parameters, _of_channel(zero.p_value), ())
+    since = SESSION if zero.covariate == CONSTANT else zero.covariate
+    return WrenchFinding(
+        effects=tuple(replace(effect, p_value=_of_channel(effect.p_value)) for effect in found.effects),
+        tested=(
+            *(replace(tried, p_value=_of_channel(tried.p_value)) for tried in found.tested),
+            Tested(WRENCH_BIAS, since, shifted.p_value),
+        ),
+        noise=found.noise,
+        against_training=found.against_training,
+        zero=shifted if shifted.p_value <= alpha else None,
+    )
+
+
+def _of_channel(p_value: float) -> float:
+    """A p value of one part of the channel as one of the whole channel."""
+    return min(1.0, PARTS * p_value)
+
+
+def _of_contact(
+    table: PushTable, baseline: PushTable | None, physics: AnalyticalPush, alpha: float, seed: int
+) -> WrenchFinding:
+    """Effects on the force while the pusher pushes."""
     if any(name not in table.covariates for name in FORCES):
         return NO_WRENCH
     windows, base = _pressing(table), None if baseline is None else _pressing(baseline)
@@ -165,7 +199,7 @@ def _of_friction(stack: Stacked, unit: Array, covariate: str, basis: DriverBasis
     columns = np.zeros((len(stack.new), 2, values.shape[1]))
     columns[stack.new, 0] = values / unit[0]
     shared = np.zeros((len(stack.new), 0)) if covariate == CONSTANT else _level(stack)
-    if covariate not in (*SESSION, CONSTANT) and all(d in t.covariates for t in stack.tables for d in basis.drivers):
+    if covariate not in (*PROGRESS, CONSTANT) and all(d in t.covariates for t in stack.tables for d in basis.drivers):
         in_both = stack.joined([basis.values(t.covariates, len(t)) for t in stack.tables])
         shared = np.column_stack([shared, in_both]) if len(stack.tables) > 1 else shared
     return Contrast(SURFACE_FRICTION, covariate, basis, columns, shared)

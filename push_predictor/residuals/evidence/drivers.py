@@ -14,10 +14,12 @@ from push_predictor.types import Array
 CATEGORIES = ("edge", "recording")
 PLACE = ("slider_x", "slider_y")
 OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: outcomes of the push, not causes
+SENSOR_ZERO = ("free_force_x", "free_force_y")  # what the window finder subtracted from the force: no cause either
 # They share noise with the residual, or vary along a push: judged against their relation in the training data.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
 OF_SESSION = ("elapsed_time", "push_index", "slid_distance", "recording")  # counted from the start of a session
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
+NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *FOLDED)
 CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)
@@ -37,7 +39,7 @@ def screening_bases(table: PushTable, names: Sequence[str] | None = None) -> lis
 
 def driver_names(table: PushTable) -> list[str]:
     """Names of the covariates that vary and may be causes."""
-    return [name for name, column in table.covariates.items() if name not in (*OUTCOMES, *FOLDED) and _varies(column)]
+    return [name for name, column in table.covariates.items() if name not in NO_CAUSES and _varies(column)]
 
 
 def two_dimensional(table: PushTable) -> DriverBasis:

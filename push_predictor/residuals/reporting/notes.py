@@ -76,6 +76,16 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
         )
     if measured is None:
         notes.append(NOT_JUDGED)
+    if forces.zero is not None:
+        change = " and ".join(
+            f"{size.value:+.2g} N along {axis}" for size, axis in zip(forces.zero.parameters, "xy", strict=True)
+        )
+        notes.append(
+            f"The reading of the force sensor in free motion changed by {change}. The windows do not contain it."
+        )
+    if motion.variance and forces.effects and not motion.terms:
+        covariates = listed([covariate_phrase(effect.covariate) for effect in motion.variance])
+        notes.append(f"The noise of the motion changed as well; it depends on {covariates}.")
     if motion.terms and forces.effects:
         effects = listed([effect_phrase(e.mechanism, e.covariate) for e in forces.effects])
         notes.append(f"The force changed as well: {effects}.")

@@ -64,6 +64,8 @@ COVARIATES: dict[str, str] = {
     "contact_gap": "measured gap at the contact",
     "normal_force": "normal force",
     "tangential_force": "tangential force",
+    "free_force_x": "the force read in free motion along x",
+    "free_force_y": "the force read in free motion along y",
     "previous_residual": "the residual of the previous push",
     "recording": "recording",
     "travel": "length of the push",
