@@ -12,7 +12,7 @@ from synthetic import square_rig
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect, mechanism_named
-from push_predictor.models.effects.exact import Mechanics, joint, joint_shift, undisturbed
+from push_predictor.models.effects.exact import Mechanics, joint, joint_shift, joint_shifts, undisturbed
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics, mechanics_of
 from push_predictor.models.mechanics.forward import PushMechanics
@@ -24,7 +24,7 @@ from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
-from push_predictor.residuals.candidates.coefficients import estimated_effects
+from push_predictor.residuals.candidates.coefficients import _Problem, estimated_effects
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.basis_choice import simplest_basis
 
@@ -129,6 +129,30 @@ def test_a_known_displacement_without_effects_is_taken_instead_of_computed(name:
     np.testing.assert_allclose(found.designs[0], expected.designs[0], atol=1e-9)
     elsewhere = joint(on, [acting], push, derivatives=False, unchanged=known + 1.0)
     np.testing.assert_allclose(elsewhere.shift, expected.shift - 1.0, atol=1e-10)
+
+
+def test_several_sets_of_effects_are_shifted_at_once_as_each_alone() -> None:
+    on, push = square(), made(12, 6)
+    later = DriverBasis("step", ("elapsed_time",), place=500.0)
+    sets = [[effect("contact_friction", size, basis=later), effect("inertia", 0.3)] for size in (0.0, 0.2, -0.1)]
+    sets += [[effect("contact_friction", 0.2, basis=later)]]
+    found = joint_shifts(on, sets, push, undisturbed(on, push))
+    for shift, effects in zip(found, sets, strict=True):
+        np.testing.assert_allclose(shift, joint_shift(on, effects, push), atol=1e-10)
+    assert not found[3][push.covariates["elapsed_time"] < 500.0].any()
+    assert found[3][push.covariates["elapsed_time"] > 500.0].any()
+
+
+def test_a_step_that_is_too_long_is_shortened_until_it_helps(deployed: PushModel) -> None:
+    evidence = evidence_of(deployed, pushes(40, 4, slippery(0.1)))
+    problem = _Problem.of(evidence, [candidate(evidence, "contact_friction", "model_inputs", ALWAYS)], None)
+    start = problem.linearised(np.zeros(1))
+    best = problem.solved().coefficients
+    found, fall = problem._shortened(start, 7.0 * best)  # a half is too far, a quarter is not
+    np.testing.assert_allclose(found.coefficients, 7.0 * best / 4.0)
+    assert fall == pytest.approx(start.objective(start.ridge) - found.objective(start.ridge), rel=1e-6)
+    same, nothing = problem._shortened(start, -best)
+    assert same is start and nothing == 0.0
 
 
 def test_a_parameter_stays_within_its_plausible_range() -> None:

@@ -8,7 +8,7 @@ from forward_pushes import SQUARE
 from supports import THREE_POINTS
 
 from push_predictor.models.mechanics.limit_surfaces.load_map import load_map
-from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface, root_of
 from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
 from push_predictor.models.mechanics.pressure import patch
@@ -31,7 +31,8 @@ def test_stretched_surface_is_near_the_sum_of_direction_dependent_point_friction
     f = support.shares[:, None] * resisted / np.sqrt(np.sum(u * resisted, axis=2))[:, :, None]
     moment = np.sum(points[:, 0] * f[:, :, 1] - points[:, 1] * f[:, :, 0], axis=1) / surface.length
     rows, zero = np.arange(300), np.zeros(300, dtype=np.int64)
-    loaded = LoadedSurface(row_surfaces([surface], zero, zero, np.zeros(300)), rows, stretch=np.tile(stretch, (300, 1)))
+    surfaces = row_surfaces([surface], zero, zero, np.zeros(300))
+    loaded = LoadedSurface(surfaces, rows, root_of(np.tile(stretch, (300, 1)), surfaces.of_rows.reach))
     found = np.stack(loaded.twist(slice(None), *f.sum(axis=1).T, moment), axis=1)
     wanted = draw * [1.0, 1.0, surface.length]
     plain = np.stack(surface.twist(*f.sum(axis=1).T, moment), axis=1)
@@ -59,6 +60,7 @@ def _angle(one: Array, other: Array) -> Array:
 
 def test_load_of_twist_agrees_with_stretch_of_zero() -> None:
     surface, zero = load_map(THREE_POINTS), np.zeros(5, dtype=np.int64)
-    loaded = LoadedSurface(row_surfaces([surface], zero, zero, np.zeros(5)), np.arange(5), stretch=np.zeros((5, 2)))
+    surfaces = row_surfaces([surface], zero, zero, np.zeros(5))
+    loaded = LoadedSurface(surfaces, np.arange(5), root_of(np.zeros((5, 2)), surfaces.of_rows.reach))
     load = load_of_twist(THREE_POINTS, np.random.default_rng(0).standard_normal((5, 3)))
     assert np.stack(loaded.twist(slice(None), *load.T)) == pytest.approx(np.stack(surface.twist(*load.T)))

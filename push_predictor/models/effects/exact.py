@@ -51,6 +51,15 @@ class JointShift:
         return _stacked(self.of_parameter, effect)
 
 
+def joint_shifts(mechanics: Mechanics, alternatives: Sequence[Sequence[Effect]], push: Push, unchanged: Array) -> Array:
+    """Shifts (k, n, 3) of the mean by the exact effects of each of k sets, computed as one set of pushes.
+
+    unchanged (n, 3): what `undisturbed` returns.
+    """
+    exact = [[effect for effect in effects if effect.exact] for effects in alternatives]
+    return displaced(mechanics.fitted, [changes_of(effects, push) for effects in exact], push, unchanged) - unchanged
+
+
 def has_exact_effects(mechanism: str | None) -> bool:
     """Whether the forward model has the parameters of a mechanism."""
     return mechanism is not None and bool(mechanism_named(mechanism).quantities)
@@ -87,7 +96,7 @@ def joint(
     elif unchanged is None:
         moved = displaced(mechanics.fitted, [{}, changes, *tried], push)
     else:
-        moved = np.concatenate([unchanged[None], displaced(mechanics.fitted, [changes, *tried], push)])
+        moved = np.concatenate([unchanged[None], displaced(mechanics.fitted, [changes, *tried], push, unchanged)])
     of_parameter = _slopes(ends, moved[2:])
     shift, designs = moved[1] - moved[0], []
     for effect in effects:
@@ -136,10 +145,13 @@ def sums_of(effects: Sequence[Effect], push: Push) -> Changes:
     return total
 
 
-def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) -> Array:
+def displaced(
+    mechanics: FittedMechanics, tried: Sequence[Changes], push: Push, unchanged: Array | None = None
+) -> Array:
     """Displacements (k, n, 3) with each of k sets of changes, computed as one set of pushes.
 
-    The heading of a push follows from that of the slider.
+    The heading of a push follows from that of the slider. unchanged (n, 3): those of pushes that nothing changes, which
+    are then not computed again.
     """
     n, k, given = len(push.inputs), len(tried), dict(push.covariates)
     names = {name for changes in tried for name in changes}
@@ -149,7 +161,12 @@ def displaced(mechanics: FittedMechanics, tried: Sequence[Changes], push: Push) 
     covariates = {name: np.tile(column, k) for name, column in given.items()}
     columns = {name: np.concatenate([changes.get(name, np.zeros(n)) for changes in tried]) for name in sorted(names)}
     inputs, duration = np.tile(push.inputs, (k, 1)), np.tile(push.duration, k)
-    return mechanics.displacement(inputs, duration, covariates, columns).reshape(k, n, 3)
+    if unchanged is None:
+        return mechanics.displacement(inputs, duration, covariates, columns).reshape(k, n, 3)
+    moved, some = np.tile(unchanged, (k, 1)), np.any([column != 0.0 for column in columns.values()], axis=0)
+    covariates, columns = ({name: one[some] for name, one in each.items()} for each in (covariates, columns))
+    moved[some] = mechanics.displacement(inputs[some], duration[some], covariates, columns)
+    return moved.reshape(k, n, 3)
 
 
 def _ends(name: str, change: Array) -> tuple[Array, Array]:

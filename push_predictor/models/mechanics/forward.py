@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline, Projection
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface, Root, root_of
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
     PushSurfaces,
     RowSurfaces,
@@ -193,9 +193,7 @@ class Motion:
 
     def _driven(self, rows: IntArray, heading: Array, touch: Touch, inertial: Array | None) -> Driven:
         values, world = self.values, self.heading[rows] + heading
-        stretch, pull = None, inertial
-        if values.active("body_anisotropy", "body_anisotropy_diagonal", "grain_x", "grain_diagonal"):
-            stretch = self.stretch[rows] + rotate(self.grain[rows], -2.0 * world)
+        root, pull = self._root_of(rows, world), inertial
         if values.active("slope_x", "slope_y"):
             steady = np.column_stack([rotate(self.slope[rows], -world), np.zeros(len(rows))])
             pull = steady if pull is None else pull + steady
@@ -204,9 +202,22 @@ class Motion:
         if values.active("friction_by_load"):
             gauge = self.surfaces.gauge(rows, touch.normal_x, touch.normal_y, touch.normal_arm)
         left, right = friction_cone(values, rows, touch, self.push.speed[rows], gauge)
-        if self._plain and stretch is None and pull is None and height is None:
+        if self._plain and root is None and pull is None and height is None:
             return driven_on_ellipsoid(touch, np.tan(left))
-        return driven(LoadedSurface(self.surfaces, rows, stretch, pull, height).twist, touch, left, right)
+        return driven(LoadedSurface(self.surfaces, rows, root, pull, height).twist, touch, left, right)
+
+    def _root_of(self, rows: IntArray, world: Array) -> Root | None:
+        """Of the direction-dependent friction at headings in the world (k,): only the table's depends on these."""
+        if self.values.active("grain_x", "grain_diagonal"):
+            stretch = self.stretch[rows] + rotate(self.grain[rows], -2.0 * world)
+            return root_of(stretch, self.surfaces.of_rows.reach[rows])
+        if self.values.active("body_anisotropy", "body_anisotropy_diagonal"):
+            return self._body_root.of(rows)
+        return None
+
+    @cached_property
+    def _body_root(self) -> Root:
+        return root_of(self.stretch, self.surfaces.of_rows.reach)
 
     @property
     def _plain(self) -> bool:

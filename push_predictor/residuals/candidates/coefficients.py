@@ -17,16 +17,15 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect
-from push_predictor.models.effects.exact import JointShift, has_exact_effects, joint, joint_shift
+from push_predictor.models.effects.exact import JointShift, has_exact_effects, joint, joint_shift, joint_shifts
 from push_predictor.models.predictors import Cross
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.evidence.residualizer import Residualizer
-from push_predictor.residuals.evidence.standardised import Evidence, evidence_scale
+from push_predictor.residuals.evidence.standardised import MOST_FITTED, Evidence, evidence_scale
 from push_predictor.types import Array, IntArray
 
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
-MOST_FITTED = 600  # windows of a fit that compares candidates
 ANGLES = 8  # groups of push angles
 LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
@@ -79,8 +78,8 @@ def exact_fit(evidence: Evidence, candidate: Candidate, z: Array, controls: Arra
     if controls.shape[1] or candidate.nuisance is not None or len(z) <= MOST_FITTED:
         found = problem.solved()
     else:
-        rows = np.linspace(0, len(z) - 1, MOST_FITTED).astype(np.int64)
-        some = _Problem.of(evidence.take(rows), [candidate.take(rows)], controls[rows], z[rows])
+        rows, few = evidence.thinned
+        some = _Problem.of(few, [candidate.take(rows)], controls[rows], z[rows])
         found = problem.linearised(some.solved().coefficients)
     (effect,), there = problem.effects(found.coefficients), candidate
     if effect.exact:
@@ -172,21 +171,42 @@ class _Problem:
         promised: twice the fall of a quadratic objective. Where pushes begin to stick, a step is far too short: the
         derivatives of the rest of the data change there, and the objective falls by more.
         """
-        before, best, most = now.objective(now.ridge), now, 0.0
-        factor, length = 2.0, 1.0
+        before, best, most, length = now.objective(now.ridge), now, 0.0, 1.0
         for _ in range(LENGTHS):
             tried = self.linearised(now.coefficients + step * length)
             fall = before - tried.objective(now.ridge)
-            if fall > most:
-                best, most = tried, fall
-                if factor < 1.0 or fall < LENGTHENED * length * promised:
-                    break
-            elif length == 1.0:
-                factor = 0.5
-            elif factor > 1.0:
+            if fall <= most:
                 break
-            length *= factor
-        return best, most
+            best, most = tried, fall
+            if fall < LENGTHENED * length * promised:
+                break
+            length *= 2.0
+        return (best, most) if most > 0.0 else self._shortened(now, step)
+
+    def _shortened(self, now: _Linearised, step: Array) -> tuple[_Linearised, float]:
+        """The problem after the longest part of a step that is of use; as it was, if none is.
+
+        Most often none is. So all are tried at once, without derivatives.
+        """
+        tried = [now.coefficients + step * 0.5**k for k in range(1, LENGTHS)]
+        for coefficients, shift in zip(tried, self._shifts(now, tried), strict=True):
+            residual = self._cleared(self.z - shift)
+            fall = now.objective(now.ridge) - _objective(residual, now.ridge, coefficients)
+            if fall > 0.0:
+                return self.linearised(coefficients), fall
+        return now, 0.0
+
+    def _shifts(self, now: _Linearised, tried: Sequence[Array]) -> Array:
+        """Standardised shifts (k, n, 3) with each of these coefficients; designs of linear effects do not change."""
+        evidence, designs = self.evidence, now.joint.designs
+        every = [(*evidence.effects, *self.effects(coefficients)) for coefficients in tried]
+        shifts = np.zeros((len(tried), *self.z.shape)) - self._before
+        if any(effect.exact for effect in every[0]):
+            shifts += joint_shifts(evidence.mechanics, every, evidence.push, evidence.undisturbed)
+        for shift, effects in zip(shifts, every, strict=True):
+            for effect, design in zip(effects, designs, strict=True):
+                shift += 0.0 if effect.exact else design @ effect.coefficients
+        return np.asarray(np.einsum("nij,knj->kni", evidence.whitener, shifts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +225,11 @@ class _Linearised:
     joint: JointShift
 
     def objective(self, ridge: Array) -> float:
-        return 0.5 * float(np.sum(self.residual**2) + np.sum(ridge * self.coefficients**2))
+        return _objective(self.residual, ridge, self.coefficients)
+
+
+def _objective(residual: Array, ridge: Array, coefficients: Array) -> float:
+    return 0.5 * float(np.sum(residual**2) + np.sum(ridge * coefficients**2))
 
 
 def _angles(angle: Array) -> IntArray:

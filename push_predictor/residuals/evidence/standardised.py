@@ -18,6 +18,7 @@ from push_predictor.types import Array, BoolArray, IntArray
 
 BLOCK = 4  # neighbouring pushes may share disturbances that no covariate records
 ACCURACY_OF_FITS = 3e-3  # relative, of displacements
+MOST_FITTED = 600  # windows of a fit that compares candidates
 FEWEST_BLOCKS = 100  # with fewer, blocks are smaller: a bootstrap over few blocks has little power
 
 
@@ -60,6 +61,12 @@ class Evidence:
     def undisturbed(self) -> Array:
         """Displacements (n, 3) by the mechanics without effects, from which shifts of effects are counted."""
         return undisturbed(self.mechanics, self.push)
+
+    @cached_property
+    def thinned(self) -> tuple[IntArray, Evidence]:
+        """Indices of at most MOST_FITTED windows spread over the session, and their evidence; enough for a fit."""
+        rows = np.linspace(0, len(self.table) - 1, min(MOST_FITTED, len(self.table))).astype(np.int64)
+        return rows, self.take(rows)
 
     def take(self, rows: IntArray | BoolArray) -> Evidence:
         """The given rows."""

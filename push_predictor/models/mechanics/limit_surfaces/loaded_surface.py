@@ -26,14 +26,14 @@ Parts: TypeAlias = tuple[Array, Array, Array]  # of a load or a twist
 class LoadedSurface:
     """The limit surfaces of some rows (k,), as a pusher feels them.
 
-    stretch (k, 2): a point at velocity u resists with W^-1 u / sqrt(u' W^-1 u), W = [[1 + a, b], [b, 1 - a]]. pull
-    (k, 3): a steady load in units of the largest force, and of that times the length. height (k,) m: the centre of
-    pressure moves by it along the pusher's force, in units of the largest.
+    root: of the direction-dependent friction, see root_of. pull (k, 3): a steady load in units of the largest force,
+    and of that times the length. height (k,) m: the centre of pressure moves by it along the pusher's force, in units
+    of the largest.
     """
 
     surfaces: PushSurfaces
     rows: IntArray
-    stretch: Array | None = None
+    root: Root | None = None
     pull: Array | None = None
     height: Array | None = None
 
@@ -43,12 +43,11 @@ class LoadedSurface:
         chosen: those of the rows that the loads are of.
         """
         rows = self.rows[chosen]
-        if self.stretch is None and self.pull is None and self.height is None:
+        if self.root is None and self.pull is None and self.height is None:
             return self.surfaces.twist(rows, force_x, force_y, moment)
-        root = None if self._root is None else _Root(*(part[chosen] for part in self._root))
+        root = None if self.root is None else self.root.of(chosen)
         load = (force_x, force_y, moment) if root is None else root.times(force_x, force_y, moment)
-        factor, load = self.on_surface(chosen, load)
-        vx, vy, spin = self.surfaces.twist(rows, *load)
+        factor, (vx, vy, spin) = self._driven(chosen, load)
         if root is not None:
             vx, vy, spin = root.times(vx, vy, spin)
         if self.height is not None:
@@ -56,24 +55,28 @@ class LoadedSurface:
             vx, vy = vx + shift * force_y, vy - shift * force_x
         return vx, vy, spin
 
-    @cached_property
-    def _root(self) -> _Root | None:
-        return None if self.stretch is None else _root_of(self.stretch, self.surfaces.of_rows.reach[self.rows])
+    def _driven(self, chosen: Rows, load: Parts) -> tuple[Array, Parts]:
+        """Factor that brings the pusher's load onto the surface (see on_surface), and the twist there."""
+        if self._stretched_pull is None and self.height is not None:
+            twist, size = self.surfaces.twist_and_gauge(self.rows[chosen], *load)
+            return 1.0 / size, twist
+        factor, load = self.on_surface(chosen, load)
+        return factor, self.surfaces.twist(self.rows[chosen], *load)
 
     @cached_property
     def _stretched_pull(self) -> Array | None:
-        if self.pull is None or self._root is None:
+        if self.pull is None or self.root is None:
             return None if self.pull is None else self.pull.T
-        return np.stack(self._root.times(*self.pull.T))
+        return np.stack(self.root.times(*self.pull.T))
 
     def on_surface(self, chosen: Rows, pusher: Parts) -> tuple[Array, Parts]:
         """Factor that brings the pusher's load onto the surface, with the pull, and the load there, as large as given.
 
-        Without a pull the factor is worked out only where the height needs it.
+        Without a pull the load stays as it is, and nothing needs the factor.
         """
         rows = self.rows[chosen]
         if self._stretched_pull is None:
-            return (np.ones(0) if self.height is None else 1.0 / self.surfaces.gauge(rows, *pusher)), pusher
+            return np.ones(0), pusher
         pull, given = self._stretched_pull[:, chosen], np.sqrt(sum(part * part for part in pusher))
         x, y, m = (part / given for part in pusher)
         dot, square = x * pull[0] + y * pull[1] + m * pull[2], np.sum(pull * pull, axis=0)
@@ -85,7 +88,7 @@ class LoadedSurface:
         return share / given, (given * load[0], given * load[1], given * load[2])
 
 
-class _Root(NamedTuple):
+class Root(NamedTuple):
     """The root R of W (k,) each: xx, xy, yy; and the inverse of the factor by which W stretches the arms' length.
 
     With isotropic friction at the velocities R^-1 u, a body with the arms R r / det R has the load R f and the same
@@ -98,15 +101,24 @@ class _Root(NamedTuple):
     yy: Array
     turn: Array
 
+    def of(self, rows: Rows) -> Root:
+        """Those of some of the rows."""
+        return Root(*(part[rows] for part in self))
+
     def times(self, x: Array, y: Array, m: Array) -> Parts:
+        """The root times forces or velocities, and moments or spins in the stretched arms' units."""
         return self.xx * x + self.xy * y, self.xy * x + self.yy * y, self.turn * m
 
 
-def _root_of(stretch: Array, reach: Array) -> _Root:
+def root_of(stretch: Array, reach: Array) -> Root:
+    """The root of W = [[1 + a, b], [b, 1 - a]] for each stretch (k, 2: a, b), at most MOST_STRETCH long.
+
+    A point at velocity u resists with W^-1 u / sqrt(u' W^-1 u). reach (k, DIRECTIONS): of the pressure.
+    """
     size = np.sqrt(np.sum(stretch * stretch, axis=1))
     a, b = (stretch * np.minimum(1.0, MOST_STRETCH / np.maximum(size, MOST_STRETCH))[:, None]).T
     determinant = np.sqrt(1.0 - a * a - b * b)
     trace = np.sqrt(2.0 + 2.0 * determinant)
     arms = np.sqrt(1.0 + a[:, None] * COS + b[:, None] * SIN)
     turn = determinant / np.sum(reach * arms, axis=1)
-    return _Root((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)
+    return Root((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)

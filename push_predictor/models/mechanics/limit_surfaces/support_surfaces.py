@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, interpolated, interpolated_gauge, place_of
+from push_predictor.models.mechanics.limit_surfaces.load_map import (
+    LoadMap,
+    Place,
+    interpolated,
+    interpolated_gauge,
+    place_of,
+)
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.types import Array, IntArray
+
+Twist: TypeAlias = tuple[Array, Array, Array]  # vx, vy, w times length, (k,) each, up to a factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +42,14 @@ class PushSurfaces(Protocol):
     def of_rows(self) -> RowQuantities:
         """Quantities of each push."""
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
         """See LimitSurface, for some of the rows (k,)."""
 
     def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
         """See LimitSurface, for some of the rows (k,)."""
+
+    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+        """Both for the same loads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +67,20 @@ class RowSurfaces:
     share: Array
     of_rows: RowQuantities
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
         """See PushSurfaces."""
+        return self._twist(rows, place_of(x, y, moment))
+
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+        """See PushSurfaces."""
+        return self._gauge(rows, place_of(x, y, moment))
+
+    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+        """See PushSurfaces: the loads are looked up once."""
         place = place_of(x, y, moment)
+        return self._twist(rows, place), self._gauge(rows, place)
+
+    def _twist(self, rows: IntArray, place: Place) -> Twist:
         one = interpolated(self.cells, self.low[rows] * self.per_table, place)
         share = self.share[rows]
         if not share.any():
@@ -67,9 +89,7 @@ class RowSurfaces:
         vx, vy, spin = (a + share * (b - a) for a, b in zip(one, other, strict=True))
         return vx, vy, spin
 
-    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
-        """See PushSurfaces."""
-        place = place_of(x, y, moment)
+    def _gauge(self, rows: IntArray, place: Place) -> Array:
         one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, place)
         share = self.share[rows]
         if not share.any():
@@ -85,13 +105,17 @@ class SameSurface:
     surface: PowerSurface
     of_rows: RowQuantities
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Array, Array, Array]:
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
         """See PushSurfaces."""
         return self.surface.twist(x, y, moment)
 
     def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
         """See PushSurfaces."""
         return self.surface.gauge(x, y, moment)
+
+    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+        """See PushSurfaces."""
+        return self.twist(rows, x, y, moment), self.gauge(rows, x, y, moment)
 
 
 def same_surface(surface: PowerSurface, n: int) -> SameSurface:
