@@ -34,7 +34,7 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
     residual = residualizer(z)
 
     def judged(basis: DriverBasis) -> Judged:
-        tried = _with_basis(candidate, basis, table)
+        tried = with_basis(candidate, basis, table)
         return Judged(tried, gains_of(residual, residualizer(tried.columns), block))
 
     chosen = simplest([judged(basis) for basis in bases_for(candidate, table)])
@@ -52,7 +52,7 @@ def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray
     growing[0] = replace(growing[0], centre=(float(values.min()),))
 
     def judged(basis: DriverBasis) -> Judged:
-        tried = _with_basis(candidate, basis, table)
+        tried = with_basis(candidate, basis, table)
         return Judged(tried, gains_of(z, tried.columns, block))
 
     steps = [judged(DriverBasis("step", (name,), place=place)) for place in _places(values)]
@@ -84,7 +84,8 @@ def simplest(tried: list[Judged]) -> Judged:
     return min(near, key=lambda j: (SIMPLEST_FIRST.index(j.candidate.basis.name), -j.gain))
 
 
-def _with_basis(candidate: Candidate, basis: DriverBasis, table: PushTable) -> Candidate:
+def with_basis(candidate: Candidate, basis: DriverBasis, table: PushTable) -> Candidate:
+    """The candidate in another basis."""
     return replace(candidate, basis=basis, values=basis.values(table.covariates, len(table)))
 
 

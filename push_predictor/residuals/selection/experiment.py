@@ -17,7 +17,7 @@ from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanisms import Push
 from push_predictor.recordings.table import INPUTS, PushTable
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.settable import continued, lengthening, proposed, settings, travel_of
+from push_predictor.residuals.selection.settable import continued, has_long_pushes, proposed, settings, travels_of
 from push_predictor.types import Array, BoolArray, IntArray
 
 PUSHES = 20
@@ -80,9 +80,13 @@ def _within(table: PushTable, training: PushTable) -> BoolArray:
 
 
 def _sample(table: PushTable, usable: BoolArray, drivers: Sequence[str]) -> IntArray:
-    """Up to ROWS of the usable windows, evenly over the session; for long pushes those that turn the slider least."""
+    """Up to ROWS of the usable windows, evenly over the session.
+
+    Long pushes should take little time and keep the contact: fast ones are tried that turn the slider least.
+    """
     rows = np.flatnonzero(usable)
-    if travel_of(table, drivers) is not None:
+    if has_long_pushes(drivers):
+        rows = rows[table.inputs[rows, 0] >= np.median(table.inputs[rows, 0])]
         turn = np.abs(table.outcomes[rows, 2]) / (table.inputs[rows, 0] * table.duration[rows])
         rows = rows[turn <= np.median(turn)]
     return np.asarray(rows[np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(np.intp)])
@@ -98,7 +102,7 @@ def _pair(evidence: Evidence, rows: IntArray, first: Effect, other: Effect) -> _
     best = np.unravel_index(np.argsort(-difference, axis=None)[:PUSHES], difference.shape)
     now = [_shift(near, near.table.covariates, rival) for rival in (first, other)]
     windows = len(session) / len(session.pushes)
-    weights = (len(session) / len(rows), windows * lengthening(session, drivers))
+    weights = (len(session) / len(rows), windows)
     expected = min(
         _expected(now[0], now[1], one[best], two[best], weights),
         _expected(now[1], now[0], two[best], one[best], weights),
@@ -138,7 +142,8 @@ def _shift(evidence: Evidence, covariates: Mapping[str, Array], rival: Effect) -
 def _proposed(session: PushTable, rows: IntArray, pairs: Sequence[_Pair]) -> tuple[Mapping[str, float], ...]:
     """The pushes of all pairs in turn, each with what to set."""
     drivers = tuple(dict.fromkeys(name for pair in pairs for name in pair.drivers))
-    later, travel = continued(session, drivers, PUSHES), travel_of(session, drivers)
+    later, travels = continued(session, drivers, PUSHES), travels_of(session, drivers, PUSHES)
+    usual = float(travels_of(session, (), 1)[0])
     inputs, taken = session.inputs[rows], np.zeros(0, dtype=np.intp)
     pushes: list[Mapping[str, float]] = []
     for k in range(min(PUSHES, len(rows))):
@@ -146,7 +151,8 @@ def _proposed(session: PushTable, rows: IntArray, pairs: Sequence[_Pair]) -> tup
         setting = _telling(pair)[turn % len(_telling(pair))]
         row = int(np.argmax(pair.difference[setting] * _novelty(inputs, taken)))
         taken = np.append(taken, row)
-        push = dict(zip(INPUTS, inputs[row].tolist(), strict=True)) | ({} if travel is None else {"travel": travel})
+        push = dict(zip(INPUTS, inputs[row].tolist(), strict=True))
+        push |= {"travel": float(travels[k])} if travels[k] > usual else {}
         now = {name: float(values[k]) for name, values in later.items() if name in drivers}
         pushes.append({**push, **proposed(pair.settings[setting], drivers, row), **now})
     return tuple(pushes)

@@ -54,31 +54,38 @@ def settings(session: PushTable, rows: PushTable, drivers: Sequence[str], count:
 def continued(session: PushTable, drivers: Sequence[str], count: int) -> dict[str, Array]:
     """Values (count,) of the covariates that only grow, at further pushes made after a session.
 
-    With time and another of them among the drivers, a rest comes first. With count and distance among them, the pushes
-    are long.
+    With time and another of them among the drivers, a rest comes first: time passes, the others do not.
     """
-    travel = travel_of(session, drivers)
-    steps = {TIME: _per_push(session, TIME), COUNT: 1.0, DISTANCE: travel or _per_push(session, DISTANCE)}
-    rested = TIME in drivers and bool({COUNT, DISTANCE} & set(drivers))
-    begin = {TIME: REST * float(np.ptp(session.covariates[TIME]))} if rested else {}
+    one = np.ones(count)
+    steps = {TIME: _per_push(session, TIME) * one, COUNT: one, DISTANCE: travels_of(session, drivers, count)}
+    if _rested(drivers):
+        steps[TIME][0] += REST * float(np.ptp(session.covariates[TIME]))
     return {
-        name: float(session.covariates[name].max()) + begin.get(name, 0.0) + step * np.arange(1.0, count + 1.0)
+        name: float(session.covariates[name].max()) + np.cumsum(step)
         for name, step in steps.items()
         if name in session.covariates
     }
 
 
-def travel_of(session: PushTable, drivers: Sequence[str]) -> float | None:
-    """The distance (m) that each further push should slide, None where it does not matter."""
-    if not {COUNT, DISTANCE} <= set(drivers):
-        return None
-    return max(LONG_PUSH, _per_push(session, DISTANCE))
+def travels_of(session: PushTable, drivers: Sequence[str], count: int) -> Array:
+    """Distances (count,) in m that further pushes slide: long ones separate distance from count.
+
+    After a rest the first half is as usual. In long pushes time, count and distance would grow together.
+    """
+    usual = _per_push(session, DISTANCE)
+    travels = np.full(count, usual)
+    if has_long_pushes(drivers):
+        travels[count // 2 if _rested(drivers) else 0 :] = max(LONG_PUSH, usual)
+    return travels
 
 
-def lengthening(session: PushTable, drivers: Sequence[str]) -> float:
-    """How many times longer the further pushes are than these."""
-    usual, travel = _per_push(session, DISTANCE), travel_of(session, drivers)
-    return 1.0 if travel is None or usual <= 0.0 else travel / usual
+def has_long_pushes(drivers: Sequence[str]) -> bool:
+    """Whether some of the further pushes are long."""
+    return {COUNT, DISTANCE} <= set(drivers)
+
+
+def _rested(drivers: Sequence[str]) -> bool:
+    return TIME in drivers and bool({COUNT, DISTANCE} & set(drivers))
 
 
 def proposed(covariates: Mapping[str, Array], drivers: Sequence[str], row: int) -> dict[str, float]:
