@@ -12,11 +12,15 @@ from synthetic import square_rig
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.effect import Effect
+from push_predictor.models.effects.exact import joint_shift
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
+from push_predictor.recordings.table import concatenate
+from push_predictor.residuals.channels.motion import motion_effects
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.selection.experiment import APART, PUSHES, Experiment, separating_pushes
+from push_predictor.residuals.selection.experiment import APART, PUSHES, Experiment, _novelty, separating_pushes
 
 SESSION = pushes(120, 2)
 SLID = 0.01 * SESSION.covariates["push_index"]  # m
@@ -91,6 +95,16 @@ class TestProposedPushes:
         assert np.allclose(column(found, "travel"), 0.08)
         assert np.allclose(np.diff(column(found, "slid_distance")), 0.08)
 
+    def test_of_all_three_rest_first_and_slide_far_afterwards(self, evidence: Evidence) -> None:
+        """Time alone grows at first, then distance: together they would not be separated."""
+        rivals = [along(name, 0.1) for name in ("elapsed_time", "slid_distance", "push_index")]
+        found = separating_pushes(evidence, rivals, TRAINING)
+        half = PUSHES // 2
+        assert [k for k, push in enumerate(found.pushes) if "travel" in push] == list(range(half, PUSHES))
+        slid = column(found, "slid_distance")
+        assert slid[half - 1] < 1.1 * SLID.max() and slid[-1] > 1.5 * SLID.max()
+        assert column(found, "elapsed_time")[0] > 1.4 * TABLE.covariates["elapsed_time"].max()
+
     def test_of_headings_turn_the_slider_and_the_push_with_it(self, model: PushModel) -> None:
         basis = DriverBasis("periodic", ("slider_heading",))
         other = DriverBasis("periodic", ("push_heading",))
@@ -123,6 +137,10 @@ class TestProposedPushes:
         found = separating_pushes(evidence, [step("elapsed_time", 500.0), step("push_index", 59.5)], TRAINING)
         assert found.pushes == () and found.inseparable == ("push_index",)
 
+    def test_are_none_for_a_rival_that_another_size_makes_the_same(self, evidence: Evidence) -> None:
+        twice = replace(along("elapsed_time", 0.1), covariate="push_index")
+        assert separating_pushes(evidence, [along("elapsed_time", 0.05), twice], TRAINING).pushes == ()
+
     def test_are_for_the_rivals_that_can_be_separated(self, evidence: Evidence) -> None:
         rivals = [step("elapsed_time", 500.0), step("push_index", 59.5), along("topic:/warmth")]
         found = separating_pushes(evidence, rivals, TRAINING)
@@ -131,6 +149,12 @@ class TestProposedPushes:
 
     def test_are_none_without_a_rival(self, evidence: Evidence) -> None:
         assert separating_pushes(evidence, [slippery(0.05)], TRAINING).pushes == ()
+
+
+def test_contacts_on_both_sides_of_the_first_vertex_are_near() -> None:
+    inputs = np.array([[0.02, 0.01, 0.0], [0.02, 0.99, 0.0], [0.02, 0.5, 0.0]])
+    novelty = _novelty(inputs, np.array([0]))
+    assert novelty[0] == 0.0 and novelty[1] < 0.01 and novelty[2] == 1.0
 
 
 class TestPushesOfAnExperiment:
@@ -152,3 +176,25 @@ class TestPushesOfAnExperiment:
         assert len(set(block[~chosen])) == 100
         taken = replace(shaped, chosen=later).take(chosen)
         assert len(set(taken.block)) == 20
+
+
+@pytest.mark.slow
+def test_pushes_after_a_rest_settle_whether_time_or_distance_drives(model: PushModel) -> None:
+    """Both grow together until the rest: afterwards time is ahead, and contact friction has followed it."""
+    first, further = pushes(150, 5), pushes(20, 6)
+    time = np.concatenate([first.covariates["elapsed_time"], 1500.0 + 0.2 * further.covariates["elapsed_time"]])
+    count = np.concatenate([first.covariates["push_index"], 150.0 + further.covariates["push_index"]])
+    wobble = 0.01 * np.repeat(np.random.default_rng(0).standard_normal(170), 3)
+    columns = {"elapsed_time": time, "push_index": count, "slid_distance": 0.01 * count + wobble}
+    both = concatenate([first, further])
+    table = replace(both, covariates={**both.covariates, **columns})
+    push = Push(table.inputs, table.duration, table.covariates)
+    mechanics = evidence_of(model, table).mechanics
+    table = replace(table, outcomes=table.outcomes + joint_shift(mechanics, [slippery(0.04)], push))
+    every = replace(evidence_of(model, table), chosen=frozenset(further.pushes))
+    names = ["elapsed_time", "slid_distance"]
+    alone = motion_effects(model, every.take(np.arange(len(first))), 0.01, names)
+    assert {alone.terms[0].best.covariate, *alone.equivalent} == {"elapsed_time", "slid_distance"}
+    assert {name for proposal in alone.experiment.pushes for name in proposal} >= set(names)
+    settled = motion_effects(model, every, 0.01, names)
+    assert settled.terms[0].best.label == ("contact_friction", "elapsed_time") and not settled.equivalent
