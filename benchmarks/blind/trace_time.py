@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -72,7 +73,8 @@ def difference(one: object, other: object) -> float | None:
     if isinstance(one, list) and isinstance(other, list):
         return _largest(list(zip(one, other, strict=True))) if len(one) == len(other) else None
     if isinstance(one, float) and isinstance(other, float):
-        return abs(one - other) / max(abs(one), abs(other), SMALL) if one != other else 0.0
+        same = one == other or (isnan(one) and isnan(other))
+        return 0.0 if same else abs(one - other) / max(abs(one), abs(other), SMALL)
     return 0.0 if one == other else None
 
 

@@ -135,7 +135,7 @@ def test_several_sets_of_effects_are_shifted_at_once_as_each_alone() -> None:
     on, push = square(), made(12, 6)
     later = DriverBasis("step", ("elapsed_time",), place=500.0)
     sets = [[effect("contact_friction", size, basis=later), effect("inertia", 0.3)] for size in (0.0, 0.2, -0.1)]
-    sets += [[effect("contact_friction", 0.2, basis=later)]]
+    sets += [[effect("contact_friction", size, basis=later)] for size in (0.2, -0.1)]
     found = joint_shifts(on, sets, push, undisturbed(on, push))
     for shift, effects in zip(found, sets, strict=True):
         np.testing.assert_allclose(shift, joint_shift(on, effects, push), atol=1e-10)
