@@ -50,7 +50,7 @@ def make_hidden(folder: Path, seed: int) -> Hidden:
     whole = simulate(replace(spec, changes=act))
     begins = conditions(spec).values["elapsed_time"]
     write_recording(places.whole, whole)
-    write_recording(places.recorded, _until(whole, float(begins[PLAIN + TRACED])))
+    write_recording(places.recorded, until(whole, float(begins[PLAIN + TRACED])))
     places.truth.parent.mkdir(parents=True, exist_ok=True)
     places.truth.write_text(json.dumps(truth, indent=1))
     return places
@@ -83,7 +83,7 @@ def _gated(law: Law) -> Law:
     return gated
 
 
-def _until(recording: Recording, seconds: float) -> Recording:
+def until(recording: Recording, seconds: float) -> Recording:
     """The first seconds of a recording."""
     first = min(int(recording.slider.stamp[0]), int(recording.pusher.stamp[0]))
     last = first + round(seconds * 1e9)

@@ -1,8 +1,8 @@
 """The residual loop, step by step: an alarm, the trace of its cause, the extended model, the error before and after.
 
-The rig changes during a replay; examples/hidden.py draws the change and hides it. The validator's alarm reports that
-the model no longer fits. The action trace_residual finds the cause, and load_model loads the extended model. A second
-validation compares both models on the pushes after the trace.
+The validator's alarm reports that the model no longer fits. The action trace_residual finds the cause, and load_model
+loads the extended model. A second validation compares both models on the pushes after the trace. In the demo the rig
+changes during a replay; examples/hidden.py draws the change and hides it.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from push_predictor_interfaces.msg import PushAlarm
 from push_predictor_interfaces.srv import LoadModel
 
 RATE, RATE_AGAIN = 10.0, 20.0
+BEFORE, AFTER = "changed_online", "after_online"  # folders of the two validations
 REPLAY_PATIENCE, TRACE_PATIENCE, PATIENCE = 200.0, 240.0, 30.0  # s
 
 
@@ -43,6 +44,20 @@ class Traced:
     message: str
     verdict: Mapping[str, Any]
     extended: Path | None
+
+
+class TraceFailedError(SystemExit):
+    """The server refused a trace, or could not finish it; the text is its reason."""
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """What the loop did. alarm: None if it did not fire; traced: None if the trace failed, for the reason `failed`."""
+
+    story: Story
+    alarm: PushAlarm | None
+    traced: Traced | None
+    failed: str = ""
 
 
 class Operator:
@@ -76,7 +91,7 @@ class Operator:
         self._listens = False
 
     def trace(self, model: str, output: Path) -> Traced:
-        """Trace the residuals that a validator wrote into a folder. Raises SystemExit if that fails."""
+        """Trace the residuals that a validator wrote into a folder. Raises TraceFailedError, SystemExit if it hangs."""
         if not self._trace.wait_for_server(PATIENCE):
             raise SystemExit(f"no action server trace_residual within {PATIENCE:.0f} s")
         goal = TraceResidual.Goal(model=model, output=str(output))
@@ -84,7 +99,7 @@ class Operator:
         handle = _answer(sent, PATIENCE)
         result = _answer(self._in_spin(handle.get_result_async), TRACE_PATIENCE).result
         if not result.success:
-            raise SystemExit(f"trace_residual: {result.message}")
+            raise TraceFailedError(result.message)
         extended = Path(result.extended_model) if result.extended_model else None
         return Traced(result.message, json.loads(result.verdict), extended)
 
@@ -129,30 +144,55 @@ def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
         flush=True,
     )
     hidden = make_hidden(out, seed)
-    before, after = out / "changed_online", out / "after_online"
-    with node("predict_server", {"models": [str(model)]}, "loop_server"), Operator() as operator:
-        _replay(model, [], hidden.recorded, before, RATE)
-        time.sleep(1.0)  # the alarm may still be in transit
-        operator.stop_listening()
-        if operator.alarm is None:
-            print("   The alarm did not fire. The trace is requested anyway.")
-        print("5. Trace the cause in the residuals that the validator recorded (action trace_residual).")
-        traced = operator.trace(name, before)
-        _print_lines(traced.message)
-        print("6. Load the extended model and continue.")
-        served = None if traced.extended is None else f"{name}_extended"
-        if traced.extended is None or served is None:
-            print("   There is no extended model: no effect was found that improves the log density.")
-        else:
-            _print_lines(operator.load(traced.extended, served))
-        # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.
-        _replay(model, [served] if served else [], hidden.whole, after, RATE_AGAIN)
-    story = story_of(model, traced.extended, served, before, after, operator.alarm)
-    _print_scores(story)
+    closed = run_loop(model, name, hidden.recorded, hidden.whole, out)
+    if closed.traced is None:
+        raise SystemExit(f"trace_residual: {closed.failed}")
+    print_scores(closed.story)
     truth = json.loads(hidden.truth.read_text())  # not before
     revealed = ", ".join(f"{key} {value}".replace("_", " ") for key, value in truth.items() if key != "right names")
     print(f"   The hidden change was: {revealed}.")
-    return draw_story(out / "loop.png", story, traced.verdict, truth)
+    return draw_story(out / "loop.png", closed.story, closed.traced.verdict, truth)
+
+
+def run_loop(
+    model: Path, name: str, recorded: Path, whole: Path, out: Path, rates: tuple[float, float] = (RATE, RATE_AGAIN)
+) -> ClosedLoop:
+    """Replay, watch for the alarm, trace, load the extended model, replay again; print what happens.
+
+    recorded: the pushes before the trace; whole: those and later ones. rates: of the two replays. out: folder for what
+    the validators write. Raises SystemExit if a node fails.
+    """
+    before, after = out / BEFORE, out / AFTER
+    with node("predict_server", {"models": [str(model)]}, "loop_server", out), Operator() as operator:
+        _replay(model, [], recorded, before, rates[0])
+        time.sleep(1.0)  # the alarm may still be in transit
+        operator.stop_listening()
+        if operator.alarm is None:
+            print("   The alarm did not fire. The trace is requested anyway.", flush=True)
+        traced, failed = _traced(operator, name, before)
+        extended = None if traced is None else traced.extended
+        served = None if extended is None else f"{name}_extended"
+        if extended is not None and served is not None:
+            print("   Load the extended model (service load_model) and continue.")
+            _print_lines(operator.load(extended, served))
+        elif traced is not None:
+            print("   There is no extended model: no effect was found that improves the log density.")
+        # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.
+        _replay(model, [served] if served else [], whole, after, rates[1])
+    story = story_of(model, extended, served, before, after, operator.alarm)
+    return ClosedLoop(story, operator.alarm, traced, failed)
+
+
+def _traced(operator: Operator, name: str, folder: Path) -> tuple[Traced | None, str]:
+    """The trace of a validator's folder, or None and the reason."""
+    print("   Trace the cause in the residuals that the validator recorded (action trace_residual).", flush=True)
+    try:
+        traced = operator.trace(name, folder)
+    except TraceFailedError as error:
+        _print_lines(f"The trace failed: {error}")
+        return None, str(error)
+    _print_lines(traced.message)
+    return traced, ""
 
 
 def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate: float) -> None:
@@ -164,8 +204,8 @@ def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate
         validator["compare"] = compare
     player = {"recording": str(recording), "play.rate": rate, "wait_for_subscribers": 30.0}
     with (
-        node("push_validator", validator, f"{output.name}_validator"),
-        node("push_replay", player, f"{output.name}_replay"),
+        node("push_validator", validator, f"{output.name}_validator", output.parent),
+        node("push_replay", player, f"{output.name}_replay", output.parent),
     ):
         deadline = time.monotonic() + REPLAY_PATIENCE
         while not result.exists():
@@ -176,7 +216,8 @@ def _replay(model: Path, compare: list[str], recording: Path, output: Path, rate
             time.sleep(0.1)
 
 
-def _print_scores(story: Story) -> None:
+def print_scores(story: Story) -> None:
+    """Print the error of both models on the pushes after the trace."""
     print(f"   Error on the {story.n_later} pushes after the trace (not used by the trace), with 95 % intervals:")
     for label, comparison in story.later.items():
         score: dict[str, Any] = metrics_json(comparison)

@@ -172,12 +172,12 @@ def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
 
 
 def _title(verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> str:
-    found = "\n    and ".join(_found(effect) for effect in verdict["effects"]) or "no effect"
+    found = "\n    and ".join(effect_in_words(effect) for effect in verdict["effects"]) or "no effect"
     hidden = f"{_words(truth['mechanism'])} {_number(truth['value'])} {_unit(truth['unit'])}".strip()
     return f"Found by the trace: {found}\nHidden until the end: {hidden} (the simulator's own parameter)"
 
 
-def _found(effect: Mapping[str, Any]) -> str:
+def effect_in_words(effect: Mapping[str, Any]) -> str:
     """An effect in words: contact friction, changes with elapsed time (step), 0.25 (95 % CI 0.2 to 0.3)."""
     name = f"{_words(effect['mechanism'] or 'unknown mechanism')}, {_dependence(effect)}"
     size = effect["parameter"]

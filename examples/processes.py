@@ -17,14 +17,17 @@ GRACE = 15.0  # s, from SIGINT to SIGKILL
 
 
 @contextmanager
-def node(executable: str, parameters: Mapping[str, Any], log_name: str = "") -> Iterator[None]:
+def node(
+    executable: str, parameters: Mapping[str, Any], log_name: str = "", logs: Path | None = None
+) -> Iterator[None]:
     """Run one of this package's nodes; leaving the context interrupts it as Ctrl-C does.
 
-    Its output goes to out/demo/EXECUTABLE.log, or LOG_NAME.log. Raises SystemExit if its exit status is not 0.
+    Its output goes to EXECUTABLE.log, or LOG_NAME.log, in the folder `logs`, by default out/demo. Raises SystemExit if
+    its exit status is not 0.
     """
     assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_text(value)}")]
     command = [sys.executable, "-m", f"push_predictor.nodes.{executable}", "--ros-args", *assigned]
-    log = LOGS / f"{log_name or executable}.log"
+    log = (logs or LOGS) / f"{log_name or executable}.log"
     with log.open("w") as stream:
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
     try:

@@ -1,0 +1,130 @@
+"""The residual loop on measured pushes: its report, the skip without data, and a whole loop through the nodes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_harness import free_domain
+
+from examples import measured_loop
+from examples.loop import ClosedLoop, Traced
+from examples.loop_picture import DEPLOYED, EXTENDED, Story
+from examples.measured_loop import REFIT, Outcome, main, to_json, to_text
+from examples.measured_recordings import Split
+from push_predictor.evaluation.validation import Comparison
+from push_predictor.recordings.streams import Recording
+
+EFFECT = {
+    "mechanism": "pressure_spread",
+    "covariate": "model_inputs",
+    "form": "constant",
+    "parameter": {"value": -0.7, "low": -0.8, "high": -0.5, "unit": "1"},
+}
+
+
+def comparison(error: float, pushes: int) -> Comparison:
+    """Three windows a push whose predictions are off by about `error`; the deviation is predicted right."""
+    rng = np.random.default_rng(0)
+    n = 3 * pushes
+    off = error * rng.normal(size=(n, 3))
+    observed = rng.normal(size=(n, 3))
+    ids = np.repeat([f"push-{k}" for k in range(pushes)], 3)
+    covariance = np.tile(error**2 * np.eye(3), (n, 1, 1))
+    return Comparison("m", 10, ids, observed + off, covariance, observed, None, np.zeros(3))
+
+
+def outcome(recording: Recording, later: dict[str, float], pushes: int = 20, failed: str = "") -> Outcome:
+    """The outcome of a loop; later: the error of each model on the later pushes."""
+    split = Split("mlab one to two", recording, recording, recording, "a support was changed")
+    traced = None if failed else Traced("", {"verdict": "mechanism_only", "effects": [EFFECT]}, None)
+    closed = ClosedLoop(Story({}, {}, 30, None), None, traced, failed)
+    counts = {"training": (50, 1000), "traced": (1, 15), "later": (pushes, 3 * pushes)}
+    alarm = {"fired": False, "pushes": 30, "log10_evidence": 0.9, "off": None}
+    return Outcome(split, counts, alarm, closed, {name: comparison(error, pushes) for name, error in later.items()})
+
+
+# --- the report -------------------------------------------------------------------------------------------------
+
+
+def test_extension_that_beats_both_models_on_later_pushes_is_called_better(recording: Recording) -> None:
+    found = outcome(recording, {DEPLOYED: 0.5, REFIT: 0.4, EXTENDED: 0.1})
+    assert to_text(found).startswith("mlab one to two. The extended model is better on the later pushes.")
+    values = to_json(found)["differences"]["extended − refit"]["nlpd"]
+    assert values["low"] <= values["value"] <= values["high"] < 0.0
+
+
+def test_gain_over_one_model_only_is_named(recording: Recording) -> None:
+    text = to_text(outcome(recording, {DEPLOYED: 0.5, REFIT: 0.1, EXTENDED: 0.1}))
+    assert "only this gain is certain: extended − deployed." in text
+
+
+def test_extension_without_gain_is_called_so(recording: Recording) -> None:
+    text = to_text(outcome(recording, {DEPLOYED: 0.1, REFIT: 0.1, EXTENDED: 0.3}))
+    assert "The extended model has no certain gain on the later pushes." in text
+
+
+def test_report_has_split_alarm_and_effect_with_its_interval(recording: Recording) -> None:
+    text = to_text(outcome(recording, {DEPLOYED: 0.5, REFIT: 0.4}))
+    assert "training 50 pushes (1000 windows), traced 1 push (15 windows), later 20 pushes (60 windows)" in text
+    assert "did not fire in 30 pushes (evidence 10^0.9)" in text
+    assert "mechanism only: pressure spread, constant, −0.7 (95 % CI −0.8 to −0.5)" in text
+    assert "The trace extended no model" in text
+
+
+def test_fired_and_disabled_alarm_are_reported(recording: Recording) -> None:
+    found = outcome(recording, {DEPLOYED: 0.5})
+    fired = {"fired": True, "pushes": 28, "log10_evidence": 2.2, "off": None}
+    assert "fired after 28 pushes (evidence 10^2.2)." in to_text(replace(found, alarm=fired))
+    assert "off: 2 training pushes." in to_text(replace(found, alarm={**fired, "off": "2 training pushes"}))
+
+
+def test_refused_trace_is_the_answer_and_its_reason_is_given(recording: Recording) -> None:
+    found = outcome(recording, {DEPLOYED: 0.5}, failed="too few pushes")
+    assert "Nothing was found: the trace refused these data." in to_text(found)
+    assert to_json(found)["trace"] == {"failed": "too few pushes"}
+
+
+def test_one_later_push_has_no_interval(recording: Recording) -> None:
+    found = outcome(recording, {DEPLOYED: 0.5, REFIT: 0.4, EXTENDED: 0.1}, pushes=1)
+    assert "(one push)" in to_text(found)
+    assert to_json(found)["later"][DEPLOYED]["nmse"]["low"] is None
+    assert "no certain gain" in to_text(found)
+    json.dumps(to_json(found), allow_nan=False)
+
+
+# --- the command ------------------------------------------------------------------------------------------------
+
+
+def test_without_the_data_it_states_which_folder_is_absent_and_succeeds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--data", str(tmp_path / "absent"), "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert said.count("SKIPPED") == 2 and str(tmp_path / "absent" / "mlab") in said and "--data FOLDER" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_share_of_no_pushes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as refused:
+        main(["--data", str(tmp_path), "--traced-share", "1"])
+    assert refused.value.code == 2
+
+
+@pytest.mark.slow
+def test_steel_block_runs_through_the_nodes_and_is_too_short_for_a_trace(
+    measured_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each run is one push; the trace needs twelve. The replays, the validations and the report work all the same."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
+    monkeypatch.setitem(measured_loop.RATES, "mcube", (20.0, 20.0))
+    assert main(["--data", str(measured_data), "--kind", "mcube", "--only", "steel", "--out", str(tmp_path)]) == 0
+    (found,) = json.loads((tmp_path / "measured_loop.json").read_text())
+    assert [part["pushes"] for part in found["split"].values()] == [2, 1, 1]
+    assert found["alarm"]["off"] and "at least 12" in found["trace"]["failed"]
+    assert found["later"][DEPLOYED]["nmse"]["value"] == pytest.approx(0.5, abs=0.2)
+    assert found["later"][REFIT]["nmse"]["value"] == pytest.approx(found["later"][DEPLOYED]["nmse"]["value"])
+    assert "Nothing was found" in capsys.readouterr().out
