@@ -230,9 +230,10 @@ def _pushes(count: int, windows: int) -> str:
 def _alarm(alarm: Mapping[str, Any]) -> str:
     if reason := alarm.get("off"):
         return f"off: {reason}."
+    evidence = f"(evidence 10^{alarm['log10_evidence']:.1f})".replace("-", "−")
     if not alarm["fired"]:
-        return f"did not fire in {alarm['pushes']} pushes (evidence 10^{alarm['log10_evidence']:.1f})."
-    return f"fired after {alarm['pushes']} pushes (evidence 10^{alarm['log10_evidence']:.1f})."
+        return f"did not fire in {alarm['pushes']} pushes {evidence}."
+    return f"fired after {alarm['pushes']} pushes {evidence}."
 
 
 def _found(closed: ClosedLoop) -> str:

@@ -125,6 +125,6 @@ def test_steel_block_runs_through_the_nodes_and_is_too_short_for_a_trace(
     (found,) = json.loads((tmp_path / "measured_loop.json").read_text())
     assert [part["pushes"] for part in found["split"].values()] == [2, 1, 1]
     assert found["alarm"]["off"] and "at least 12" in found["trace"]["failed"]
-    assert found["later"][DEPLOYED]["nmse"]["value"] == pytest.approx(0.5, abs=0.2)
-    assert found["later"][REFIT]["nmse"]["value"] == pytest.approx(found["later"][DEPLOYED]["nmse"]["value"])
+    online, offline = (found["later"][name]["nmse"]["value"] for name in (DEPLOYED, REFIT))  # the same mean
+    assert online == pytest.approx(offline, rel=1e-6) and 0.0 < online < 1.0
     assert "Nothing was found" in capsys.readouterr().out
