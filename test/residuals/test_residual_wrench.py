@@ -121,6 +121,28 @@ def test_dependence_on_place_that_training_has_too_is_not_reported() -> None:
     assert found(sloped(2), sloped(1)).effects == ()
 
 
+def on_an_uneven_table(seed: int) -> PushTable:
+    """Windows of a rig on whose table the friction varies from place to place, the same for every seed."""
+    table, rng = made(seed), np.random.default_rng([seed, 4])
+    place = 0.05 * rng.standard_normal((PUSHES, 2)).repeat(WINDOWS, axis=0)
+    waves = np.random.default_rng(1).normal(0.0, 2.0 * np.pi / 0.1, (6, 2))
+    grip = np.exp(0.2 * np.sin(place @ waves.T + np.arange(6)).mean(axis=1) * np.sqrt(12.0))
+    forces = {name: table.covariates[name] * grip for name in ("normal_force", "tangential_force")}
+    where = {"slider_x": place[:, 0], "slider_y": place[:, 1]}
+    return replace(table, covariates={**table.covariates, **forces, **where})
+
+
+@pytest.mark.slow
+def test_level_holds_on_a_table_whose_friction_varies_with_position() -> None:
+    """Training and new pushes are at other places of the same table; independent pairs, so that counts are binomial."""
+    p_values = []
+    for seed in range(40):
+        finding = found(on_an_uneven_table(100 + seed), on_an_uneven_table(500 + seed))
+        p_values.append(min(tried.p_value for tried in finding.tested))
+    assert np.sum(np.array(p_values) <= 0.2) <= 13  # 97.5 % of a binomial of 40 and 0.2
+    assert np.sum(np.array(p_values) <= 0.05) <= 5
+
+
 @pytest.mark.slow
 def test_finds_nothing_without_an_effect() -> None:
     for seed in range(10, 22):
@@ -164,6 +186,9 @@ def test_level_is_shared_by_the_zero_and_the_force_in_contact() -> None:
     for tried in alone.tested:
         assert p_values[tried.mechanism, tried.covariate] >= min(1.0, 2.0 * tried.p_value)
     assert shared.effects[0].p_value == 2.0 * alone.effects[0].p_value
+    level = 1.5 * alone.effects[0].p_value  # enough for the force alone, but not for half of it
+    assert wrench_effects(before, made(1), PHYSICS, alpha=level).effects
+    assert not wrench_effects(after, zeroed(made(1), (0.0, 0.0)), PHYSICS, alpha=level).effects
 
 
 def test_windows_without_a_force_give_no_finding() -> None:

@@ -22,10 +22,15 @@ def made(seed: int, bias: Vector = (0.0, 0.0), since: int = 0, drift: float = 0.
     rng = np.random.default_rng(seed)
     zero = np.tile(NOISE * rng.standard_normal(2), (pushes, 1)) + drift * shared(rng, pushes)
     zero += NOISE * rng.standard_normal((pushes, 2)) + np.where(np.arange(pushes)[:, None] >= since, bias, 0.0)
-    push = np.repeat(np.arange(pushes), WINDOWS)
+    return reading(zero)
+
+
+def reading(zero: Array) -> PushTable:
+    """Windows of pushes before which the sensor reads zero (p, 2)."""
+    push = np.repeat(np.arange(len(zero)), WINDOWS)
     n = len(push)
     covariates = {"free_force_x": zero[push, 0], "free_force_y": zero[push, 1], "push_index": push.astype(np.float64)}
-    inputs = np.column_stack([np.full(n, 0.02), rng.random(n), np.zeros(n)])
+    inputs = np.column_stack([np.full(n, 0.02), np.linspace(0.0, 0.9, n), np.zeros(n)])
     return PushTable(inputs, np.full(n, 0.2), np.zeros((n, 3)), push.astype(np.str_), covariates)
 
 
@@ -64,6 +69,15 @@ def test_bias_from_a_push_on_is_found_as_a_step_with_its_size() -> None:
         assert shift.p_value < 1e-4
         for size, truth in zip(shift.parameters, (0.3, -0.2), strict=True):
             assert size.low < truth < size.high and size.high - size.low < 0.03
+
+
+def test_smallest_bias_that_is_found_is_as_documented() -> None:
+    """In docs/explanation/residual_loop.md, at a level of 0.001."""
+    sound = reading(np.zeros((PUSHES, 2)))
+    for since, missed, seen in ((0, 0.107, 0.113), (PUSHES // 2, 0.088, 0.103)):
+        for size in (missed, seen):
+            bias = np.where(np.arange(PUSHES)[:, None] >= since, (0.0, size), 0.0)
+            assert (found(reading(bias), sound).p_value <= 0.001) == (size == seen)
 
 
 def test_interval_covers_the_change_even_if_neighbouring_pushes_share_noise() -> None:

@@ -2,8 +2,9 @@
 
 A bias that is always there is subtracted and does no harm to the windows, but the sensor reads too much by it. The zero
 of the new pushes is compared with that of training, and within the session before and after a push. The zero of a sound
-sensor also differs a little between sessions (BETWEEN_SESSIONS), which the test takes for chance. Over hundreds of
-pushes the means are exact, so this alone bounds the smallest bias that is found: 0.11 N at a level of 0.001.
+sensor also differs a little between sessions (BETWEEN_SESSIONS), which the test takes for chance. Within a session it
+may drift by as much. Over hundreds of pushes the means are exact, so this alone bounds the smallest bias that is found:
+0.11 N since training and 0.1 N within the session, at a level of 0.001.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ def zero_shift(windows: PushTable, baseline: PushTable | None) -> ZeroShift | No
     if now is None:
         return None
     places = np.unique(np.linspace(0, len(now), PLACES + 2).astype(int)[1:-1])
-    steps = [_Change(PROGRESS, "step", now[:k], now[k:], 2 * len(places)) for k in places if _enough(now, int(k))]
-    tried = steps if before is None else [_Change(CONSTANT, "constant", before, now, 2), *steps]
+    steps = [_Change(PROGRESS, "step", now[:k], now[k:], 1, 2 * len(places)) for k in places if _enough(now, int(k))]
+    tried = steps if before is None else [_Change(CONSTANT, "constant", before, now, 2, 2), *steps]
     if not tried:
         return None
     best = max(tried, key=lambda change: change.log_evidence)
@@ -59,12 +60,16 @@ def zero_shift(windows: PushTable, baseline: PushTable | None) -> ZeroShift | No
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """A change of the zeros (b, 2) of some pushes to those (a, 2) of later ones; it is one of `alternatives` tried."""
+    """A change of the zeros (b, 2) of some pushes to those (a, 2) of later ones.
+
+    sessions: that the pushes are from. alternatives: number of changes tried, of which this is one.
+    """
 
     covariate: str
     basis: str
     before: Array
     after: Array
+    sessions: int
     alternatives: int
 
     @property
@@ -80,7 +85,7 @@ class _Change:
     @property
     def log_evidence(self) -> float:
         """Minus the logarithm of the p value: a normal change in two dimensions, Bonferroni."""
-        chance = self.variance + 2.0 * BETWEEN_SESSIONS**2 * np.eye(2)
+        chance = self.variance + self.sessions * BETWEEN_SESSIONS**2 * np.eye(2)
         return float(0.5 * self.size @ np.linalg.solve(chance, self.size) - np.log(self.alternatives))
 
     @property
@@ -114,7 +119,7 @@ def _placed(step: _Change, zeros: Array) -> _Change:
     places = [k for k in range(1, len(zeros)) if _enough(zeros, k)]
     scatter = [float(sum(len(part) * part.var(axis=0).sum() for part in (zeros[:k], zeros[k:]))) for k in places]
     place = places[int(np.argmin(scatter))]
-    return _Change(step.covariate, step.basis, zeros[:place], zeros[place:], step.alternatives)
+    return _Change(step.covariate, step.basis, zeros[:place], zeros[place:], step.sessions, step.alternatives)
 
 
 def _of_mean(zeros: Array) -> Array:
