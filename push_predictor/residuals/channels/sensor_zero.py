@@ -123,10 +123,9 @@ def _placed(step: _Change, zeros: Array) -> _Change:
 
 
 def _of_mean(zeros: Array) -> Array:
-    """Covariance (2, 2) of the mean of zeros (p, 2), from the means of about sqrt(p) runs of pushes.
+    """Covariance (2, 2) of the mean of zeros (p, 2), from single pushes or from runs of about sqrt(p) pushes.
 
-    A sensor's zero drifts, so that neighbouring pushes share part of their noise.
+    A sensor's zero drifts, so that neighbouring pushes may share part of their noise: the larger of the two counts.
     """
-    runs = np.array_split(zeros, int(np.sqrt(len(zeros))))
-    means = np.array([run.mean(axis=0) for run in runs])
-    return np.asarray(np.cov(means.T) / len(means))
+    runs = np.array([run.mean(axis=0) for run in np.array_split(zeros, int(np.sqrt(len(zeros))))])
+    return np.asarray(max((np.cov(means.T) / len(means) for means in (zeros, runs)), key=np.trace))
