@@ -216,7 +216,8 @@ def _searched(context: _Context, watch: Watch) -> Searched:
         model, context.evidence, context.share("motion"), context.covariates, seed, inside=context.inside
     )
     watch("force", 0.6)
-    forces = wrench_effects(analysis, model.training, context.evidence.physics, context.share("wrench"), seed)
+    known = analysis.take(context.inside)  # faster pushes need more force, and training does not show how much
+    forces = wrench_effects(known, model.training, context.evidence.physics, context.share("wrench"), seed)
     biased = None if motion.terms else _biased(forces, spread=bool(motion.variance))
     return Searched(measured, motion, forces, None if biased is None else _corrected(context, biased))
 

@@ -18,7 +18,7 @@ from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.channels.motion import NO_MOTION
 from push_predictor.residuals.channels.variance import VarianceEffect
-from push_predictor.residuals.channels.wrench import WrenchEffect, WrenchFinding
+from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting.trace_json import trace_json
@@ -92,6 +92,23 @@ def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(m
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
     assert [e.mechanism for e in both.effects] == ["surface_friction"]
     assert any("noise of the motion changed as well" in note and "speed" in note for note in both.notes)
+
+
+def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pushes faster than those of training need another force on an unchanged rig."""
+    data, judged = faultless(), []
+    inputs = data.table.inputs.copy()
+    faster = np.isin(data.table.push_id, data.table.pushes[::2])
+    inputs[faster, 0] *= 5.0
+    shifted = replace(data, table=replace(data.table, inputs=inputs), recordings=None)
+    monkeypatch.setattr(
+        "push_predictor.residuals.trace.wrench_effects", lambda table, *_: judged.append(table) or NO_WRENCH
+    )
+    monkeypatch.setattr("push_predictor.residuals.trace.motion_effects", lambda *_, **__: NO_MOTION)
+    found = trace(learnt(), shifted)
+    assert "velocity" in [each.covariate for each in found.input_shift]
+    assert 0 < len(judged[0]) < len(found.analysis)
+    assert judged[0].inputs[:, 0].max() < 2.0 * data.table.inputs[:, 0].max()
 
 
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
