@@ -1,83 +1,78 @@
-"""What the textbook model lacks on measured pushes: the residual loop's search, step by step.
+"""What an analytical model lacks on measured pushes: `trace`, and the scores of its effects one after another.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.ladder --data FOLDER [--kind mit-square|mlab] [--quick]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.ladder --data FOLDER [--kind mit-square|mlab] [--base BASE]
 
-FOLDER has mit_square and mlab. A third of the pushes (residuals/evidence/split.py) is held out and used once, at the
-end, for all steps together. A third of the others is the gate. A step is the search on the rest with family-wise level
-0.05. Its best candidate enters the model if its parameter is plausible for a rig and if the density at the gate
-improves with 95 % confidence. Otherwise it is noted and not tried again. The ladder ends when nothing is significant.
+FOLDER has mit_square and mlab. `trace` is called as by its command, with the covariates of the data. It holds out a
+third of the pushes (residuals/evidence/split.py) and uses them once, at the end. BASE is the textbook model (an
+ellipsoidal limit surface, contact friction 0.3) or `exact`: the exact forward model with the textbook's parameters and,
+where the names of the recordings state them, the support points. No base is fitted, only its covariance is.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Callable, Sequence, Set
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 
-from push_predictor.evaluation.estimate import by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.push_scores import push_scores
+from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
+from push_predictor.evaluation.push_scores import PushScores, push_scores
 from push_predictor.models.effects.effect import Effect, mechanism_named
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanics.fitted import FittedMechanics
+from push_predictor.models.mechanics.forward import PushMechanics
+from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
+from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.importers import import_source
-from push_predictor.recordings.table import PushTable
-from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.candidates.enumeration import candidates_of
-from push_predictor.residuals.evidence.drivers import driver_names
-from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.recordings.load import different_supports
+from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
-from push_predictor.residuals.evidence.split import digest_of, held_out_rows
+from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.extension.extended_model import extend
-from push_predictor.residuals.extension.held_out_gain import compared, gain
-from push_predictor.residuals.outcome import Gain
-from push_predictor.residuals.selection.forward_selection import search
-from push_predictor.residuals.selection.term_choice import SelectedTerm
+from push_predictor.residuals.extension.held_out_gain import compared
+from push_predictor.residuals.extension.refit import refit_base
+from push_predictor.residuals.outcome import Trace
+from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-ALPHA = 0.05  # of a step; the gate rejects false positives
-MOST_TRIES = 12
-NO_LEVEL = -1.0  # of a category
-Label: TypeAlias = tuple[str | None, str]
 HEAD = """| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |
 |---|---|---|---|---|"""
 ORDER = ("row_id", "push_index")  # meaningless in the square's table: its rows are shuffled
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """A step of the ladder, accepted or refused.
+class Measured:
+    """Measured pushes, and the support points (k, 3) of those recordings whose names state them, by their number."""
 
-    model: with the effect; effect: None for the first step. at_gate: gain in NLPD at the gate. refused: the reason,
-    empty if accepted.
-    """
-
-    model: PushModel
-    effect: Effect | None
-    p_value: float
-    rivals: tuple[str, ...] = ()
-    at_gate: Gain | None = None
-    refused: str = ""
+    data: LoadedData
+    supports: Mapping[int, Array]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the ladders."""
+    """Print the steps of each trace."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
-    parser.add_argument("--quick", action="store_true", help="two tries at most")
+    parser.add_argument("--base", choices=sorted(BASES))
     options = parser.parse_args(arguments)
     for kind in [options.kind] if options.kind else sorted(LADDERS):
-        with tempfile.TemporaryDirectory() as work:
-            loaded = LADDERS[kind](options.data, Path(work))
-        print(f"\n## {kind}\n")
-        report(loaded, 2 if options.quick else MOST_TRIES)
+        measured = load(kind, options.data)
+        for base in [options.base] if options.base else sorted(BASES, reverse=True):
+            print(f"\n## {kind}, {base} base\n")
+            report(BASES[base](measured), measured.data)
+
+
+def load(kind: str, data: Path) -> Measured:
+    """Import and load one kind of measured pushes."""
+    with tempfile.TemporaryDirectory() as work:
+        loaded = LADDERS[kind](data, Path(work))
+        return Measured(loaded, different_supports(sorted(Path(work).glob("*.csv"))))
 
 
 def mit_square(data: Path, work: Path) -> LoadedData:
@@ -97,117 +92,50 @@ def mlab(data: Path, work: Path) -> LoadedData:
 LADDERS: dict[str, Callable[[Path, Path], LoadedData]] = {"mit-square": mit_square, "mlab": mlab}
 
 
-def report(loaded: LoadedData, most_tries: int = MOST_TRIES) -> None:
-    """Run the ladder, score all steps on the held-out pushes, and print a row per step."""
-    aside = held_out_rows(loaded.table)
-    table, held = loaded.table.take(~aside), loaded.table.take(aside)
-    print(f"{len(table.pushes)} pushes for the search, {len(held.pushes)} held out, sha256 {digest_of(held)[:12]}")
-    print(f"drivers: {', '.join(names_of(loaded))}\n", flush=True)
-    tried = climb(loaded, most_tries)
-    print(HEAD)
-    rungs = [step for step in tried if not step.refused]
-    for before, step in zip([rungs[0], *rungs], rungs, strict=False):
-        print(_row(before, step, held, rungs[0].model.training_mean))
-    for step in tried[1:]:
-        print(_detail(step))
+def textbook(measured: Measured) -> PushModel:
+    """The textbook model, with the covariance of its residuals on the pushes that are not held out."""
+    table = measured.data.table
+    return train_model(table.take(~held_out_rows(table)), measured.data.rig, "analytical", name="textbook")
 
 
-def names_of(loaded: LoadedData) -> list[str]:
-    """Names of the drivers that are tried."""
-    return driver_names(loaded.table)
+def exact(measured: Measured) -> PushModel:
+    """The exact forward model with the textbook's parameters, on the known supports."""
+    model, rig = textbook(measured), measured.data.rig
+    supports = {number: supported_at(points) for number, points in measured.supports.items()}
+    mechanics = FittedMechanics(PushMechanics(rig.outline, rig.pusher_radius, supports=supports))
+    return replace(model, name="exact", predictor=predictor_about(mechanics, model.training))
 
 
-def climb(loaded: LoadedData, most_tries: int = MOST_TRIES) -> list[Step]:
-    """The steps that were tried, from the textbook model on, without the held-out pushes."""
-    table = loaded.table.take(~held_out_rows(loaded.table))
-    at_gate = held_out_rows(table)
-    rest, gate = table.take(~at_gate), table.take(at_gate)
-    model = train_model(rest, loaded.rig, "analytical", name="textbook")
-    tried, refused = [Step(model, None, 1.0)], set[Label]()
-    while len(tried) <= most_tries:
-        found = _suspect(model, rest, names_of(loaded), refused)
-        if found is None:
-            break
-        step = _judged(model, found, rest, gate)
-        if found.best.label not in refused:
-            tried.append(step)
-        if not step.refused:
-            model = step.model
-        else:
-            refused |= {found.best.label} if found.best.label not in refused else _all_by(found.best.covariate)
-    return tried
+BASES: dict[str, Callable[[Measured], PushModel]] = {"textbook": textbook, "exact": exact}
 
 
-def _suspect(model: PushModel, table: PushTable, names: Sequence[str], refused: Set[Label]) -> SelectedTerm | None:
-    """The candidate with the largest gain, constant or with a driver, except for refused ones."""
-    evidence, inputs = evidence_of(model, table), inputs_basis(model, table)
-    candidates = [_of_all_levels(c, table) for c in candidates_of(evidence, names, inputs) if c.label not in refused]
-    found: list[SelectedTerm] = []
-    for constant in (True, False):
-        chosen = [c for c in candidates if (c.basis.name == "constant") == constant]
-        if chosen:
-            found += search(evidence, chosen, inputs, ALPHA / 2.0, most_terms=1).terms
-    return max(found, key=lambda term: term.rivals[0].gain, default=None)
+def report(base: PushModel, data: LoadedData) -> None:
+    """Trace the residual, score the effects one after another on the held-out pushes, and print a row for each."""
+    begin = time.process_time()
+    found = trace(base, data)
+    table = found.held_out.table
+    searched, digest = len(found.analysis.pushes), found.held_out.digest[:12]
+    print(f"{searched} pushes searched, {len(table.pushes)} held out, sha256 {digest}")
+    print(f"trace: {time.process_time() - begin:.0f} CPU s\n\n{HEAD}")
+    scores = [push_scores(compared(model, table, base.training_mean)) for model in models_of(found)]
+    names = [base.name, *(f"+ {named(effect)}" for effect in found.terms)]
+    for before, after, name in zip([None, *scores], scores, names, strict=False):
+        print(_row(before, after, name), flush=True)
+    print()
+    for found_effect, effect in zip(found.effects, found.terms, strict=True):
+        print("\n  ".join([f"{named(effect)}, p {found_effect.p_value:.1g}", *parameters(effect)]))
 
 
-def _all_by(covariate: str) -> Set[Label]:
-    """Labels of all mechanisms with this driver; used when the generic response was refused twice."""
-    return {(None, covariate), *((mechanism.name, covariate) for mechanism in LIBRARY)}
+def models_of(found: Trace) -> list[PushModel]:
+    """The refit, and the models with one effect more each, all effects of a model estimated together."""
+    evidence, refit = evidence_of(found.model, found.analysis), refit_base(found.model, found.analysis)
+    candidates = [candidate(evidence, effect.mechanism, effect.covariate, effect.basis) for effect in found.terms]
+    return [refit, *(extend(refit, evidence, candidates[: k + 1]) for k in range(len(candidates)))]
 
 
-def _of_all_levels(candidate: Candidate, table: PushTable) -> Candidate:
-    """The candidate with one coefficient for every level; the textbook model has no reference level."""
-    if candidate.basis.name != "category":
-        return candidate
-    basis = replace(candidate.basis, levels=(NO_LEVEL, *candidate.basis.levels))
-    return replace(candidate, basis=basis, values=basis.values(table.covariates, len(table)))
-
-
-def _judged(model: PushModel, found: SelectedTerm, rest: PushTable, gate: PushTable) -> Step:
-    best = found.best
-    evidence = evidence_of(model, rest)
-    after = extend(model, evidence, [candidate(evidence, best.mechanism, best.covariate, best.basis)])
-    effect, (_, nlpd) = after.predictor.effects[-1], gain(model, after, gate)
-    refused = "" if nlpd.high < 0.0 else "no gain at the gate"
-    if not _plausible(effect, rest):
-        refused = "implausible parameter"
-    others = dict.fromkeys(_label(*rival.candidate.label) for rival in found.rivals)
-    others.pop(_label(*best.label), None)
-    return Step(after, effect, found.p_value, tuple(others), nlpd, refused)
-
-
-def _plausible(effect: Effect, table: PushTable) -> bool:
-    """Whether the parameters are plausible for a rig at all of these windows."""
-    if effect.mechanism is None:
-        return True
-    mechanism = mechanism_named(effect.mechanism)
-    values = effect.basis.values(table.covariates, len(table))
-    return mechanism.plausible(values @ effect.coefficients.reshape(len(mechanism.parameters), -1).T)
-
-
-def _row(before: Step, step: Step, held: PushTable, reference: Array) -> str:
-    sums = push_scores(compared(step.model, held, reference))
-    outputs = " ".join(f"{value:.3f}" for value in sums.totals().nmse[0])
-    errors = f"{by_push(sums, total_nmse).text('.3f')}, {outputs} | {by_push(sums, total_nlpd).text()}"
-    changes = [""] * 2 if step is before else [_interval(g) for g in gain(before.model, step.model, held, reference)]
-    return f"| {named(step)} | {errors} | {' | '.join(changes)} |"
-
-
-def _detail(step: Step) -> str:
-    assert step.effect is not None
-    assert step.at_gate is not None
-    fate = f"refused: {step.refused}" if step.refused else "accepted"
-    evidence = (
-        f"p {step.p_value:.4f}, NLPD at the gate {_interval(step.at_gate)}; rivals: {', '.join(step.rivals) or 'none'}"
-    )
-    return "\n  ".join([f"\n{named(step)}, {fate}; {evidence}", *parameters(step.effect)])
-
-
-def named(step: Step) -> str:
-    """The name of the step for a reader."""
-    if step.effect is None:
-        return "textbook"
-    return f"{_label(step.effect.mechanism, step.effect.covariate)} ({step.effect.basis.name})"
+def named(effect: Effect) -> str:
+    """The name of an effect for a reader."""
+    return f"{effect.mechanism or 'unknown'} by {effect.covariate} ({effect.basis.name})"
 
 
 def parameters(effect: Effect) -> list[str]:
@@ -231,12 +159,12 @@ def _column(effect: Effect, k: int) -> str:
     return f"column {k + 1} of {effect.basis.name}"
 
 
-def _label(mechanism: str | None, covariate: str) -> str:
-    return f"{mechanism or 'unknown'} by {covariate}"
-
-
-def _interval(gain: Gain) -> str:
-    return f"{gain.value:+.3f} ({gain.low:+.3f} to {gain.high:+.3f})"
+def _row(before: PushScores | None, after: PushScores, name: str) -> str:
+    outputs = " ".join(f"{value:.3f}" for value in after.totals().nmse[0])
+    cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
+    for figure in (total_nmse, total_nlpd):
+        cells.append("" if before is None else difference_by_push(before, after, figure).text("+.3f"))
+    return f"| {name} | {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import LIBRARY, Mechanism, Push
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism, Push
 from push_predictor.models.mechanisms.perturbed import displaced, no_change
 from push_predictor.recordings.table import PushTable
 from push_predictor.simulation.rig_simulator import SimulationSpec, push_outcomes, random_pushes
@@ -318,4 +318,5 @@ def test_the_worked_example_of_the_docs_is_a_mechanism() -> None:
 def test_the_docs_name_every_mechanism_with_its_limit() -> None:
     text = (REPOSITORY / "docs" / "reference" / "trace.md").read_text()
     rows = {row.split("|")[1].strip(" `"): row.split("|") for row in text.splitlines() if row.startswith("| `")}
-    assert [float(rows[m.name][3]) for m in LIBRARY] == [m.parameters[0].largest for m in LIBRARY]
+    every = (*LIBRARY, *REFINEMENTS)
+    assert [float(rows[m.name][3]) for m in every] == [m.parameters[0].largest for m in every]

@@ -16,7 +16,7 @@ from made_up_traces import DRIFT, EXPERIMENT, GRAIN, PLACE, made_up_trace, plant
 
 from push_predictor.evaluation.report.maps import Cells, PushMap
 from push_predictor.models.effects.driver_basis import DriverBasis
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
 from push_predictor.models.request import UNITS
 from push_predictor.residuals import outcome
 from push_predictor.residuals.channels.corrections import CORRECTIONS
@@ -180,7 +180,9 @@ def test_verdict_explains_a_candidate_below_alpha_that_is_not_significant(nothin
 
 
 def test_every_mechanism_and_covariate_has_a_phrase() -> None:
-    assert {mechanism.name for mechanism in LIBRARY} | set(CORRECTIONS) | {"surface_friction"} <= set(MECHANISMS)
+    assert {mechanism.name for mechanism in (*LIBRARY, *REFINEMENTS)} | set(CORRECTIONS) | {"surface_friction"} <= set(
+        MECHANISMS
+    )
     assert set(UNITS) <= set(COVARIATES)
     assert not any("_" in phrase for phrase in [*COVARIATES.values(), *(m.noun for m in MECHANISMS.values())])
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.mechanics.analytical import AnalyticalPush
-from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Push
 from push_predictor.models.mechanisms.mechanism import Mechanism
 from push_predictor.types import Array
 
@@ -19,10 +19,10 @@ GENERIC_TERMS = 6  # of the polynomial, for each output
 class Effect:
     """Shift of the mean: sum over parameters p and columns m of the basis, response_p x basis_m x coefficient_pm.
 
-    mechanism: a name of LIBRARY, or None for the generic one. coefficients (p * m,), p first; covariance of them
-    (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path). exact:
-    the sum over the columns changes parameters of the mechanics, and the shift is what that changes (see exact.py);
-    otherwise the shift is linear in the coefficients, as effects of older model files are.
+    mechanism: of LIBRARY or REFINEMENTS, or None for the generic one. coefficients (p * m,), p first; covariance of
+    them (p * m, p * m). outcome_scale (3,): unit of the generic responses (m, m, rad per metre of the tip's path).
+    exact: the sum over the columns changes parameters of the mechanics, and the shift is what that changes (see
+    exact.py); otherwise the shift is linear in the coefficients, as effects of older model files are.
     """
 
     mechanism: str | None
@@ -98,5 +98,5 @@ def generic_width() -> int:
 
 
 def mechanism_named(name: str) -> Mechanism:
-    """The mechanism of that name. Raises KeyError if the library has none."""
-    return {mechanism.name: mechanism for mechanism in LIBRARY}[name]
+    """The mechanism of that name. Raises KeyError if there is none."""
+    return {mechanism.name: mechanism for mechanism in (*LIBRARY, *REFINEMENTS)}[name]

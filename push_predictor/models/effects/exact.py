@@ -11,7 +11,7 @@ from push_predictor.models.effects.effect import Effect, mechanism_named, produc
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.parameters import BY_NAME
-from push_predictor.models.mechanisms import LIBRARY, Push
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Push
 from push_predictor.types import Array
 
 # Of a parameter's prior standard deviation: a shorter step of a derivative would show errors of the integration.
@@ -19,7 +19,7 @@ DIFFERENCE = 0.5
 
 LARGEST = {
     name: parameter.largest
-    for mechanism in LIBRARY
+    for mechanism in (*LIBRARY, *REFINEMENTS)
     if mechanism.quantities
     for name, parameter in zip(mechanism.quantities, mechanism.parameters, strict=True)
 }

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from push_predictor.models.mechanics.fit import JointFit, student_curvature, student_loss, student_weights
-from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.types import Array
 
 FOLDS = 10
@@ -25,7 +24,7 @@ class CrossValidation:
         pushes = fit.rows.pushes
         fold = np.random.default_rng(0).permutation(pushes) % min(FOLDS, pushes)
         self.fold = fold[fit.rows.push]
-        table = [BY_NAME[name] for name in fit.names]
+        table = fit.rows.named(fit.names)
         self._textbook = np.array([parameter.textbook for parameter in table])
         self._prior = np.array([parameter.spread for parameter in table]) ** -2.0
         self._values = np.array([fit.values[name] for name in fit.names])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 
-from push_predictor.models.mechanics.fit import FitRows, JointFit, fit_jointly, refit, with_candidates
+from push_predictor.models.mechanics.fit import Displacing, FitRows, JointFit, fit_jointly, refit, with_candidates
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation, held_out_scores
 from push_predictor.models.mechanics.parameters import PARAMETERS
@@ -22,6 +23,9 @@ LEAST_GAIN = 0.03  # nats per push and parameter: less is not worth it
 FEWEST_PUSHES = 3  # of a cross-validation
 CLEARLY = 1.0  # standard errors from push to push: the one standard error rule
 REFITTED = 3  # changes with the largest expected gains that are refitted before one is chosen
+
+
+Group: TypeAlias = tuple[str, ...]  # parameters that are added and dropped together
 
 
 @dataclass(frozen=True)
@@ -57,10 +61,26 @@ def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> l
     pair for a while. So where no single parameter helps, the step adds two, or takes one or two in place of one.
     Candidates are all parameters whose covariates the rows have, and that the support and the data can show.
     """
-    rungs = [Rung(fit_jointly(mechanics, rows, ()))]
+    return climb_from(
+        mechanics, fit_jointly(mechanics, rows, ()), [(name,) for name in candidates(mechanics, rows)], watch=watch
+    )
+
+
+def climb_from(
+    mechanics: Displacing,
+    start: JointFit,
+    groups: Sequence[Group],
+    accepts: Callable[[Rung], bool] = lambda rung: True,
+    watch: Watch = no_watch,
+) -> list[Rung]:
+    """The rungs of the ladder from a fit on; groups: of parameters, which can be added and dropped.
+
+    Parameters of the start that are in no group stay. accepts: a condition on rungs in addition to the rule.
+    """
+    rungs, rows = [Rung(start)], start.rows
     while len(rungs) <= MOST_STEPS and rows.pushes >= FEWEST_PUSHES:
         watch(f"fit mechanics: step {len(rungs)}", min(0.8, 0.08 * len(rungs)))
-        found = _next(mechanics, rungs[-1].fit)
+        found = _next(mechanics, rungs[-1].fit, groups, accepts)
         if found is None:
             break
         rungs.append(found)
@@ -69,7 +89,7 @@ def climb(mechanics: PushMechanics, rows: FitRows, watch: Watch = no_watch) -> l
 
 def candidates(mechanics: PushMechanics, rows: FitRows) -> list[str]:
     """Names of the parameters that these rows can show; the rim exponent is the one of the pressure's spread."""
-    on_patch = mechanics.support is None and not _all_known(mechanics, rows)
+    on_patch = mechanics.support is None and not all_supports_known(mechanics, rows.covariates)
     return [
         parameter.name
         for parameter in PARAMETERS
@@ -80,38 +100,42 @@ def candidates(mechanics: PushMechanics, rows: FitRows) -> list[str]:
     ]
 
 
-def _all_known(mechanics: PushMechanics, rows: FitRows) -> bool:
-    recording = rows.covariates.get("recording")
+def all_supports_known(mechanics: PushMechanics, covariates: Mapping[str, Array]) -> bool:
+    """Whether the mechanics know the supports of all recordings of these pushes."""
+    recording = covariates.get("recording")
     return recording is not None and set(np.unique(recording).tolist()) <= set(mechanics.supports)
 
 
-def _next(mechanics: PushMechanics, fit: JointFit) -> Rung | None:
+def _next(
+    mechanics: Displacing, fit: JointFit, groups: Sequence[Group], accepts: Callable[[Rung], bool]
+) -> Rung | None:
     """The next rung, None if no change of the free parameters helps."""
-    others = [name for name in candidates(mechanics, fit.rows) if name not in fit.names]
-    wide = with_candidates(mechanics, fit, others)
+    free = [group for group in groups if set(group) <= set(fit.names)]
+    others = [group for group in groups if group not in free]
+    most = MOST_PARAMETERS + len(set(fit.names) - {name for group in free for name in group})
+    wide = with_candidates(mechanics, fit, [name for group in others for name in group])
     known = CrossValidation(wide)
     now = known.scores(fit.names)
-    for changes in (_single(others), _exchanges(fit.names, others)):
+    for changes in (_single(others), _exchanges(free, others)):
         ranked = [Change(c.added, c.dropped, float((now - known.scores(_after(fit, c))).sum())) for c in changes]
         ranked = sorted((c for c in ranked if c.expected > _least(fit, c)), key=lambda c: -c.expected)
         rungs = [_taken(mechanics, fit, wide, change, ranked) for change in ranked[:REFITTED]]
-        if good := [rung for rung in rungs if worthwhile(fit, rung)]:
+        if good := [rung for rung in rungs if worthwhile(fit, rung, most) and accepts(rung)]:
             return max(good, key=lambda rung: rung.gain)
     return None
 
 
-def _single(others: list[str]) -> Iterator[Change]:
-    return (Change((name,)) for name in others)
+def _single(others: list[Group]) -> Iterator[Change]:
+    return (Change(group) for group in others)
 
 
-def _exchanges(free: tuple[str, ...], others: list[str]) -> Iterator[Change]:
-    """Pairs to add, parameters to drop, and one or two in place of one."""
-    pairs = list(combinations(others, 2))
+def _exchanges(free: list[Group], others: list[Group]) -> Iterator[Change]:
+    """Pairs to add, groups to drop, and one or two in place of one."""
+    pairs = [(*first, *second) for first, second in combinations(others, 2)]
     yield from (Change(pair) for pair in pairs)
-    for name in free:
-        yield Change((), (name,))
-        yield from (Change((other,), (name,)) for other in others)
-        yield from (Change(pair, (name,)) for pair in pairs)
+    for group in free:
+        yield Change((), group)
+        yield from (Change(other, group) for other in (*others, *pairs))
 
 
 def _after(fit: JointFit, change: Change) -> tuple[str, ...]:
@@ -121,11 +145,15 @@ def _after(fit: JointFit, change: Change) -> tuple[str, ...]:
 
 def _least(fit: JointFit, change: Change) -> float:
     """The smallest gain that is worth a change, nats."""
-    least = max(LEAST_EVIDENCE, LEAST_GAIN * fit.rows.pushes)
-    return least * max(len(change.added) - len(change.dropped), 0.5)
+    return least_gain(fit.rows.pushes) * max(len(change.added) - len(change.dropped), 0.5)
 
 
-def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
+def least_gain(pushes: int) -> float:
+    """The smallest gain that is worth another parameter, nats over all pushes."""
+    return max(LEAST_EVIDENCE, LEAST_GAIN * pushes)
+
+
+def _taken(mechanics: Displacing, fit: JointFit, wide: JointFit, change: Change, ranked: list[Change]) -> Rung:
     """The rung with a change, refitted."""
     after = refit(mechanics, wide, _after(fit, change))
     gain = held_out_scores(fit) - held_out_scores(after)
@@ -133,12 +161,15 @@ def _taken(mechanics: PushMechanics, fit: JointFit, wide: JointFit, change: Chan
     return Rung(after, change.added, change.dropped, float(gain.sum()), _error(gain), rivals)
 
 
-def worthwhile(fit: JointFit, rung: Rung) -> bool:
-    """Whether the gain of a rung after `fit` is large enough and, for more parameters, beyond its standard error."""
+def worthwhile(fit: JointFit, rung: Rung, most: int = MOST_PARAMETERS) -> bool:
+    """Whether the gain of a rung after `fit` is large enough and, for more parameters, beyond its standard error.
+
+    most: free parameters that a rung may have.
+    """
     more = len(rung.fit.names) > len(fit.names)
     least = _least(fit, Change(rung.added, rung.dropped))
     clear = CLEARLY * rung.error if more else 0.0
-    return len(rung.fit.names) <= MOST_PARAMETERS and rung.gain > max(least, clear)
+    return len(rung.fit.names) <= most and rung.gain > max(least, clear)
 
 
 def _error(gain: Array) -> float:

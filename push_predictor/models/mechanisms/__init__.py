@@ -19,6 +19,7 @@ from push_predictor.models.mechanisms.pressure_spread import PRESSURE_SPREAD
 from push_predictor.models.mechanisms.pusher_radius import PUSHER_RADIUS
 from push_predictor.models.mechanisms.pusher_travel import PUSHER_TRAVEL
 from push_predictor.models.mechanisms.pushing_height import PUSHING_HEIGHT
+from push_predictor.models.mechanisms.refinements import REFINEMENTS
 from push_predictor.models.mechanisms.tilted_surface import TILTED_SURFACE
 
 LIBRARY: tuple[Mechanism, ...] = (
@@ -37,4 +38,4 @@ LIBRARY: tuple[Mechanism, ...] = (
     PUSHER_TRAVEL,
 )
 
-__all__ = ["LIBRARY", "Mechanism", "Parameter", "Push"]
+__all__ = ["LIBRARY", "REFINEMENTS", "Mechanism", "Parameter", "Push"]

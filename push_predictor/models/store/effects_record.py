@@ -10,7 +10,7 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import BASES, DriverBasis, columns_of
 from push_predictor.models.effects.effect import Effect, generic_width, mechanism_named
-from push_predictor.models.mechanisms import LIBRARY
+from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS
 from push_predictor.models.predictors import Cross
 from push_predictor.types import Array
 
@@ -83,7 +83,7 @@ def _record(effect: Effect) -> dict[str, Any]:
 
 def _effect(record: dict[str, Any], covariance: Array) -> Effect:
     mechanism, basis = record["mechanism"], _basis(record["form"])
-    if mechanism is not None and mechanism not in [known.name for known in LIBRARY]:
+    if mechanism is not None and mechanism not in [known.name for known in (*LIBRARY, *REFINEMENTS)]:
         raise ValueError(f"mechanism {mechanism!r} is not in the library")
     width = generic_width() if mechanism is None else len(mechanism_named(mechanism).parameters)
     size = width * columns_of(basis)

@@ -36,13 +36,14 @@ def estimated_effects(
     evidence: Evidence,
     candidates: Sequence[Candidate],
     own_inputs: Array | None = None,
+    start: Array | None = None,
 ) -> tuple[tuple[Effect, ...], Cross]:
     """The effects of these candidates, and the covariances between their coefficients (see ExtendedPredictor).
 
-    own_inputs (n, m): controls to regress out of residuals and responses.
+    own_inputs (n, m): controls to regress out of residuals and responses. start: coefficients (p,) near the solution.
     """
     problem = _Problem.of(evidence, candidates, own_inputs)
-    found, n = problem.solved(), len(evidence.table)
+    found, n = problem.solved(start), len(evidence.table)
     covariance = _widened(
         _jackknife(found.columns, found.residual, evidence.block, found.ridge),
         _jackknife(found.columns, found.residual, _angles(evidence.table.inputs[:, 2]), found.ridge),
@@ -153,9 +154,10 @@ class _Problem:
         """Values (n, 3, ...) without the nuisance, and without what the inputs express."""
         return self.residualizer(projected(values, self.nuisance))
 
-    def solved(self) -> _Linearised:
-        """The problem about its solution."""
-        now = self.linearised(np.concatenate([effect.coefficients for effect in self.start]))
+    def solved(self, start: Array | None = None) -> _Linearised:
+        """The problem about its solution; start: coefficients (p,) to begin with, zero if None."""
+        zero = np.concatenate([effect.coefficients for effect in self.start])
+        now = self.linearised(zero if start is None else start)
         for _ in range(MOST_STEPS):
             square = np.einsum("nkp,nkq->pq", now.columns, now.columns) + np.diag(now.ridge)
             slope = np.einsum("nkp,nk->p", now.columns, now.residual) - now.ridge * now.coefficients

@@ -19,10 +19,11 @@ from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.experiment import Experiment, separating_pushes
-from push_predictor.residuals.selection.forward_selection import SearchResult, search
+from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
+from push_predictor.residuals.selection.further_steps import climbed
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm
+from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which a constant effect is more than extrapolation
@@ -80,6 +81,8 @@ def motion_effects(
     candidates = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
     found = replace(found, terms=needed_terms(found.terms, evidence))
+    if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
+        found = climbed(found, ForwardSelection(TermChoice(evidence, found.candidates, inputs, seed), share, baseline))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None

@@ -65,9 +65,14 @@ def fit(flat: Array, residual: Array, block: IntArray | None = None) -> Array:
 def judged_exactly(exact: ExactFit, z: Array, residualizer: Residualizer, block: IntArray) -> Judged:
     """An exact fit with its gain on residuals z (n, 3), a nat less for each of its coefficients."""
     before, after = residualizer(z), residualizer(z - exact.shift)
-    old, new = (np.mean(r**2, axis=0) for r in (before, after))
-    gains = sums_by(block, (_log_density(after, new) - _log_density(before, old))[:, None])[:, 0]
+    gains = log_gains(before, after, block)
     return Judged(exact.candidate, gains - exact.candidate.plain.shape[2] / len(gains), exact)
+
+
+def log_gains(before: Array, after: Array, block: IntArray) -> Array:
+    """Log density per block of residuals (n, 3) after minus before, each output with its own variance."""
+    old, new = (np.mean(r**2, axis=0) for r in (before, after))
+    return sums_by(block, (_log_density(after, new) - _log_density(before, old))[:, None])[:, 0]
 
 
 def gains_of(residual: Array, flat: Array, block: IntArray) -> Array:

@@ -1,4 +1,4 @@
-"""Forward selection: screen all candidates, select the best, subtract it, screen again; at most three terms."""
+"""Forward selection: screen all candidates, select the best, subtract it, screen again; three terms at most."""
 
 from __future__ import annotations
 
@@ -51,20 +51,23 @@ def search(
     *,
     baseline: Baseline | None = None,
     most_terms: int = MOST_TERMS,
+    terms: Sequence[SelectedTerm] = (),
+    unexplained: Array | None = None,
 ) -> SearchResult:
     """Search the residuals for terms; alpha is the probability of any term where there is no effect.
 
     inputs: the model's inputs, which are regressed out. baseline: cross-validated training residuals, against which
-    effects in a learnt base's own inputs are judged; without it they are judged against zero.
+    effects in a learnt base's own inputs are judged; without it they are judged against zero. terms: found
+    before, which leave `unexplained` (n, 3).
     """
     selection = ForwardSelection(TermChoice(evidence, tuple(candidates), inputs, seed), alpha, baseline)
-    z, first = evidence.z, None
-    terms: list[SelectedTerm] = []
+    z, first = evidence.z if unexplained is None else unexplained, None
+    terms, most = list(terms), most_terms + len(terms)
     while True:
         screened = selection.screened(z)
         first = first or screened
         found = [k for k in range(len(candidates)) if screened.p_value[k] <= alpha]
-        if not found or len(terms) == most_terms:
+        if not found or len(terms) == most:
             return SearchResult(tuple(terms), tuple(candidates), first, screened, z)
         found = selection.first_to_select(found, screened, z)
         used = {term.best.covariate for term in terms}

@@ -23,14 +23,14 @@ def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[Sel
     fitted = [term for term in terms if not term.own]
     while len(fitted) > 1:
         effects, _ = estimated_effects(evidence, [term.best for term in fitted])
-        p_values = [_p_of_zero(effect.coefficients, effect.covariance) for effect in effects]
+        p_values = [p_of_zero(effect.coefficients, effect.covariance) for effect in effects]
         if max(p_values) <= NOT_ZERO:
             break
         del fitted[int(np.argmax(p_values))]
     return tuple(term for term in terms if term.own or any(term is kept for kept in fitted))
 
 
-def _p_of_zero(coefficients: Array, covariance: Array) -> float:
+def p_of_zero(coefficients: Array, covariance: Array) -> float:
     """Probability of coefficients (p,) at least as far from zero, if the effect were zero."""
     square = float(coefficients @ np.linalg.pinv(covariance, hermitian=True) @ coefficients)
     return float(chdtrc(len(coefficients), square))
