@@ -25,7 +25,7 @@ SLOW = ("inertia", "pushing_height")  # with them the forward model takes much l
 
 
 class Displacing(Protocol):
-    """What a fit needs of mechanics: Displacing, or changes of mechanics that a model has already."""
+    """What a fit needs of mechanics: PushMechanics, or changes of the mechanics that a model has."""
 
     def displacement(
         self, values: ParameterValues, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None = None
