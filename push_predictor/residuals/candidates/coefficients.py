@@ -27,6 +27,7 @@ from push_predictor.types import Array, IntArray
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
 ANGLES = 8  # groups of push angles
+SINGULAR = 1e-12  # of the largest variance; less is rounding
 LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
 ENOUGH = 0.2  # nats: a step that gains less is the last
@@ -240,9 +241,14 @@ def _angles(angle: Array) -> IntArray:
 
 
 def _widened(covariance: Array, other: Array) -> Array:
-    """A covariance (p, p) with its standard deviations raised to at least those of another."""
-    factor = np.sqrt(np.maximum(1.0, np.diag(other) / np.maximum(np.diag(covariance), np.finfo(float).tiny)))
-    return np.asarray(covariance * np.outer(factor, factor))
+    """A covariance (p, p) raised to another in every direction in which that one is larger."""
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > SINGULAR * max(values[-1], np.finfo(float).tiny)
+    root = vectors[:, kept] * np.sqrt(values[kept])
+    unit = vectors[:, kept] / np.sqrt(values[kept])
+    ratio, turn = np.linalg.eigh(unit.T @ other @ unit)
+    axes = root @ turn
+    return np.asarray(covariance + (axes * np.maximum(ratio - 1.0, 0.0)) @ axes.T)
 
 
 def _jackknife(columns: Array, residual: Array, block: IntArray, ridge: Array) -> Array:
