@@ -276,6 +276,18 @@ class TestBasis:
         assert not term.own and term.share > 0.5
 
     @pytest.mark.slow
+    def test_onset_of_an_effect_that_is_fixed_to_the_world_is_found(self) -> None:
+        """A slope that is there from the 25th of 200 pushes on looks constant, too."""
+        plain = pushes(200, 302)
+        late, size = DriverBasis("step", ("elapsed_time",), place=250.0), np.array([0.2, -0.1])
+        effect = Effect("tilted_surface", "elapsed_time", late, size, np.zeros((2, 2)), np.ones(3), True)
+        push = Push(plain.inputs, plain.duration, plain.covariates)
+        table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
+        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        (term,) = searched(base, table).terms
+        assert (term.best.label, term.best.basis.name) == (("tilted_surface", "elapsed_time"), "step")
+
+    @pytest.mark.slow
     def test_linear_dependence_stays_linear(self, learnt) -> None:
         plain = pushes(200, 301)
         table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)

@@ -14,7 +14,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.candidates.coefficients import exact_fit
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, OF_SESSION
+from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -159,7 +159,7 @@ class TermChoice:
         Where a base absorbs no constant effect, the constant and the changing part of an effect are found apart.
         """
         first = judged[0].candidate
-        if self.inputs.absorbs or first.covariate not in (CONSTANT, *OF_SESSION):
+        if self.inputs.absorbs or not (first.basis.name == "constant" or first.covariate in OF_SESSION):
             return judged
         constant = self._constants(judged)
         if not constant:
@@ -171,11 +171,11 @@ class TermChoice:
     def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
         """The constant effects found, if one comes first; else that of the first one's mechanism."""
         first = judged[0].candidate
-        if first.covariate == CONSTANT:
-            return [j for j in judged if j.candidate.covariate == CONSTANT and j.candidate.mechanism is not None]
-        nothing = np.zeros(1)
-        same = [c for c in self.candidates if c.label == (first.mechanism, CONSTANT) and c.mechanism is not None]
-        return [Judged(c, nothing) for c in same]
+        known = [j for j in judged if j.candidate.mechanism is not None and j.candidate.basis.name == "constant"]
+        if first.basis.name == "constant":
+            return known
+        same = [c for c in self.candidates if c.mechanism == first.mechanism and c.basis.name == "constant"]
+        return [Judged(c, np.zeros(1)) for c in same if c.mechanism is not None]
 
     def _onsets(self, mechanism: str, z: Array) -> list[Judged]:
         """The whole effect of a mechanism by its onset along each covariate, the best fitted exactly, by gain."""
