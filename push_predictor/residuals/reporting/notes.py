@@ -81,7 +81,7 @@ def _of_other_channels(motion: MotionFinding, measured: MeasurementFinding | Non
             f"{size.value:+.2g} N along {axis}" for size, axis in zip(forces.zero.parameters, "xy", strict=True)
         )
         notes.append(
-            f"The reading of the force sensor in free motion changed by {change}. The windows do not contain it."
+            f"The reading of the force sensor in free motion changed by {change}. It was subtracted from the windows."
         )
     if motion.variance and forces.effects and not motion.terms:
         covariates = listed([covariate_phrase(effect.covariate) for effect in motion.variance])

@@ -45,7 +45,7 @@ UNNAMED = (
 )
 EXPERIMENT = (
     "Make the pushes below in this order, with the covariates set as the table shows. There the predictions of the "
-    "rivals differ most. Each push is in these data, at other values of the covariates. Elapsed time, push count and "
+    "rivals differ most. Each repeats a recorded push at other values of the covariates. Elapsed time, push count and "
     "distance slid only grow: rest, or push, until they reach the first row. Then trace again: add --and and the new "
     "recording to the command."
 )

@@ -148,7 +148,7 @@ def _proposed(session: PushTable, rows: IntArray, pairs: Sequence[_Pair]) -> tup
     pushes: list[Mapping[str, float]] = []
     for k in range(min(PUSHES, len(rows))):
         pair, turn = pairs[k % len(pairs)], k // len(pairs)
-        setting = _telling(pair)[turn % len(_telling(pair))]
+        setting = _separating(pair)[turn % len(_separating(pair))]
         row = int(np.argmax(pair.difference[setting] * _novelty(inputs, taken)))
         taken = np.append(taken, row)
         push = dict(zip(INPUTS, inputs[row].tolist(), strict=True))
@@ -158,7 +158,7 @@ def _proposed(session: PushTable, rows: IntArray, pairs: Sequence[_Pair]) -> tup
     return tuple(pushes)
 
 
-def _telling(pair: _Pair) -> list[int]:
+def _separating(pair: _Pair) -> list[int]:
     """The settings at which the rivals differ at least half as much as at the best."""
     best = pair.difference.max(axis=1)
     return [int(k) for k in np.flatnonzero(best >= 0.5 * best.max())]

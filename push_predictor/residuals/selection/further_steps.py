@@ -98,7 +98,7 @@ def further_steps(terms: Sequence[SelectedTerm], selection: ForwardSelection) ->
     """The terms with constant ones added, dropped and replaced; None if there is nothing to change.
 
     Effects along covariates stay. An unknown constant effect goes if the steps explain it; otherwise nothing changes.
-    What a step adds must surely differ from zero once all are fitted together.
+    What a step adds must differ significantly from zero in the joint fit of all.
     """
     evidence, seed = selection.choice.evidence, selection.choice.seed
     driven = [term for term in terms if not _is_constant(term.best)]
@@ -231,7 +231,7 @@ class _Step:
             start = [effect.coefficients for k, effect in enumerate(effects) if k != len(fixed) + worst]
 
     def replaces(self, chosen: Sequence[Candidate], fitted: _Fitted) -> bool:
-        """Whether the changes can stand for those before: some remain, and no new one failed that replaced a known."""
+        """Whether the changes can replace those before: some remain, and none failed that replaced a known one."""
         dropped = set(self.now) - {None} - {c.mechanism for c in chosen}
         failed = {c.mechanism for c in chosen} - {c.mechanism for c in fitted.constants} - set(self.now)
         return bool(fitted.effects) and not (dropped and failed)
