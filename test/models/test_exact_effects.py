@@ -231,7 +231,7 @@ def deployed() -> PushModel:
 
 def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis) -> Effect:
     evidence = evidence_of(deployed, table, physics())
-    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)])[0][0]
+    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)], by_angle=True)[0][0]
 
 
 def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:

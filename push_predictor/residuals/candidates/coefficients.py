@@ -3,8 +3,8 @@
 What a learnt base could express in its own inputs is regressed out of residuals and responses first (Frisch and Waugh
 1933). Effects that change parameters of the mechanics are exact, found by steps of Gauss and Newton. The covariance is
 a jackknife over blocks of pushes: it covers disturbances that neighbouring pushes share, and coefficients that depend
-on a few pushes. No mechanics is exact: where pushes of different angles disagree about a coefficient by more, its
-interval is widened to that of a jackknife over angles.
+on a few pushes. No mechanics is exact: where pushes of different angles disagree about a coefficient by more, the
+interval of its size is widened to that of a jackknife over angles.
 """
 
 from __future__ import annotations
@@ -38,17 +38,21 @@ def estimated_effects(
     candidates: Sequence[Candidate],
     own_inputs: Array | None = None,
     start: Array | None = None,
+    *,
+    by_angle: bool = False,
 ) -> tuple[tuple[Effect, ...], Cross]:
     """The effects of these candidates, and the covariances between their coefficients (see ExtendedPredictor).
 
     own_inputs (n, m): controls to regress out of residuals and responses. start: coefficients (p,) near the solution.
+    by_angle: whether the covariance is for a size and not for a test against chance. It then also covers errors of the
+    mechanics, as far as pushes of different angles disagree.
     """
     problem = _Problem.of(evidence, candidates, own_inputs)
     found, n = problem.solved(start), len(evidence.table)
-    covariance = _widened(
-        _jackknife(found.columns, found.residual, evidence.block, found.ridge),
-        _jackknife(found.columns, found.residual, _angles(evidence.table.inputs[:, 2]), found.ridge),
-    )
+    covariance = _jackknife(found.columns, found.residual, evidence.block, found.ridge)
+    if by_angle:
+        groups = _angles(evidence.table.inputs[:, 2])
+        covariance = _widened(covariance, _jackknife(found.columns, found.residual, groups, found.ridge))
     covariance *= n / max(n - problem.residualizer.q.shape[1], 1)
     effects = tuple(
         replace(effect, covariance=covariance[part, part])
