@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -78,8 +79,8 @@ def made_up_set(pushes: int = 40) -> PushSet:
     return PushSet(PushTable(inputs, np.full(len(inputs), 0.2), scattered, ids(pushes)), rig())
 
 
-def corpus(origin: str = "simulated", pushes: int = 40) -> Corpus:
-    return Corpus(origin, f"{origin}: made up", {PAIR: made_up_set(pushes)}, PAIR)  # type: ignore[arg-type]  # text
+def corpus(origin: Literal["simulated", "measured"] = "simulated", pushes: int = 40) -> Corpus:
+    return Corpus(origin, f"{origin}: made up", {PAIR: made_up_set(pushes)}, PAIR)
 
 
 # ---- shares and histograms

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ PAIR = ("rect1", "plywood")
 NUGGET, MATERN = OTHERS[0], OTHERS[1]
 
 
-def corpus(pushes: int = 60, origin: str = "simulated") -> Corpus:
+def corpus(pushes: int = 60, origin: Literal["simulated", "measured"] = "simulated") -> Corpus:
     """A smooth law with a scatter that grows with the angle; four windows a push."""
     rng = np.random.default_rng(0)
     rows = 4 * pushes
@@ -44,7 +45,7 @@ def corpus(pushes: int = 60, origin: str = "simulated") -> Corpus:
     scatter = (0.1 + np.abs(inputs[:, 2:])) * rng.standard_normal((rows, 3)) * (2e-3, 2e-3, 0.05)
     table = PushTable(inputs, np.full(rows, 0.2), moved + scatter, np.repeat([f"push{k}" for k in range(pushes)], 4))
     rig = Rig("rect1", shape_outline("rect1"), 0.00475, "plywood", 0.837)
-    return Corpus(origin, f"{origin}: made up", {PAIR: PushSet(table, rig)}, PAIR)  # type: ignore[arg-type]  # text
+    return Corpus(origin, f"{origin}: made up", {PAIR: PushSet(table, rig)}, PAIR)
 
 
 def scored(nlpd: float, nmse: float = 0.2, pushes: int = 50, noise: float = 0.02) -> PushScores:

@@ -29,7 +29,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.reporting.chart import Dots
 from push_predictor.residuals import outcome
 from push_predictor.residuals.evidence.input_shift import ShiftedInput
-from push_predictor.residuals.outcome import Gain, Sized, Trace
+from push_predictor.residuals.outcome import Gain, Sized, Trace, Verdict
 from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.figures.driver_basis import basis_charts, determined
 from push_predictor.residuals.reporting.figures.errors import error_charts
@@ -51,9 +51,9 @@ SIDES = DriverBasis("category", ("edge",), levels=(0.0, 1.0, 2.0, 3.0))
 UNKNOWN = [0.0] * 8 + [0.018] + [0.0] * 5 + [0.6] + [0.0] * 3  # dy and dtheta over the angle
 
 
-def shifted(trace: Trace, verdict: str = "input_shift") -> Trace:
+def shifted(trace: Trace, verdict: Verdict = "input_shift") -> Trace:
     """A copy of a trace whose pushes were faster than those of training."""
-    return replace(trace, verdict=verdict, input_shift=(FASTER,))  # type: ignore[arg-type]
+    return replace(trace, verdict=verdict, input_shift=(FASTER,))
 
 
 TRACES: dict[str, Callable[[], Trace]] = {
