@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -46,6 +46,12 @@ def compare(model: PushModel, table: PushTable) -> Comparison:
 
 def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
     """Combine given predictions (n, 3), (n, 3, 3), for instance from a service, with a table's outcomes."""
+    moments = comparison_of_moments(model, table, mean, covariance)
+    return replace(moments, exact_log_density=model.exact_log_density(table))
+
+
+def comparison_of_moments(model: PushModel, table: PushTable, mean: Array, covariance: Array) -> Comparison:
+    """The same without the exact density, which takes most of the time."""
     return Comparison(
         model.name,
         len(model.training),
@@ -53,7 +59,7 @@ def comparison_of(model: PushModel, table: PushTable, mean: Array, covariance: A
         mean,
         covariance,
         table.outcomes,
-        model.exact_log_density(table),
+        None,
         model.training_mean,
     )
 

@@ -15,11 +15,11 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.residuals.channels.contrast import MAD_TO_SD
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, OF_SESSION, screening_bases
+from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, screening_bases
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence
-from push_predictor.residuals.selection.baseline import Baseline, difference
+from push_predictor.residuals.selection.baseline import Baseline, difference, raised
 from push_predictor.residuals.selection.power import QUANTILE
 from push_predictor.residuals.selection.screening import (
     Controlled,
@@ -153,28 +153,28 @@ def _tested(
         return _finding(trials, screened, alpha)
     detectable = _detectable(screened.threshold(alpha), evidence, z, baseline)
     if baseline.inputs.learnt:
-        before = _Squares.of(model, baseline.evidence, baseline.evidence.z)
-        screened = _against_training(trials, screened, alpha, squares, before, seed)
+        screened = _against_training(model, trials, screened, alpha, squares, baseline, seed)
     return replace(_finding(trials, screened, alpha), detectable=detectable)
 
 
 def _against_training(
-    trials: Sequence[_Trial], screened: Screened, alpha: float, new: _Squares, before: _Squares, seed: int
+    model: PushModel,
+    trials: Sequence[_Trial],
+    screened: Screened,
+    alpha: float,
+    new: _Squares,
+    baseline: Baseline,
+    seed: int,
 ) -> Screened:
-    """Raise p of what is found along covariates of training to that of the difference from training, all at once."""
-    known = set(before.table.covariates) - {*OF_SESSION}
-    found = [
-        k
-        for k, t in enumerate(trials)
-        if screened.p_value[k] <= alpha and t.basis.drivers and known.issuperset(t.basis.drivers)
-    ]
-    if not found:
+    """Raise p of what is found along covariates of training to that of the difference from training."""
+    found = [k for k, t in enumerate(trials) if screened.p_value[k] <= alpha and t.basis.drivers]
+    compared = [k for k in found if baseline.comparable(trials[k].basis)]
+    if not compared:
         return screened
-    every = [(trials[k].basis, dict(_outputs())[trials[k].output]) for k in found]
-    changes = [difference(new.raw_scores(*each), before.raw_scores(*each)) for each in every]
-    p_value = screened.p_value.copy()
-    p_value[found] = np.maximum(p_value[found], screen(changes, seed).p_value)
-    return replace(screened, p_value=p_value)
+    before, outputs = _Squares.of(model, baseline.evidence, baseline.evidence.z), dict(_outputs())
+    every = {k: (trials[k].basis, outputs[trials[k].output]) for k in compared}
+    changes = {k: difference(new.raw_scores(*each), before.raw_scores(*each)) for k, each in every.items()}
+    return raised(screened, changes, seed)
 
 
 def _detectable(threshold: float, evidence: Evidence, z: Array, baseline: Baseline) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from push_predictor.evaluation.estimate import Figure, difference_by_push, total_nlpd, total_nmse
 from push_predictor.evaluation.push_scores import push_scores
-from push_predictor.evaluation.validation import Comparison, compare
+from push_predictor.evaluation.validation import Comparison, compare, comparison_of_moments
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.extension.recalibration import (
@@ -72,18 +72,9 @@ def compared(model: PushModel, table: PushTable, training_mean: Array) -> Compar
 
 
 def _moments_compared(model: PushModel, table: PushTable, training_mean: Array) -> Comparison:
-    """The same without the exact density, which takes most of the time and which no gain needs."""
+    """The same without the exact density, which no gain needs."""
     seen = new_windows(model, table)
-    return Comparison(
-        model.name,
-        len(model.training),
-        table.push_id,
-        seen.mean,
-        seen.covariance,
-        table.outcomes,
-        None,
-        training_mean,
-    )
+    return replace(comparison_of_moments(model, table, seen.mean, seen.covariance), training_mean=training_mean)
 
 
 def _difference(first: Comparison, second: Comparison, figure: Figure) -> Gain:

@@ -7,12 +7,14 @@ is true of covariates that share the tracker's noise with the residual.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import get_args
 
 import numpy as np
 
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.effects.exact import Mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
@@ -24,7 +26,7 @@ from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.loading import previous_residual, with_inputs
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
-from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, raw_scores
+from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, Screened, raw_scores, screen
 from push_predictor.types import Array
 
 
@@ -42,7 +44,7 @@ class Baseline:
 
     def judges(self, candidate: Candidate) -> bool:
         """Whether a candidate is always judged against training: it lies in the base's inputs or is local to a push."""
-        if any(name not in self.evidence.table.covariates for name in candidate.basis.drivers):
+        if not self._records(candidate.basis):
             return False
         own = candidate.kind == "constant" or (candidate.kind == "speed" and self.inputs.knows_speed)
         return (own and self.inputs.learnt) or candidate.covariate in LOCAL
@@ -50,11 +52,19 @@ class Baseline:
     def compares(self, candidate: Candidate) -> bool:
         """Whether a candidate may have acted in training too, because its covariate has a value there.
 
-        A learnt base that folds sides or does not take the position as input lacks such an effect from the start. What
-        is counted from the start of a session has another meaning in each.
+        A learnt base that folds sides or does not take the position as input lacks such an effect from the start.
         """
-        recorded = all(name in self.evidence.table.covariates for name in candidate.basis.drivers)
-        return self.inputs.learnt and recorded and candidate.covariate not in OF_SESSION and not self.judges(candidate)
+        return self.inputs.learnt and self.comparable(candidate.basis) and not self.judges(candidate)
+
+    def comparable(self, basis: DriverBasis) -> bool:
+        """Whether the covariates of a basis were recorded in training, and mean the same there.
+
+        What is counted from the start of a session has another meaning in each.
+        """
+        return self._records(basis) and not set(basis.drivers) & set(OF_SESSION)
+
+    def _records(self, basis: DriverBasis) -> bool:
+        return all(name in self.evidence.table.covariates for name in basis.drivers)
 
     def scores(self, candidate: Candidate) -> tuple[Scores, Array]:
         """Block scores and information of a candidate on the training windows."""
@@ -108,6 +118,15 @@ def baseline_of(model: PushModel, mechanics: Mechanics) -> Baseline:
     before = {"previous_residual": previous_residual(table, evidence.z)}
     evidence = replace(evidence, table=replace(table, covariates={**table.covariates, **before}))
     return Baseline(evidence, inputs_basis(model, table))
+
+
+def raised(screened: Screened, changes: Mapping[int, Scores], seed: int) -> Screened:
+    """Raise p of some candidates, by number, to that of their difference from training, judged all at once."""
+    if not changes:
+        return screened
+    numbers, p_value = list(changes), screened.p_value.copy()
+    p_value[numbers] = np.maximum(p_value[numbers], screen(list(changes.values()), seed).p_value)
+    return replace(screened, p_value=p_value)
 
 
 def difference(new: tuple[Scores, Array], training: tuple[Scores, Array]) -> Scores:

@@ -13,7 +13,7 @@ from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis
 from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.standardised import FEWEST_BLOCKS, Evidence
-from push_predictor.residuals.selection.baseline import Baseline, difference
+from push_predictor.residuals.selection.baseline import Baseline, difference, raised
 from push_predictor.residuals.selection.cross_validation import fit
 from push_predictor.residuals.selection.screening import Scores, Screened, raw_scores, screen, unit_scores
 from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
@@ -169,12 +169,9 @@ class ForwardSelection:
         if baseline is None:
             return screened
         found = [k for k, c in enumerate(candidates) if screened.p_value[k] <= self.alpha and baseline.compares(c)]
-        if not found:
-            return screened
-        changes = [difference(self._raw(candidates[k], blocks[k]), baseline.scores(candidates[k])) for k in found]
-        p_value = screened.p_value.copy()
-        p_value[found] = np.maximum(p_value[found], screen(changes, self.choice.seed).p_value)
-        return replace(screened, p_value=p_value, unchanged=tuple(k for k in found if p_value[k] > self.alpha))
+        changes = {k: difference(self._raw(candidates[k], blocks[k]), baseline.scores(candidates[k])) for k in found}
+        compared = raised(screened, changes, self.choice.seed)
+        return replace(compared, unchanged=tuple(k for k in found if compared.p_value[k] > self.alpha))
 
     def _scores(self, candidate: Candidate, blocks: ResidualBlocks) -> Scores:
         """Scores of these blocks, then of those in training (zero if the candidate is not judged against it)."""
