@@ -28,6 +28,11 @@ class DriverBasis:
     place: float = 0.0
     levels: tuple[float, ...] = ()
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether the effect is the same at every value of its covariate."""
+        return self.name == "constant"
+
     def values(self, covariates: Mapping[str, Array], n: int) -> Array:
         """The columns (n, m) of the basis at n pushes; a constant is one column of ones."""
         columns = [np.asarray(covariates[name], dtype=np.float64) for name in self.drivers]

@@ -40,7 +40,7 @@ class Nuisance:
 
     def of_change(self, mechanism: str | None, covariate: str, basis: DriverBasis, kind: Kind) -> Array | None:
         """Orthonormal columns (3 n, q) for a candidate that changes an effect which may exist anyway; None if none."""
-        return self._nuisance(mechanism if basis.name == "constant" else None, covariate, kind)
+        return self._nuisance(mechanism if basis.is_constant else None, covariate, kind)
 
     def of_growth(self, mechanism: str | None, covariate: str, kind: Kind) -> Array | None:
         """The same for an effect that starts at zero: the constant effect of its own mechanism stays in."""

@@ -88,7 +88,7 @@ class ParameterChanges:
         fitted, found = self.evidence.mechanics.fitted, dict[str, MechanicsParameter]()
         for key, (c, quantity, _) in self.columns.items():
             known, value = BY_NAME[quantity], fitted.value(quantity)
-            if c.basis.name == "constant":
+            if c.basis.is_constant:
                 found[key] = replace(known, name=key, textbook=0.0, low=known.low - value, high=known.high - value)
             else:
                 found[key] = _of_size(key, max(value - known.low, known.high - value))
@@ -97,7 +97,7 @@ class ParameterChanges:
 
 def _key(c: Candidate, quantity: str, number: int, parameter: int, column: int) -> str:
     """A name for a coefficient of candidate `number`: that of the quantity itself if it is constant."""
-    if c.basis.name == "constant" and mechanism_named(str(c.mechanism)).quantities:
+    if c.basis.is_constant and mechanism_named(str(c.mechanism)).quantities:
         return quantity
     return f"{quantity} {number} {parameter} {column}"
 

@@ -112,7 +112,7 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
 
 def _separable(candidate: Candidate, inside: float) -> bool:
     """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
-    if candidate.basis.name != "constant" or inside == 1.0:
+    if not candidate.basis.is_constant or inside == 1.0:
         return True
     return inside >= MOSTLY and candidate.mechanism is not None
 

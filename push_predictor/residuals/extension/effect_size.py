@@ -35,14 +35,14 @@ def _name(effect: Effect) -> str:
     parameters = mechanism_named(str(effect.mechanism)).parameters
     many = f"{str(effect.mechanism).replace('_', ' ')}, length of its vector"
     name = parameters[0].name if len(parameters) == 1 else many
-    return name if effect.basis.name == "constant" else f"{name}, change over {effect.covariate}"
+    return name if effect.basis.is_constant else f"{name}, change over {effect.covariate}"
 
 
 def _change(effect: Effect, table: PushTable) -> Array:
     """Difference (m,) of the basis between the two ends that are compared."""
     basis = effect.basis
     values = basis.values(table.covariates, len(table))
-    if basis.name == "constant":
+    if basis.is_constant:
         return np.ones(1)
     if basis.name in ("linear", "logarithmic", "quadratic", "step"):
         driver = np.asarray(table.covariates[basis.drivers[0]])

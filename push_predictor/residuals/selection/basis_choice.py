@@ -63,7 +63,7 @@ def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray
 def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:
     """The bases in which a candidate's covariate may enter."""
     name, basis = candidate.covariate, candidate.basis
-    if basis.name == "constant" or name in CATEGORIES:
+    if basis.is_constant or name in CATEGORIES:
         return [basis]
     if name in HEADINGS:
         return [DriverBasis("periodic", (name,)), DriverBasis("periodic, twice around", (name,))]

@@ -50,7 +50,6 @@ def search(
     seed: int = 0,
     *,
     baseline: Baseline | None = None,
-    most_terms: int = MOST_TERMS,
     terms: Sequence[SelectedTerm] = (),
     unexplained: Array | None = None,
 ) -> SearchResult:
@@ -62,7 +61,7 @@ def search(
     """
     selection = ForwardSelection(TermChoice(evidence, tuple(candidates), inputs, seed), alpha, baseline)
     z, first = evidence.z if unexplained is None else unexplained, None
-    terms, most = list(terms), most_terms + len(terms)
+    terms, most = list(terms), MOST_TERMS + len(terms)
     while True:
         screened = selection.screened(z)
         first = first or screened

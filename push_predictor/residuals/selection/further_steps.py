@@ -87,7 +87,7 @@ def climbed(found: SearchResult, selection: ForwardSelection) -> SearchResult:
 
 def worthwhile(term: SelectedTerm, evidence: Evidence) -> bool:
     """Whether a term of the search gains as much as the ladder asks of a step; an unknown constant effect does not."""
-    if term.best.mechanism is None and _is_constant(term.best):
+    if term.best.mechanism is None and term.best.basis.is_constant:
         return False
     best, pushes = term.rivals[0], len(evidence.table.pushes)
     least = least_gain(pushes) * best.candidate.plain.shape[2]
@@ -101,11 +101,11 @@ def further_steps(terms: Sequence[SelectedTerm], selection: ForwardSelection) ->
     What a step adds must differ significantly from zero in the joint fit of all.
     """
     evidence, seed = selection.choice.evidence, selection.choice.seed
-    driven = [term for term in terms if not _is_constant(term.best)]
+    driven = [term for term in terms if not term.best.basis.is_constant]
     if not terms or len(evidence.table.pushes) < FEWEST_PUSHES or any(term.best.mechanism is None for term in driven):
         return None
     tried = _constants(evidence)
-    now = {term.best.mechanism: term for term in terms if _is_constant(term.best)}
+    now = {term.best.mechanism: term for term in terms if term.best.basis.is_constant}
     began = [c for c in tried if c.mechanism in now]
     chosen, near = _climbed(evidence, [term.best for term in driven], tried, began, seed)
     step = _Step(selection, driven, now, len(tried))
@@ -113,10 +113,6 @@ def further_steps(terms: Sequence[SelectedTerm], selection: ForwardSelection) ->
     if not step.replaces(chosen, fitted) or {c.mechanism for c in fitted.constants} == set(now):
         return None
     return step.terms(fitted) if None not in now or step.explains(fitted, now[None].best) else None
-
-
-def _is_constant(c: Candidate) -> bool:
-    return c.basis.name == "constant"
 
 
 def _constants(evidence: Evidence) -> list[Candidate]:

@@ -70,7 +70,7 @@ def detectable_json(sizes: list[Detectable]) -> dict[str, Mapping[str, object]]:
 
 
 def _is_reported(candidate: Candidate, strongest: str | None) -> bool:
-    constant = candidate.basis.name == "constant" and candidate.covariate in (CONSTANT, HEADED, SIDES)
+    constant = candidate.basis.is_constant and candidate.covariate in (CONSTANT, HEADED, SIDES)
     return constant or (candidate.covariate == strongest and candidate.basis.name == "linear")
 
 

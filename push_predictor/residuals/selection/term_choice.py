@@ -135,13 +135,13 @@ class TermChoice:
     def _growing(self, found: Sequence[int]) -> set[str]:
         """Mechanisms found both constant, though no base can have the effect, and changing with a covariate."""
         labels = [(self.candidates[k].mechanism, self.candidates[k]) for k in found]
-        constant = {name for name, c in labels if name is not None and _is_constant(c)}
+        constant = {name for name, c in labels if name is not None and _constant_outside_inputs(c)}
         return constant & {name for name, c in labels if name is not None and c.covariate not in NOT_GROWING}
 
     def _not_constant(self, found: Sequence[int]) -> list[int]:
         """Without the constant effects of growing mechanisms: they are part of the growing effect."""
         growing = self._growing(found)
-        return [k for k in found if not (_is_constant(c := self.candidates[k]) and c.mechanism in growing)]
+        return [k for k in found if not (_constant_outside_inputs(c := self.candidates[k]) and c.mechanism in growing)]
 
     def _case(self, judged: Judged, z: Array) -> Case:
         return Case(z, controls_for(judged.candidate.kind, self.inputs), self.evidence.block)
@@ -159,7 +159,7 @@ class TermChoice:
         Where a base absorbs no constant effect, the constant and the changing part of an effect are found apart.
         """
         first = judged[0].candidate
-        if self.inputs.absorbs or not (first.basis.name == "constant" or first.covariate in OF_SESSION):
+        if self.inputs.absorbs or not (first.basis.is_constant or first.covariate in OF_SESSION):
             return judged
         constant = self._constants(judged)
         if not constant:
@@ -171,10 +171,10 @@ class TermChoice:
     def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
         """The constant effects found, if one comes first; else that of the first one's mechanism."""
         first = judged[0].candidate
-        known = [j for j in judged if j.candidate.mechanism is not None and j.candidate.basis.name == "constant"]
-        if first.basis.name == "constant":
+        known = [j for j in judged if j.candidate.mechanism is not None and j.candidate.basis.is_constant]
+        if first.basis.is_constant:
             return known
-        same = [c for c in self.candidates if c.mechanism == first.mechanism and c.basis.name == "constant"]
+        same = [c for c in self.candidates if c.mechanism == first.mechanism and c.basis.is_constant]
         return [Judged(c, np.zeros(1)) for c in same if c.mechanism is not None]
 
     def _onsets(self, mechanism: str, z: Array) -> list[Judged]:
@@ -278,13 +278,13 @@ class TermChoice:
         return SelectedTerm(chosen, (best, *others), p_value, coefficients, shift, share, naming, own)
 
 
-def _is_constant(candidate: Candidate) -> bool:
-    return candidate.kind == "driven" and candidate.basis.name == "constant"
+def _constant_outside_inputs(candidate: Candidate) -> bool:
+    return candidate.kind == "driven" and candidate.basis.is_constant
 
 
 def _if_growing(candidate: Candidate, growing: set[str]) -> Candidate:
     """A candidate of a growing mechanism, with the constant effect of that mechanism included."""
-    driven = candidate.mechanism in growing and not _is_constant(candidate)
+    driven = candidate.mechanism in growing and not _constant_outside_inputs(candidate)
     return replace(candidate, nuisance=candidate.nuisance_growing) if driven else candidate
 
 
