@@ -190,15 +190,20 @@ def test_rejects_too_long_batch_before_any_prediction():
 
 
 def test_single_push_is_answered_during_a_long_batch(server):
+    # If pushes waited for the batches, one or two would be answered after each. A busy machine may need another try.
+    assert any(_pushes_during_batches(server) > 5 for _ in range(20))
+
+
+def _pushes_during_batches(server) -> int:
+    """Number of single pushes that are answered before two long batches are."""
     many = query_to_batch_request(PushQuery("analytical", np.tile(MANY, (2500, 1)), 0.2, {}))
     batches = [server._clients["predict_push_batch"].call_async(many) for _ in range(2)]
     answered = 0
     while not all(batch.done() for batch in batches) and answered < 100_000:
         assert server.push().success
         answered += 1
-    # If pushes waited for the batches, one or two would be answered after each.
-    assert all(batch.done() for batch in batches) and answered > 5
     assert all(len(batch.result().in_domain) == 50_000 for batch in batches)
+    return answered
 
 
 def test_unneeded_covariates_change_nothing(server):
