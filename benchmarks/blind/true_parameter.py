@@ -50,10 +50,7 @@ def covers(truth: Mapping[str, Any], effect: Mapping[str, Any], reported: Mappin
     size_of = SIZES.get((kind, effect.get("unit", "")))
     if parameter is None or size_of is None or reported["mechanism"] != kind:
         return None
-    # Only the foreign rig states its engine; older truths lack the friction.
-    if (kind == "tilted_surface" and "friction" not in truth) or (
-        kind == "centre_of_friction" and "engine" not in truth
-    ):
+    if kind in NEEDED and NEEDED[kind] not in truth:
         return None
     share = _share(effect, reported)
     if share is None:

@@ -45,6 +45,7 @@ from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
+from push_predictor.residuals.selection.absolute_fit import left_by
 from push_predictor.types import BoolArray
 
 FEWEST_PUSHES = 12
@@ -365,7 +366,7 @@ def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[Shi
     A force that differs also bends tip and rod differently, which can look like noise that changed a little.
     """
     if motion.terms:
-        if motion.terms[0].best.mechanism is None:
+        if motion.terms[0].mechanism is None:
             return "driver_only"
         return "mechanism_only" if motion.equivalent else "effect"
     if forces.effects:
@@ -388,16 +389,17 @@ def _found_effects(
     if motion.terms:
         return tuple(
             FoundEffect(
-                term.best.mechanism,
+                term.mechanism,
                 SESSION if term.since_training else term.best.covariate,
                 term.outputs,
                 term.best.basis.name,
-                size_of(effect, context.evidence.table),
+                None if term.mechanism is None else size_of(effect, context.evidence.table),
                 _of_trace(term.p_value, "motion"),
                 term.share,
                 term.naming.resembles,
             )
-            for term, effect in zip(motion.terms, effects, strict=True)
+            for k, (term, effect) in enumerate(zip(motion.terms, effects, strict=True))
+            if not any(left_by(earlier, term) for earlier in motion.terms[:k])
         )
     if motion.variance and not forces.effects:
         return tuple(

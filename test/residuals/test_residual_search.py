@@ -239,6 +239,17 @@ class TestNames:
         assert not first.naming.known
 
     @pytest.mark.slow
+    def test_effect_like_a_mechanism_is_modelled_as_this_but_not_named_after_it(self, learnt) -> None:
+        """Contact friction grows with temperature, and so does a drift to one side that it cannot explain."""
+        plain = pushes(200, 207)
+        warm = linear(plain, "topic:/temperature")
+        table = with_effect(plain, "contact_friction", warm, 0.2)
+        drift = np.outer(0.8 * warm.values(plain.covariates, len(plain)), [0.0, NOISE[1], 0.0])
+        first = searched(learnt, replace(table, outcomes=table.outcomes + drift)).terms[0]
+        assert first.best.label == ("contact_friction", "topic:/temperature")
+        assert (first.mechanism, first.naming.resembles) == (None, "contact_friction")
+
+    @pytest.mark.slow
     def test_correlated_covariates_stay_undecided(self, learnt) -> None:
         plain = pushes(200, 206)
         twins = {**plain.covariates, "slid_distance": 0.003 * plain.covariates["elapsed_time"] + 0.001}

@@ -17,6 +17,7 @@ from push_predictor.residuals.evidence.drivers import SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
+from push_predictor.residuals.selection.absolute_fit import with_fitting_names
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
 from push_predictor.residuals.selection.experiment import Experiment, separating_pushes
 from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
@@ -80,7 +81,7 @@ def motion_effects(
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
     candidates = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
-    found = replace(found, terms=needed_terms(found.terms, evidence))
+    found = replace(found, terms=with_fitting_names(needed_terms(found.terms, evidence)))
     if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
         found = climbed(found, ForwardSelection(TermChoice(evidence, found.candidates, inputs, seed), share, baseline))
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
@@ -134,7 +135,7 @@ def _spread(
 def _other_mechanisms(first: SelectedTerm | None) -> tuple[str, ...]:
     if first is None or not first.naming.known:
         return ()
-    return tuple(name for name in first.naming.mechanisms if name is not None and name != first.best.mechanism)
+    return tuple(name for name in first.naming.mechanisms if name is not None and name != first.mechanism)
 
 
 def _tested(found: SearchResult) -> tuple[Tested, ...]:

@@ -42,7 +42,7 @@ def _change(trace: Trace) -> str:
     if trace.verdict == "measurement":
         errors = listed([mechanism_phrase(name) for name in dict.fromkeys(e.mechanism for e in trace.effects)])
         return f"{headline(trace)}: {errors}."
-    more = len(trace.terms) - 1
+    more = min(len(trace.terms), len(trace.effects)) - 1
     further = f", and {count(more, 'further change was', 'further changes were')} found" if more > 0 else ""
     return f"{headline(trace)}{further}."
 
@@ -153,7 +153,7 @@ def _model_clause(trace: Trace) -> tuple[str, str]:
         return "Retrain the model on the new pushes", "that is enough, and no extension is needed"
     if _retraining_helps(trace):
         return "Retrain the model on the new pushes", "that lowers the errors, and the extension adds nothing certain"
-    found = "the effect does" if len(trace.terms) == 1 else "the effects do"
+    found = "the effect does" if len(trace.effects) == 1 else "the effects do"
     return "Keep the deployed model", f"on {pushes} {found} not improve the predictions beyond chance"
 
 

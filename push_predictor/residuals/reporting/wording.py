@@ -86,12 +86,12 @@ def _decision(trace: Trace) -> str:
         return "The motion model is extended."
     if not np.isfinite([gain.low, gain.high]).all():
         return "The motion model stays unchanged: there are too few pushes for an interval."
-    effects = "the effect does" if len(trace.terms) == 1 else "the effects do"
+    effects = "the effect does" if len(trace.effects) == 1 else "the effects do"
     return f"The motion model stays unchanged: {effects} not improve the log density beyond chance."
 
 
 def _gain(trace: Trace, pushes: str) -> str:
-    effects = "the effect changes" if len(trace.terms) == 1 else "the effects change"
+    effects = "the effect changes" if len(trace.effects) == 1 else "the effects change"
     reference = "as deployed" if trace.gain_over == "deployed" else "retrained"
     return (
         f"On {pushes} {effects} the negative log density by {estimate(trace.gain_nlpd, 'nats per window')}. "

@@ -62,6 +62,11 @@ class SelectedTerm:
     since_training: bool = False
 
     @property
+    def mechanism(self) -> str | None:
+        """The mechanism that the effect is named after; None if none fits, even if `best` has one that comes close."""
+        return self.best.mechanism if self.naming.known else None
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs that the term shifts."""
         shift = projected(self.shift, self.best.nuisance)
@@ -209,7 +214,7 @@ class TermChoice:
         return simplest_basis(candidate, self.evidence.table, z, controls, self.evidence.block)
 
     def _named(self, judged: Sequence[Judged], driver: str, z: Array, growing: set[str]) -> tuple[Judged, Naming]:
-        """The best mechanism along a covariate, if any fits; else the generic polynomial."""
+        """The best mechanism along a covariate, if any fits; else, without a name, it or the generic polynomial."""
         by_gain = self._along(judged, driver, z, growing)
         known = [
             j for j in by_gain if j.candidate.mechanism is not None and j.gain > 0.0 and plausible(j, self._case(j, z))
@@ -218,8 +223,9 @@ class TermChoice:
         unexplained = {id(j): self._unexplained(j, generics, z) for j in known}
         fitting = [j for j in known if unexplained[id(j)] <= MOST_UNEXPLAINED]
         if not fitting and generics:
-            best = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
+            generic = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
             closest = known[0].candidate.mechanism if known else None
+            best = known[0] if known and self.inputs.absorbs and surely_larger(known[0], generic) else generic
             return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0), closest)
         fitting = fitting or known[:1] or by_gain[:1]  # the last two if there is no generic candidate
         best = fitting[0]

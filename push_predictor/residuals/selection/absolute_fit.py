@@ -1,0 +1,59 @@
+"""A name needs absolute fit: what an effect leaves must not depend on what its mechanism itself depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.effects.effect import mechanism_named
+from push_predictor.residuals.evidence.drivers import CONSTANT
+from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED
+from push_predictor.residuals.selection.term_choice import SelectedTerm
+
+
+def with_fitting_names(terms: Sequence[SelectedTerm]) -> tuple[SelectedTerm, ...]:
+    """The terms without names that do not fit: what such a mechanism leaves is an unknown effect, found later.
+
+    The model keeps the mechanism's response, which explained most. The mechanism is what the unknown effect resembles.
+    What the fit of an effect leaves of it comes last.
+    """
+    misfits = {term.mechanism for k, term in enumerate(terms) if any(_withdraws(t, term) for t in terms[k + 1 :])}
+    fitting = [_unnamed(term) if term.mechanism in misfits else term for term in terms]
+    left = [any(left_by(earlier, term) for earlier in fitting[:k]) for k, term in enumerate(fitting)]
+    return tuple(fitting[k] for k in np.argsort(left, kind="stable"))
+
+
+def left_by(effect: SelectedTerm, later: SelectedTerm) -> bool:
+    """Whether a term found later is what the fit of an effect leaves of it, rather than another effect."""
+    if effect.mechanism is not None:
+        return later.mechanism is None and later.best.covariate in _dependence(effect)
+    same = _closest(effect) is not None and _closest(later) == _closest(effect)
+    return same or (later.mechanism is None and later.best.covariate in {CONSTANT, *_dependence(effect)})
+
+
+def _withdraws(later: SelectedTerm, named: SelectedTerm) -> bool:
+    """Whether a name does not fit: a later term is a large part of what depends on the same."""
+    if named.mechanism is None or not left_by(named, later):
+        return False
+    left, explained = (max(term.rivals[0].gain, 0.0) for term in (later, named))
+    return left > MOST_UNEXPLAINED * (left + explained)
+
+
+def _unnamed(term: SelectedTerm) -> SelectedTerm:
+    naming = replace(term.naming, mechanisms=(None,), known=False, resembles=term.best.mechanism)
+    return replace(term, naming=naming)
+
+
+def _closest(term: SelectedTerm) -> str | None:
+    """The mechanism of a term, or the one that it resembles."""
+    return term.mechanism or term.naming.resembles
+
+
+def _dependence(term: SelectedTerm) -> set[str]:
+    """The covariates that a term may depend on: its possible drivers, and those of its mechanism's response."""
+    mechanism = _closest(term)
+    turns = mechanism is not None and "slider_heading" in mechanism_named(mechanism).needs
+    return {*term.naming.drivers, *(HEADINGS if turns else ())}
