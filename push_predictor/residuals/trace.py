@@ -354,7 +354,7 @@ def _extension(context: _Context, motion: MotionFinding) -> _Extension:
     added = iter(after.predictor.effects[-len(candidates) :] if after else ())
     # An effect in the model's own inputs is reported at its full size, but the refit learns it.
     effects = tuple(
-        estimated_effects(evidence, [t.best], by_angle=True)[0][0] if t.own else next(added) for t in motion.terms
+        estimated_effects(evidence, [t.best], of_size=True)[0][0] if t.own else next(added) for t in motion.terms
     )
     gain = held_out_gain(model, refit, after, evidence.table, context.held_out) if after else None
     return _Extension(held_out_windows(refit).calibrated(), after, effects, gain)

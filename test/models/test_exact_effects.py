@@ -33,6 +33,9 @@ ALWAYS = DriverBasis("constant")
 IN_METRES = np.array([1.0, 1.0, 0.04])  # a turn counts as the path of a point 4 cm from the centre
 
 
+CONTACT, ANGLE = 1, 2  # columns of the inputs
+
+
 def made(n: int, seed: int = 0, duration: float = 0.2) -> Push:
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([rng.uniform(0.02, 0.1, n), rng.random(n), rng.uniform(-1.0, 1.0, n)])
@@ -231,7 +234,7 @@ def deployed() -> PushModel:
 
 def found(deployed: PushModel, table: PushTable, mechanism: str, basis: DriverBasis) -> Effect:
     evidence = evidence_of(deployed, table, physics())
-    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)], by_angle=True)[0][0]
+    return estimated_effects(evidence, [candidate(evidence, mechanism, "elapsed_time", basis)], of_size=True)[0][0]
 
 
 def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
@@ -242,11 +245,14 @@ def test_the_size_of_a_large_effect_is_found(deployed: PushModel) -> None:
     assert estimate.exact and abs(float(estimate.coefficients[0]) - 0.4) < 3.0 * sd < 0.1
 
 
-def test_where_pushes_of_different_angles_disagree_the_interval_is_wider(deployed: PushModel) -> None:
-    """Real mechanics err by angle: pushes of one angle, however many, do not make the size more certain."""
+@pytest.mark.parametrize(("differ_by", "limit"), [(CONTACT, 0.5), (ANGLE, 0.0)])
+def test_where_pushes_of_different_inputs_disagree_the_interval_is_wider(
+    deployed: PushModel, differ_by: int, limit: float
+) -> None:
+    """Real mechanics err by contact and angle: pushes of one angle, however many, do not make the size more certain."""
     weak, strong = pushes(100, 5, slippery(0.1)), pushes(100, 5, slippery(0.3))
-    to_one_side = weak.inputs[:, 2] > 0.0
-    mixed = replace(weak, outcomes=np.where(to_one_side[:, None], strong.outcomes, weak.outcomes))
+    on_one_side = weak.inputs[:, differ_by] > limit
+    mixed = replace(weak, outcomes=np.where(on_one_side[:, None], strong.outcomes, weak.outcomes))
     estimate = found(deployed, mixed, "contact_friction", DRIFT)
     assert 0.1 < estimate.coefficients[0] < 0.3
     assert np.sqrt(estimate.covariance[0, 0]) > 0.1 * (0.3 - 0.1)

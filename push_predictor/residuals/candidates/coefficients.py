@@ -3,8 +3,8 @@
 What a learnt base could express in its own inputs is regressed out of residuals and responses first (Frisch and Waugh
 1933). Effects that change parameters of the mechanics are exact, found by steps of Gauss and Newton. The covariance is
 a jackknife over blocks of pushes: it covers disturbances that neighbouring pushes share, and coefficients that depend
-on a few pushes. No mechanics is exact: where pushes of different angles disagree about a coefficient by more, the
-interval of its size is widened to that of a jackknife over angles.
+on a few pushes. No mechanics is exact: where pushes of different angles, or at different places of the outline,
+disagree about a coefficient by more, the interval of its size is widened to that of a jackknife over these.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from push_predictor.types import Array, IntArray
 
 RIDGE = 1e-3  # share of a column's own square, for nearly collinear columns
 MOST_STEPS = 10
-ANGLES = 8  # groups of push angles
+GROUPS = 8  # of push angles, and of places on the outline
 SINGULAR = 1e-12  # of the largest variance; less is rounding
 LENGTHENED = 0.6  # of what a step promises: a larger fall shows that it is too short
 LENGTHS = 5  # of a step that are tried
@@ -39,20 +39,21 @@ def estimated_effects(
     own_inputs: Array | None = None,
     start: Array | None = None,
     *,
-    by_angle: bool = False,
+    of_size: bool = False,
 ) -> tuple[tuple[Effect, ...], Cross]:
     """The effects of these candidates, and the covariances between their coefficients (see ExtendedPredictor).
 
     own_inputs (n, m): controls to regress out of residuals and responses. start: coefficients (p,) near the solution.
-    by_angle: whether the covariance is for a size and not for a test against chance. It then also covers errors of the
-    mechanics, as far as pushes of different angles disagree.
+    of_size: whether the covariance is for a size and not for a test against chance. It then also covers errors of the
+    mechanics, as far as pushes of different angles, or at different places of the outline, disagree.
     """
     problem = _Problem.of(evidence, candidates, own_inputs)
     found, n = problem.solved(start), len(evidence.table)
     covariance = _jackknife(found.columns, found.residual, evidence.block, found.ridge)
-    if by_angle:
-        groups = _angles(evidence.table.inputs[:, 2])
-        covariance = _widened(covariance, _jackknife(found.columns, found.residual, groups, found.ridge))
+    if of_size:
+        for inputs in evidence.table.inputs[:, 1:].T:  # contact, angle
+            other = _jackknife(found.columns, found.residual, _groups(inputs), found.ridge)
+            covariance = _widened(covariance, other)
     covariance *= n / max(n - problem.residualizer.q.shape[1], 1)
     effects = tuple(
         replace(effect, covariance=covariance[part, part])
@@ -239,9 +240,9 @@ def _objective(residual: Array, ridge: Array, coefficients: Array) -> float:
     return 0.5 * float(np.sum(residual**2) + np.sum(ridge * coefficients**2))
 
 
-def _angles(angle: Array) -> IntArray:
-    """Groups (n,) of windows with similar push angles, of equal size; left and right slip are apart."""
-    return np.searchsorted(np.quantile(angle, np.arange(1, ANGLES) / ANGLES), angle)
+def _groups(values: Array) -> IntArray:
+    """Groups (n,) of equal size of windows with similar values; of angles, left and right slip are apart."""
+    return np.searchsorted(np.quantile(values, np.arange(1, GROUPS) / GROUPS), values)
 
 
 def _widened(covariance: Array, other: Array) -> Array:

@@ -30,7 +30,7 @@ def extend(base: PushModel, evidence: Evidence, candidates: Sequence[Candidate])
     learnt, absorbs = base.predictor.learnt, base.predictor.absorbs
     # About mechanics, a learnt base expresses little in its own inputs, and a refit keeps the mechanics.
     own_inputs = inputs_basis(base, evidence.table).columns if learnt and absorbs else None
-    effects, cross = estimated_effects(evidence, candidates, own_inputs, by_angle=True)
+    effects, cross = estimated_effects(evidence, candidates, own_inputs, of_size=True)
     predictor = _with_effects(base.predictor, evidence.physics, effects, cross)
     table = spread_rows(base, evidence.table)
     if learnt or absorbs:
