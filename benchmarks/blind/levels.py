@@ -25,8 +25,8 @@ from push_predictor.models.train_learnt import MEANS
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.channel_search import Searched, search_channels
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
-from push_predictor.residuals.trace import Searched, search_channels
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec
 

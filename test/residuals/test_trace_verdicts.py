@@ -16,6 +16,7 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.channel_search import search_channels
 from push_predictor.residuals.channels.motion import NO_MOTION
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
@@ -23,7 +24,7 @@ from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.outcome import Sized, Trace
 from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.reporting.wording import worth_sentence
-from push_predictor.residuals.trace import search_channels, trace
+from push_predictor.residuals.trace import trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.rig_simulator import simulate
@@ -82,11 +83,11 @@ def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(m
     effect = WrenchEffect("surface_friction", "model_inputs", "constant", (lower,), 0.0005, ())
     noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
     motion = replace(NO_MOTION, variance=(noise,), equivalent=("dwell_time",))
-    monkeypatch.setattr("push_predictor.residuals.trace.motion_effects", lambda *_, **__: motion)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: motion)
     alone = trace(learnt(), faultless())
     assert (alone.verdict, alone.kind, alone.equivalent) == ("variance", "variance", ("dwell_time",))
     monkeypatch.setattr(
-        "push_predictor.residuals.trace.wrench_effects", lambda *_: WrenchFinding((effect,), (), 0.1, True)
+        "push_predictor.residuals.channel_search.wrench_effects", lambda *_: WrenchFinding((effect,), (), 0.1, True)
     )
     both = trace(learnt(), faultless())
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
@@ -102,9 +103,9 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     inputs[faster, 0] *= 5.0
     shifted = replace(data, table=replace(data.table, inputs=inputs), recordings=None)
     monkeypatch.setattr(
-        "push_predictor.residuals.trace.wrench_effects", lambda table, *_: judged.append(table) or NO_WRENCH
+        "push_predictor.residuals.channel_search.wrench_effects", lambda table, *_: judged.append(table) or NO_WRENCH
     )
-    monkeypatch.setattr("push_predictor.residuals.trace.motion_effects", lambda *_, **__: NO_MOTION)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
     found = trace(learnt(), shifted)
     assert "velocity" in [each.covariate for each in found.input_shift]
     assert 0 < len(judged[0]) < len(found.analysis)
@@ -115,9 +116,9 @@ def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkey
     zero = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
     found = WrenchFinding((), (), 0.1, True, WrenchEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
     noise = VarianceEffect("velocity", DriverBasis("linear", ("velocity",)), ("dx",), 0.005, 1.3)
-    monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: found)
     monkeypatch.setattr(
-        "push_predictor.residuals.trace.motion_effects", lambda *_, **__: replace(NO_MOTION, variance=(noise,))
+        "push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: replace(NO_MOTION, variance=(noise,))
     )
     traced = trace(learnt(), faultless())
     assert traced.verdict == "variance"
@@ -128,7 +129,7 @@ def test_force_bias_during_contact_is_a_measurement_error(monkeypatch: pytest.Mo
     pulls = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
     effect = WrenchEffect("wrench_bias", "model_inputs", "constant", pulls, 0.0005, ())
     found = WrenchFinding((effect,), (), 0.1, True)
-    monkeypatch.setattr("push_predictor.residuals.trace.wrench_effects", lambda *_: found)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: found)
     result = trace_json(trace(learnt(), faultless()))
     assert (result["verdict"], result["channel"], result["motion_model_changed"]) == (
         "measurement",

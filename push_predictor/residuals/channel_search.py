@@ -1,0 +1,124 @@
+"""The search of all channels: errors of measurement, then the motion, then the force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_predictor.evaluation.offline import window_options
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.watch import Watch, no_watch
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.channels.corrections import correct
+from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
+from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
+from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, WrenchFinding, wrench_effects
+from push_predictor.residuals.evidence.loading import LoadedData, corrected_data
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.residuals.question import Question
+
+BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
+
+
+def search_channels(
+    model: PushModel,
+    loaded: LoadedData,
+    *,
+    alpha: float = 0.01,
+    covariates: Sequence[str] | None = None,
+    seed: int = 0,
+) -> Searched:
+    """Search the windows like `trace`, but extend no model and open no held-out pushes."""
+    return search_all(Question.of(model, loaded, alpha, covariates, seed), no_watch)
+
+
+def search_all(question: Question, watch: Watch) -> Searched:
+    """What is found on each channel; watch: see `trace`."""
+    model, analysis, seed = question.model, question.windows, question.seed
+    watch("measurement", 0.1)
+    measured = measurement_errors(analysis, model.training, question.loaded.rig, question.share("measurement"), seed)
+    if measured is not None and measured.errors:
+        corrected = _corrected(question, measured)
+        if _explains_residuals(question, corrected):
+            return Searched(measured, NO_MOTION, NO_WRENCH, corrected)
+    watch("motion", 0.15)
+    motion = motion_effects(
+        model, question.evidence, question.share("motion"), question.covariates, seed, inside=question.inside
+    )
+    watch("force", 0.6)
+    known = analysis.take(question.inside)  # faster pushes need more force, and training does not show how much
+    forces = wrench_effects(known, model.training, question.evidence.physics, question.share("wrench"), seed)
+    biased = None if motion.terms else _biased(forces, spread=bool(motion.variance))
+    return Searched(measured, motion, forces, None if biased is None else _corrected(question, biased))
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What was found on each channel, before anything is opened that was held out.
+
+    measured: None if the windows do not determine measurement errors. corrected: None, or the measurement error that
+    explains the residuals; nothing else was searched for then.
+    """
+
+    measured: MeasurementFinding | None
+    motion: MotionFinding
+    forces: WrenchFinding
+    corrected: Corrected | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """Measurement errors, and the same pushes cut again from corrected streams; None without streams."""
+
+    finding: MeasurementFinding
+    evidence: Evidence | None
+    held_out: PushTable | None
+
+
+def _corrected(question: Question, measured: MeasurementFinding) -> Corrected:
+    """The windows of the recordings after all corrections."""
+    if question.loaded.recordings is None:
+        return Corrected(measured, None, None)
+    recordings = list(question.loaded.recordings)
+    for error in measured.errors:
+        recordings = [correct(recording, error.mechanism, error.values) for recording in recordings]
+    again = corrected_data(question.loaded, recordings, window_options(question.model))
+    held = held_out_rows(again.table, again.chosen)
+    analysis, held_out = again.table.take(~held), again.table.take(held)
+    return Corrected(measured, replace(evidence_of(question.model, analysis), chosen=again.chosen), held_out)
+
+
+def _explains_residuals(question: Question, corrected: Corrected) -> bool:
+    """Whether a correction halves the residuals of a model that is badly off.
+
+    A compliant tip opens the gap like a late clock, but no correction of the clock brings the predictions back. Without
+    streams to correct, or with small residuals, the gap alone decides.
+    """
+    if corrected.evidence is None:
+        return True
+    before, after = _excess(question.evidence), _excess(corrected.evidence)
+    return before < BADLY_OFF or after < 0.5 * before
+
+
+def _excess(evidence: Evidence) -> float:
+    """Mean excess of the squared standardised residuals over 1; each square counts at most 25."""
+    return float(np.mean(np.minimum(evidence.z**2, 25.0))) - 1.0
+
+
+def _biased(forces: WrenchFinding, spread: bool) -> MeasurementFinding | None:
+    """A bias of the force sensor as a measurement error, though it is found on the wrench channel.
+
+    One of the sensor's zero does no harm to the windows, so it is the answer only if neither the force in contact nor
+    the spread of the outcomes changed.
+    """
+    first = next(iter(forces.effects), None if spread else forces.zero)
+    if first is None or first.mechanism != WRENCH_BIAS:
+        return None
+    size = float(np.linalg.norm([parameter.value for parameter in first.parameters]))
+    error = MeasurementFault(
+        first.mechanism, first.parameters, first.p_value, first.rivals, size, first.covariate, first.basis
+    )
+    return MeasurementFinding((error,), forces.tested, forces.noise, forces.against_training)

@@ -1,0 +1,88 @@
+"""The question of a trace: the deployed model and the windows it is judged on, split once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from push_predictor.errors import RequestError
+from push_predictor.models.push_model import PushModel
+from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.extrapolation import about_mechanics, widened
+from push_predictor.residuals.evidence.input_shift import ShiftedInput, input_shift
+from push_predictor.residuals.evidence.instrument import GAP, with_instrument
+from push_predictor.residuals.evidence.loading import LoadedData, previous_residual
+from push_predictor.residuals.evidence.split import held_out_rows
+from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
+from push_predictor.types import BoolArray
+
+FEWEST_PUSHES = 12
+SHARES = {"motion": 0.6, "measurement": 0.2, "wrench": 0.2}  # of alpha: every kind of false alarm counts
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Analysis pushes, their evidence, and held-out pushes.
+
+    model: the deployed one, or one about mechanics where that cannot extrapolate. windows: of the analysis, as they
+    were measured. inside: those among the inputs of training.
+    """
+
+    deployed: PushModel
+    model: PushModel
+    loaded: LoadedData
+    alpha: float
+    covariates: tuple[str, ...] | None
+    seed: int
+    windows: PushTable
+    evidence: Evidence
+    inside: BoolArray
+    held_out: PushTable
+    shifted: tuple[ShiftedInput, ...]
+
+    @classmethod
+    def of(
+        cls, model: PushModel, loaded: LoadedData, alpha: float, covariates: Sequence[str] | None, seed: int
+    ) -> Question:
+        """Predict all windows, add the previous push's residual to their covariates, and split them."""
+        _check(model, loaded.table, alpha, covariates)
+        shift = input_shift(model, loaded.table)
+        searched = about_mechanics(model) if shift.inputs else model
+        every = widened(evidence_of(searched, loaded.table), model.training, shift)
+        every = replace(every, chosen=loaded.chosen)
+        before = previous_residual(loaded.table, every.z)
+        table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
+        held, usable = held_out_rows(table, loaded.chosen), with_instrument(table)
+        if GAP in (covariates or ()) and GAP not in usable.covariates:
+            raise RequestError(
+                "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"
+            )
+        return cls(
+            deployed=model,
+            model=searched,
+            loaded=loaded,
+            alpha=alpha,
+            covariates=None if covariates is None else tuple(covariates),
+            seed=seed,
+            windows=table.take(~held),
+            evidence=replace(every.take(~held), table=usable.take(~held)),
+            inside=~shift.outside[~held],
+            held_out=table.take(held),
+            shifted=shift.inputs,
+        )
+
+    def share(self, channel: str) -> float:
+        """The part of alpha that a channel may spend."""
+        return SHARES[channel] * self.alpha
+
+
+def _check(model: PushModel, table: PushTable, alpha: float, covariates: Sequence[str] | None) -> None:
+    if not 0.0 < alpha < 1.0:
+        raise RequestError("alpha", alpha, "a probability above 0 and below 1")
+    if not len(model.training):
+        raise RequestError("model", model.name, "one that was trained on pushes: retrain it on those at hand")
+    if len(table.pushes) < FEWEST_PUSHES:
+        raise RequestError("pushes", len(table.pushes), f"at least {FEWEST_PUSHES}, preferably hundreds")
+    for name in covariates or ():
+        if name not in table.covariates and name != "previous_residual":
+            raise RequestError("covariate", name, f"one of {', '.join(sorted(table.covariates))}")
