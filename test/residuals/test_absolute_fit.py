@@ -22,8 +22,8 @@ def term(
     rivals: Sequence[str] = (),
     resembles: str | None = None,
 ) -> SelectedTerm:
-    """A term that gains as much; resembles: for an unknown effect, whose model is this mechanism's response."""
-    best = Candidate(mechanism or resembles, covariate, DriverBasis("linear", (covariate,)), np.ones((1, 3, 1)))
+    """A term that gains as much; resembles: for an unknown effect, whose model is the polynomial."""
+    best = Candidate(mechanism, covariate, DriverBasis("linear", (covariate,)), np.ones((1, 3, 1)))
     naming = Naming((covariate, *rivals), (mechanism,), mechanism is not None, 0.0, resembles)
     return SelectedTerm(best, (Judged(best, np.array([gain])),), 0.001, np.ones(1), np.ones((1, 3)), 0.1, naming, False)
 
@@ -85,6 +85,11 @@ def test_second_term_of_a_mechanism_that_does_not_fit_has_no_name_either() -> No
 def test_model_keeps_the_response_of_a_mechanism_without_its_name() -> None:
     first = with_fitting_names([term("tilted_surface", "push_index", 300.0), term(None, "push_heading", 100.0)])[0]
     assert (first.best.mechanism, first.naming.mechanisms) == ("tilted_surface", (None,))
+
+
+def test_unknown_effect_resembles_the_same_whatever_is_found_later() -> None:
+    found = [term(None, "push_index", 300.0, resembles="tilted_surface"), term(None, "push_heading", 100.0)]
+    assert names(found) == [UNKNOWN_SLOPE, (None, None)]
 
 
 def test_rest_of_an_effect_comes_after_other_effects() -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,14 +18,21 @@ from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.channel_search import search_channels
-from push_predictor.residuals.channels.motion import NO_MOTION
+from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
+from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace
+from push_predictor.residuals.reporting.answer import answer
+from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.trace_json import trace_json
 from push_predictor.residuals.reporting.wording import worth_sentence
+from push_predictor.residuals.selection.cross_validation import Judged
+from push_predictor.residuals.selection.naming import Naming
+from push_predictor.residuals.selection.term_choice import SelectedTerm
 from push_predictor.residuals.trace import trace
 from push_predictor.simulation.changes import Changes
 from push_predictor.simulation.pushes import random_pushes
@@ -93,6 +102,39 @@ def test_changed_force_is_the_answer_before_noise_that_seems_to_change_with_it(m
     assert (both.verdict, both.kind, both.equivalent) == ("wrench_only", None, ())
     assert [e.mechanism for e in both.effects] == ["surface_friction"]
     assert any("noise of the motion changed as well" in note and "speed" in note for note in both.notes)
+
+
+def test_effect_that_only_resembles_a_mechanism_has_no_size_and_its_rest_is_no_second_effect(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The model takes the mechanism's response and what this leaves; the trace reports one unknown effect."""
+
+    def unnamed(_: PushModel, evidence: Evidence, *__: Any, **___: Any) -> MotionFinding:
+        time = evidence.table.covariates["elapsed_time"]
+        drift = DriverBasis("linear", ("elapsed_time",), (float(time.mean()),), (float(time.std()),))
+        turning = DriverBasis("periodic", ("slider_heading",))
+        slope = candidate(evidence, "tilted_surface", "elapsed_time", drift)
+        rest = candidate(evidence, None, "slider_heading", turning)
+        terms = (_term(slope, resembles="tilted_surface"), _term(rest, resembles=None))
+        return replace(NO_MOTION, terms=terms)
+
+    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", unnamed)
+    found = trace(learnt(), faultless())
+    assert (found.verdict, found.mechanisms) == ("driver_only", ())
+    (effect,) = found.effects
+    assert (effect.mechanism, effect.resembles, effect.parameter) == (None, "tilted_surface", None)
+    assert [term.mechanism for term in found.terms] == ["tilted_surface", None]
+    json.dumps(trace_json(found))
+    write_trace_report(tmp_path / "page.html", found)  # pairs effects with terms
+    assert "further" not in " ".join(answer(found))
+
+
+def _term(best: Candidate, resembles: str | None) -> SelectedTerm:
+    """A term without a name."""
+    n, size = len(best.response), best.plain.shape[2]
+    naming = Naming((best.covariate,), (None,), False, 1.0, resembles)
+    judged = (Judged(best, np.array([100.0])),)
+    return SelectedTerm(best, judged, 0.001, np.zeros(size), np.ones((n, 3)), 0.1, naming, False)
 
 
 def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -225,7 +225,8 @@ class TermChoice:
         if not fitting and generics:
             generic = max((self._with_simplest_basis(g, z) for g in generics), key=lambda j: j.gain)
             closest = known[0].candidate.mechanism if known else None
-            best = known[0] if known and self.inputs.absorbs and surely_larger(known[0], generic) else generic
+            better = known and self.inputs.learnt and surely_larger(known[0], generic)  # others: see further_steps.py
+            best = known[0] if better else generic
             return best, Naming((driver,), (None,), False, min(unexplained.values(), default=1.0), closest)
         fitting = fitting or known[:1] or by_gain[:1]  # the last two if there is no generic candidate
         best = fitting[0]
