@@ -9,6 +9,7 @@ import pytest
 from made_up_traces import DRIFT, planted, pushes, slippery
 from synthetic import square_rig
 
+from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
@@ -105,3 +106,13 @@ def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it
     found = motion_effects(model, evidence_of(model, pushes(120, 8, always)), 0.01, ["elapsed_time"])
     (term,) = found.terms
     assert term.best.label == ("contact_friction", "model_inputs") and term.since_training == session
+
+
+def test_constant_effect_that_was_selected_twice_is_one(deployed: PushModel) -> None:
+    """Its first fit left a part of it to the drift, and fitted together both would have half of its size."""
+    rougher = planted("contact_friction", "model_inputs", DriverBasis("constant"), 0.1)
+    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06), rougher))
+    drift = chosen(evidence, "contact_friction", "elapsed_time")
+    constant = replace(drift, best=candidate(evidence, "contact_friction", "model_inputs", DriverBasis("constant")))
+    again = replace(constant, p_value=0.002)
+    assert needed_terms([constant, drift, again], evidence) == (constant, drift)

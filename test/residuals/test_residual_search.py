@@ -299,6 +299,22 @@ class TestBasis:
         assert (term.best.label, term.best.basis.name) == (("tilted_surface", "elapsed_time"), "step")
 
     @pytest.mark.slow
+    def test_constant_effect_that_the_inputs_express_in_part_has_no_onset(self) -> None:
+        """An onset before almost all pushes is the constant effect, and must gain more than the whole of this."""
+        plain = pushes(200, 303)
+        shift, always = np.array([0.015, 0.0]), DriverBasis("constant")
+        effect = Effect("centre_of_friction", "edge", always, shift, np.zeros((2, 2)), np.ones(3), True)
+        push = Push(plain.inputs, plain.duration, plain.covariates)
+        table = replace(plain, outcomes=plain.outcomes + joint_shift(MECHANICS, [effect], push))
+        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        evidence, inputs = evidence_of(base, table, PHYSICS), inputs_basis(base, table)
+        sides = table.covariates["edge"][:, None] == np.arange(3)  # they explain a part of the effect
+        folded = replace(inputs, folds=True, columns=np.column_stack([inputs.columns, sides]))
+        candidates = candidates_of(evidence, DRIVERS, folded)
+        first = search(evidence, candidates, folded, 0.01, baseline=baseline(base)).terms[0].best
+        assert (first.mechanism, first.basis.is_constant) == ("centre_of_friction", True)
+
+    @pytest.mark.slow
     def test_linear_dependence_stays_linear(self, learnt) -> None:
         plain = pushes(200, 301)
         table = with_effect(plain, "contact_friction", linear(plain, "slider_x"), 0.08)

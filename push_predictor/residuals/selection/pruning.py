@@ -18,8 +18,10 @@ NOT_ZERO = 0.01  # p above which an effect among others may be zero
 def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[SelectedTerm, ...]:
     """The terms without those whose effect may be zero once all are fitted together, the least certain dropped first.
 
-    Terms that a refit of the base learns stay.
+    A constant effect that was selected twice is one: the first fit of it left a part to another term. Terms that a
+    refit of the base learns stay.
     """
+    terms = _once(terms)
     fitted = [term for term in terms if not term.own]
     while len(fitted) > 1:
         effects, _ = estimated_effects(evidence, [term.best for term in fitted])
@@ -28,6 +30,12 @@ def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[Sel
             break
         del fitted[int(np.argmax(p_values))]
     return tuple(term for term in terms if term.own or any(term is kept for kept in fitted))
+
+
+def _once(terms: Sequence[SelectedTerm]) -> list[SelectedTerm]:
+    """The terms, each constant effect only where it was selected first."""
+    first = {term.best.label: term for term in reversed(terms) if term.best.basis.is_constant}
+    return [term for term in terms if first.get(term.best.label, term) is term or not term.best.basis.is_constant]
 
 
 def p_of_zero(coefficients: Array, covariance: Array) -> float:

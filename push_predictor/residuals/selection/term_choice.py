@@ -169,7 +169,9 @@ class TermChoice:
         constant = self._constants(judged)
         if not constant:
             return judged
-        always = max((self._exact(j, z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain)
+        always = max(
+            (self._whole(_unconditional(j.candidate), z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain
+        )
         surely = [j for j in self._onsets(str(always.candidate.mechanism), z) if surely_larger(j, always)]
         return [*surely, *judged]
 
@@ -191,8 +193,7 @@ class TermChoice:
 
     def _by_onset(self, candidate: Candidate, z: Array) -> Judged:
         """The candidate's whole effect by its onset along its covariate."""
-        whole = replace(candidate, nuisance=None, nuisance_growing=None)
-        return best_onset(whole, self.evidence.table, z, self.evidence.block)
+        return best_onset(_unconditional(candidate), self.evidence.table, z, self.evidence.block)
 
     def _whole(self, candidate: Candidate, z: Array) -> Judged:
         """The candidate fitted exactly, and judged by its whole effect; a fit serves all with the same values."""
@@ -287,6 +288,11 @@ class TermChoice:
 
 def _constant_outside_inputs(candidate: Candidate) -> bool:
     return candidate.kind == "driven" and candidate.basis.is_constant
+
+
+def _unconditional(candidate: Candidate) -> Candidate:
+    """The candidate projected off nothing: its whole effect."""
+    return replace(candidate, nuisance=None, nuisance_growing=None)
 
 
 def _if_growing(candidate: Candidate, growing: set[str]) -> Candidate:
