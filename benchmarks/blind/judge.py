@@ -170,10 +170,13 @@ def _decidable(truth: Json) -> bool:
 
 
 def _share(truth: Json, result: Json, failed: bool) -> float | None:
-    """Share of the oracle's gain if that is at least MEDIUM; an unchanged model gains nothing."""
+    """Share of the oracle's gain if that is at least MEDIUM and certain; an unchanged model gains nothing.
+
+    Both gains are over the better of the deployed model and the refit.
+    """
     oracle = truth.get("oracle_gain")
-    if oracle is None or -oracle["value"] < MEDIUM:
+    if oracle is None or -oracle["value"] < MEDIUM or oracle["traced"]["high"] >= 0.0:
         return None
     if failed or not result["motion_model_changed"]:
         return 0.0
-    return float(result["gain"]["nlpd"]["value"] / oracle["value"])
+    return float(result["gain"]["nlpd"]["value"] / oracle["traced"]["value"])

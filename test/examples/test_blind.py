@@ -24,10 +24,15 @@ from push_predictor.simulation.sensors import Faults
 SMALL = Size(training=25, least=20, most=24, rows=40, kind="analytical")
 
 
+def gain_of(value: float, high: float = -0.01, traced: float = -0.5) -> dict[str, Any]:
+    """An oracle's gain over the refit, and over the reference of a trace."""
+    return {"value": value, "high": high, "traced": {"value": traced, "high": min(traced + 0.1, 0.0)}}
+
+
 def truth(**other: Any) -> dict[str, Any]:
     record = {
         "group": "library", "channel": "motion", "kind": "contact_friction", "names": ["contact_friction"],
-        "covariates": ["slid_distance"], "size": "large", "oracle_gain": {"value": -0.5},
+        "covariates": ["slid_distance"], "size": "large", "oracle_gain": gain_of(-0.6),
     }  # fmt: skip
     return {**record, **other}
 
@@ -231,11 +236,19 @@ def test_counts_harm_and_failures() -> None:
 
 @pytest.mark.parametrize(("gain", "size"), [(-0.05, "small"), (-0.1, "medium"), (-0.4, "medium"), (-0.41, "large")])
 def test_oracle_gain_decides_the_size_class(gain: float, size: str) -> None:
-    assert one(truth(oracle_gain={"value": gain}), no_finding())["size"] == size
+    assert one(truth(oracle_gain=gain_of(gain)), no_finding())["size"] == size
+
+
+def test_share_of_the_oracles_gain_counts_where_the_oracle_extends_the_model() -> None:
+    """Both gains are over the better of the deployed model and the refit; the size is the gain over the refit."""
+    found = verdict("contact_friction", "slid_distance")
+    assert one(truth(oracle_gain=gain_of(-0.2, traced=-0.8)), found)["share"] == pytest.approx(0.5)
+    assert one(truth(oracle_gain=gain_of(-0.2, traced=-0.05)), found)["share"] is None
+    assert one(truth(oracle_gain=gain_of(-0.05, traced=-0.8)), found)["share"] is None
 
 
 def test_drivers_of_small_effects_count_where_an_oracle_could_decide() -> None:
-    gains = [{"value": -0.05, "high": -0.01}, {"value": -0.05, "high": 0.01}, {"value": -0.2, "high": 0.01}, None]
+    gains = [gain_of(-0.05), gain_of(-0.05, high=0.01), gain_of(-0.2, high=0.01), None]
     truths = {f"{number:03d}": truth(oracle_gain=gain) for number, gain in enumerate(gains)}
     scored = score_of(truths, dict.fromkeys(truths, verdict("contact_friction", "slid_distance")))
     assert counted(scored, "right driver in the named set") == (3, 3)
