@@ -21,8 +21,9 @@ from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
+from push_predictor.residuals.selection.cross_validation import Judged
 from push_predictor.residuals.selection.forward_selection import SearchResult, search
-from push_predictor.residuals.selection.naming import Naming
+from push_predictor.residuals.selection.naming import Naming, surely_larger
 from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm
 
@@ -116,3 +117,14 @@ def test_constant_effect_that_was_selected_twice_is_one(deployed: PushModel) -> 
     constant = replace(drift, best=candidate(evidence, "contact_friction", "model_inputs", DriverBasis("constant")))
     again = replace(constant, p_value=0.002)
     assert needed_terms([constant, drift, again], evidence) == (constant, drift)
+
+
+@pytest.mark.parametrize(("level", "sure"), [(0.05, True), (0.01, True), (0.05 / 12, False)])
+def test_advantage_must_be_surer_the_more_alternatives_were_tried(
+    deployed: PushModel, level: float, sure: bool
+) -> None:
+    """An advantage of 2.5 standard errors over 100 blocks."""
+    best = chosen(evidence_of(deployed, pushes(60, 3)), "contact_friction", "elapsed_time").best
+    alternating = np.where(np.arange(100) % 2, 1.0, -1.0)
+    larger = Judged(best, alternating + 0.25)
+    assert surely_larger(larger, Judged(best, np.zeros(100)), level) == sure

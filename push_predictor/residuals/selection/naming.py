@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri
 
 from push_predictor.models.effects.effect import mechanism_named
 from push_predictor.residuals.candidates.candidate import Candidate
@@ -19,7 +20,6 @@ from push_predictor.residuals.selection.screening import raw_scores, screen, uni
 from push_predictor.types import Array, IntArray
 
 REJECTED = 0.01  # p below which a rival is rejected
-SURELY = 2.33  # the same in standard errors
 UNEXPLAINED = 0.05  # p below which a mechanism fails to explain something along its covariate
 MOST_UNEXPLAINED = 0.15  # largest share along the covariate that a named mechanism may fail to explain
 
@@ -71,10 +71,10 @@ def plausible(judged: Judged, case: Case) -> bool:
     return mechanism_named(candidate.mechanism).plausible(np.quantile(np.abs(strength), 0.9, axis=0)[None])
 
 
-def surely_larger(one: Judged, other: Judged) -> bool:
-    """Whether a gain is larger by more than chance from block to block."""
+def surely_larger(one: Judged, other: Judged, level: float = REJECTED) -> bool:
+    """Whether a gain is larger by more than chance from block to block; level: probability of such a chance."""
     more = Judged(one.candidate, one.gains - other.gains)
-    return more.gain > SURELY * more.error
+    return more.gain > -float(ndtri(level)) * more.error
 
 
 def unexplained_share(mechanism: Judged, generic: Candidate, case: Case, seed: int = 0) -> float:

@@ -37,6 +37,7 @@ SMOOTH = ("linear", "logarithmic", "quadratic")  # bases in which rivals are com
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_REFINED = 12  # of the labels, those that are tried in every basis
 MOST_RIVALS = 3  # mechanisms of a whole effect that are fitted exactly
+BY_CHANCE = 0.05  # probability that any covariate seems to be the onset of a constant effect
 MOST_NAMED = 6  # candidates along the covariate, best first, that are tried as its name
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
 
@@ -172,7 +173,8 @@ class TermChoice:
         always = max(
             (self._whole(_unconditional(j.candidate), z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain
         )
-        surely = [j for j in self._onsets(str(always.candidate.mechanism), z) if surely_larger(j, always)]
+        along = self._along_covariates(str(always.candidate.mechanism))
+        surely = [j for j in self._onsets(along, z) if surely_larger(j, always, BY_CHANCE / len(along))]
         return [*surely, *judged]
 
     def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
@@ -184,10 +186,14 @@ class TermChoice:
         same = [c for c in self.candidates if c.mechanism == first.mechanism and c.basis.is_constant]
         return [Judged(c, np.zeros(1)) for c in same if c.mechanism is not None]
 
-    def _onsets(self, mechanism: str, z: Array) -> list[Judged]:
-        """The whole effect of a mechanism by its onset along each covariate, the best fitted exactly, by gain."""
+    def _along_covariates(self, mechanism: str) -> list[Candidate]:
+        """One candidate of a mechanism for each covariate along which it may set in."""
         each = {c.covariate: c for c in reversed(self.candidates) if c.mechanism == mechanism}
-        stepped = [self._by_onset(c, z) for c in each.values() if c.basis.name == "linear"]
+        return [c for c in each.values() if c.basis.name == "linear"]
+
+    def _onsets(self, along: Sequence[Candidate], z: Array) -> list[Judged]:
+        """The whole effect by its onset along each covariate, the best fitted exactly, by gain."""
+        stepped = [self._by_onset(c, z) for c in along]
         best = sorted(stepped, key=lambda j: -j.gain)[:MOST_NAMED]
         return sorted((self._whole(j.candidate, z) for j in best), key=lambda j: -j.gain)
 
