@@ -18,6 +18,7 @@ from push_predictor.residuals.candidates.enumeration import candidates_of
 from push_predictor.residuals.channels.motion import motion_effects
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
+from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.residualizer import Residualizer, sums_by
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.selection.baseline import baseline_of
@@ -128,3 +129,28 @@ def test_advantage_must_be_surer_the_more_alternatives_were_tried(
     alternating = np.where(np.arange(100) % 2, 1.0, -1.0)
     larger = Judged(best, alternating + 0.25)
     assert surely_larger(larger, Judged(best, np.zeros(100)), level) == sure
+
+
+def with_gap(table: PushTable) -> PushTable:
+    """Pushes whose gap is the error of the tracker at the contact, which also shifts their outcomes."""
+    push = np.unique(table.push_id, return_inverse=True)[1]
+    gap = 2e-4 * np.random.default_rng(9).standard_normal(len(table.pushes))[push]
+    gap += 2e-5 * np.random.default_rng(10).standard_normal(len(table))
+    outcomes = table.outcomes + np.outer(gap, [1.5, 0.0, 0.0])
+    return replace(table, outcomes=outcomes, covariates={**table.covariates, "contact_gap": gap})
+
+
+def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outcome() -> None:
+    """With single windows of its pushes training shows no gap without the window's own noise."""
+    training, later = with_gap(pushes(120, 1)), with_gap(pushes(120, 7))
+    model = train_model(training, square_rig(), "analytical", name="deployed")
+    single = replace(model, training=training.take(np.unique(training.push_id, return_index=True)[1]))
+    names = ["contact_gap", "elapsed_time"]
+    same = motion_effects(model, evidence_of(model, with_instrument(later)), 0.01, names)
+    unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
+    assert not same.terms and not same.uncompared
+    assert not unknown.terms and unknown.uncompared == ("contact_gap",)
+    plain = replace(training, outcomes=pushes(120, 1).outcomes)
+    new = replace(model, training=plain)
+    (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
+    assert term.best.covariate == "contact_gap"

@@ -42,8 +42,9 @@ class MotionFinding:
     terms: in the order of selection. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
-    confounded: covariates that were not tried, because the inputs explain them. remaining: the strongest significant
-    candidate after all terms.
+    confounded: covariates that were not tried, because the inputs explain them. uncompared: because they share noise
+    with the residual, and training does not show how much. remaining: the strongest significant candidate after all
+    terms.
     """
 
     terms: tuple[SelectedTerm, ...]
@@ -57,6 +58,7 @@ class MotionFinding:
     variance: tuple[VarianceEffect, ...]
     unchanged: tuple[Label, ...]
     confounded: tuple[str, ...]
+    uncompared: tuple[str, ...] = ()
 
 
 NO_MOTION = MotionFinding((), (), (), (), None, {}, None, Experiment(), (), (), ())
@@ -79,7 +81,8 @@ def motion_effects(
     inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    candidates = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
+    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
+    candidates = [c for c in every if not baseline.lacks(c.covariate)]
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
     found = replace(found, terms=with_fitting_names(needed_terms(found.terms, evidence)))
     if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
@@ -102,6 +105,7 @@ def motion_effects(
         variance=tuple(replace(s, p_value=min(1.0, s.p_value / VARIANCE_SHARE)) for s in notable),
         unchanged=_unchanged(found),
         confounded=tuple(confounded(evidence, names, inputs)),
+        uncompared=tuple(dict.fromkeys(c.covariate for c in every if baseline.lacks(c.covariate))),
     )
 
 

@@ -55,6 +55,12 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"Not tested: {names}. Contact point, push angle and speed predict them in these pushes. "
             f"To test them, randomise the order of the pushes."
         )
+    if motion.uncompared:
+        names = listed([covariate_phrase(name) for name in motion.uncompared])
+        notes.append(
+            f"Not tested: {names}. Its noise is also that of the outcome. How both are related without a change, only "
+            f"training pushes of several windows show, and the model has too few."
+        )
     if rivals := motion.experiment.inseparable:
         names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])
         notes.append(

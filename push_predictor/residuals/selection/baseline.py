@@ -49,6 +49,10 @@ class Baseline:
         own = candidate.kind == "constant" or (candidate.kind == "speed" and self.inputs.knows_speed)
         return (own and self.inputs.learnt) or candidate.covariate in LOCAL
 
+    def lacks(self, covariate: str) -> bool:
+        """Whether a covariate shares noise with the residual, but training does not show how much."""
+        return covariate in LOCAL and covariate not in self.evidence.table.covariates
+
     def compares(self, candidate: Candidate) -> bool:
         """Whether a candidate may have acted in training too, because its covariate has a value there.
 
