@@ -154,3 +154,20 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
     assert term.best.covariate == "contact_gap"
+
+
+def test_one_sided_pushes_are_compared_with_training_pushes_on_this_side(deployed: PushModel) -> None:
+    later, kept = pushes(120, 7), deployed.training.inputs[:, 1]
+    mechanics = evidence_of(deployed, later).mechanics
+    on_side = later.inputs[later.inputs[:, 1] < 0.25]
+    one_sided = baseline_of(deployed, mechanics, on_side).evidence.table
+    assert 0.15 * len(kept) < len(one_sided) < 0.4 * len(kept)
+    assert np.sum(one_sided.inputs[:, 1] < 0.22) == np.sum(kept < 0.22)
+    assert np.all((one_sided.inputs[:, 1] < 0.3) | (one_sided.inputs[:, 1] > 0.95))
+
+
+def test_training_is_compared_as_a_whole_with_pushes_everywhere_and_with_pushes_elsewhere(deployed: PushModel) -> None:
+    later = pushes(120, 7)
+    mechanics, faster = evidence_of(deployed, later).mechanics, later.inputs * [5.0, 1.0, 1.0]
+    for inputs in (later.inputs, faster):
+        assert len(baseline_of(deployed, mechanics, inputs).evidence.table) == len(deployed.training)

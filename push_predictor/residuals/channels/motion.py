@@ -78,7 +78,8 @@ def motion_effects(
     inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: its noise is not
     judged, and an error that depends on the inputs alone is no effect.
     """
-    inputs, baseline = inputs_basis(model, evidence.table), baseline_of(model, evidence.mechanics)
+    inputs = inputs_basis(model, evidence.table)
+    baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
     every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]

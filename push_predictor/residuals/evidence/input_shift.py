@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.geometry.outline import Outline
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -15,6 +14,7 @@ SPEED_MARGIN = 0.15  # relative: speeds are estimated from few samples
 ANGLE_MARGIN = 0.1  # rad
 CONTACT_MARGIN = 0.03  # of the perimeter
 WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
+ONE_SIDED = 0.2  # share of training outside the new inputs from which it is compared only where these lie
 NOTABLE = 0.05  # share of the windows outside from which an input has shifted
 
 
@@ -39,12 +39,7 @@ class InputShift:
 def input_shift(model: PushModel, table: PushTable) -> InputShift:
     """Compare the inputs of n new windows with those of a model's training windows."""
     training = model.training.inputs
-    outline = model.rig.outline
-    outside = {
-        "velocity": _beyond(table.inputs[:, 0], training[:, 0], SPEED_MARGIN * float(training[:, 0].max())),
-        "contact": _apart(outline, table.inputs[:, 1], training[:, 1]),
-        "angle": _beyond(table.inputs[:, 2], training[:, 2], ANGLE_MARGIN),
-    }
+    outside = _outside(table.inputs, training, model.rig.outline.rotational_symmetry)
     shifted = [
         ShiftedInput(name, _range(training[:, k]), _range(table.inputs[:, k]), float(outside[name].mean()))
         for k, name in enumerate(outside)
@@ -57,13 +52,30 @@ def input_shift(model: PushModel, table: PushTable) -> InputShift:
     return InputShift(tuple(shifted), rows)
 
 
+def among(inputs: Array, others: Array) -> BoolArray:
+    """Which of n inputs (n, 3) lie among others, on the same sides of the outline; all, if nearly all do.
+
+    The sides of a real slider differ, although a model takes symmetric ones for the same.
+    """
+    outside = np.any(list(_outside(inputs, others, 1).values()), axis=0)
+    return ~outside if outside.mean() >= ONE_SIDED else np.ones(len(inputs), dtype=np.bool_)
+
+
+def _outside(inputs: Array, known: Array, symmetry: int) -> dict[str, BoolArray]:
+    """By input, which of n inputs (n, 3) lie outside the known ones; symmetry: of the outline, 0 for a circle."""
+    return {
+        "velocity": _beyond(inputs[:, 0], known[:, 0], SPEED_MARGIN * float(known[:, 0].max())),
+        "contact": _apart(symmetry, inputs[:, 1], known[:, 1]),
+        "angle": _beyond(inputs[:, 2], known[:, 2], ANGLE_MARGIN),
+    }
+
+
 def _beyond(values: Array, known: Array, margin: float) -> BoolArray:
     return np.asarray((values < known.min() - margin) | (values > known.max() + margin))
 
 
-def _apart(outline: Outline, contact: Array, known: Array) -> BoolArray:
-    """Contacts (n,) far from every known one; the symmetry that a model folds is folded here too."""
-    order = outline.rotational_symmetry
+def _apart(order: int, contact: Array, known: Array) -> BoolArray:
+    """Contacts (n,) far from every known one; the order of symmetry that a model folds is folded here too."""
     if order == 0:
         return np.zeros(len(contact), dtype=np.bool_)
     places = np.sort(np.mod(known * order, 1.0))

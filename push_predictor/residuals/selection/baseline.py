@@ -21,6 +21,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.enumeration import usable
 from push_predictor.residuals.candidates.nuisance import Nuisance
 from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
+from push_predictor.residuals.evidence.input_shift import among
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for, inputs_basis
 from push_predictor.residuals.evidence.instrument import with_instrument
 from push_predictor.residuals.evidence.loading import previous_residual, with_inputs
@@ -28,6 +29,8 @@ from push_predictor.residuals.evidence.residualizer import ResidualBlocks
 from push_predictor.residuals.evidence.standardised import Evidence, whitened_response, whitener_of
 from push_predictor.residuals.selection.screening import TINY, Controlled, Scores, Screened, raw_scores, screen
 from push_predictor.types import Array
+
+FEWEST_COMPARED = 30  # training pushes among the new inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +117,21 @@ class Baseline:
         return {}
 
 
-def baseline_of(model: PushModel, mechanics: Mechanics) -> Baseline:
-    """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps."""
+def baseline_of(model: PushModel, mechanics: Mechanics, inputs: Array | None = None) -> Baseline:
+    """The baseline of a model, by leave-one-push-out predictions of the training windows that it keeps.
+
+    inputs (n, 3): of the new windows. If these leave out a part of training's inputs, this part is not compared, as
+    long as enough is left: the error of a learnt base depends on the inputs, and the sides of a slider differ.
+    """
     table, predictor = with_instrument(with_inputs(model.training)), model.predictor.with_independent_outputs()
     mean, covariance, _ = replace(model, predictor=predictor).held_out_moments()
     evidence = Evidence(table, table.outcomes - mean, whitener_of(covariance), mechanics)
     before = {"previous_residual": previous_residual(table, evidence.z)}
     evidence = replace(evidence, table=replace(table, covariates={**table.covariates, **before}))
-    return Baseline(evidence, inputs_basis(model, table))
+    rows = np.ones(len(table), dtype=np.bool_) if inputs is None else among(table.inputs, inputs)
+    if len(np.unique(table.push_id[rows])) < FEWEST_COMPARED:
+        rows[:] = True
+    return Baseline(evidence.take(rows), inputs_basis(model, table.take(rows)))
 
 
 def raised(screened: Screened, changes: Mapping[int, Scores], seed: int) -> Screened:
