@@ -63,8 +63,10 @@ def test_outcome_of_a_verdict(result: dict[str, Any], outcome: str) -> None:
     assert outcome_of(TRUTH, result) == outcome
 
 
-def test_only_undecided_verdicts_are_continued(tmp_path: Path) -> None:
-    for name, result in (("000", verdict("a", "b")), ("001", verdict("a")), ("002", {"failed": "x"})):
+def test_only_undecided_effects_on_the_mean_of_the_motion_are_continued(tmp_path: Path) -> None:
+    measured, noise = verdict("a", "b", channel="measurement"), verdict("a", "b", kind="variance")
+    every = (verdict("a", "b"), verdict("a"), {"failed": "x"}, measured, noise)
+    for name, result in zip(("000", "001", "002", "003", "004"), every, strict=True):
         (tmp_path / f"{name}.json").write_text(json.dumps(result))
     assert undecided_of(tmp_path) == ["000"]
 
