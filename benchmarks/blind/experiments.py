@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def undecided_of(results: Path) -> list[str]:
-    """Names of the recordings with an undecided effect on the mean of the motion; pushes are proposed only for these."""
+    """Recordings with an undecided effect on the mean of the motion; pushes are proposed only for these."""
     found = {path.stem: json.loads(path.read_text()) for path in sorted(results.glob("*.json"))}
     return [name for name, one in found.items() if one.get("undecided") and _of_mean(one)]
 
