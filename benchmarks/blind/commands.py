@@ -64,8 +64,8 @@ def run(options: argparse.Namespace) -> None:
 def oracle(options: argparse.Namespace) -> None:
     """Add the gain of an oracle to every truth."""
     apart(options.data, options.truth)
-    todo = [(path, options.data) for path in sorted(options.truth.glob("*.json"))]
-    _all(_oracle_kept, [call for call in todo if "oracle_gain" not in json.loads(call[0].read_text())], options.cores)
+    every = sorted(options.truth.glob("*.json"))
+    _all(_oracle_kept, [(path, options.data) for path in every if _lacks_oracle(path)], options.cores)
 
 
 def removed(options: argparse.Namespace) -> None:
@@ -135,6 +135,12 @@ def _make_kept(number: int, size: Size, options: argparse.Namespace) -> None:
 def _trace_kept(name: str, options: argparse.Namespace) -> None:
     verdict = trace_one(options.data / name, options.alpha, options.without)
     _write(options.out / f"{name}.json", verdict)
+
+
+def _lacks_oracle(truth: Path) -> bool:
+    """Whether a truth has no gain of an oracle, or one of an older version, without that over a trace's reference."""
+    known = json.loads(truth.read_text())
+    return "oracle_gain" not in known or "traced" not in (known["oracle_gain"] or {"traced": None})
 
 
 def _oracle_kept(truth: Path, data: Path) -> None:

@@ -4,11 +4,11 @@
     python -m benchmarks.blind run --data blind/data --out blind/results
     python -m benchmarks.blind.experiments --data blind/data --truth blind/truth --results blind/results --out more
 
-For each recording with an undecided verdict, the same rig with the same hidden effect is pushed on twice: with the
-pushes that its trace proposes, and with as many random ones. Each continuation is written as a recording, and traced
-with --and. A verdict is settled if one covariate remains, and settled right if the effect depends on that one. The rig
-and its effect are drawn again from the seed, so --training, --least and --most must be those of `make`. An interrupted
-run continues.
+For each recording with an undecided effect on the mean of the motion, the same rig with the same hidden effect is
+pushed on twice: with the pushes that its trace proposes, and with as many random ones. Each continuation is written
+as a recording, and traced with --and. A verdict is settled if one covariate remains, and settled right if the effect
+depends on that one. The rig and its effect are drawn again from the seed, so --training, --least and --most must be
+those of `make`. An interrupted run continues.
 """
 
 from __future__ import annotations

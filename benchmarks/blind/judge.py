@@ -170,9 +170,9 @@ def _decidable(truth: Json) -> bool:
 
 
 def _share(truth: Json, result: Json, failed: bool) -> float | None:
-    """Share of the oracle's gain if that is at least MEDIUM and certain; an unchanged model gains nothing.
+    """Share of the oracle's gain; None if that is below MEDIUM over the refit, or if it would not extend the model.
 
-    Both gains are over the better of the deployed model and the refit.
+    Both gains are over the better of the deployed model and the refit. An unchanged model gains nothing.
     """
     oracle = truth.get("oracle_gain")
     if oracle is None or -oracle["value"] < MEDIUM or oracle["traced"]["high"] >= 0.0:

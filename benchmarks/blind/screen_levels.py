@@ -62,8 +62,9 @@ class _Design:
 def _design(model: PushModel, table: PushTable) -> _Design:
     analysis = with_instrument(table).take(~held_out_rows(table))
     evidence, inputs = evidence_of(model, analysis), inputs_basis(model, analysis)
-    candidates = tuple(candidates_of(evidence, None, inputs))
-    return _Design(evidence, inputs, baseline_of(model, evidence.mechanics), candidates)
+    baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
+    candidates = tuple(c for c in candidates_of(evidence, None, inputs) if not baseline.lacks(c.covariate))
+    return _Design(evidence, inputs, baseline, candidates)
 
 
 def _smallest(design: _Design, rng: np.random.Generator, draws: int) -> Iterator[float]:

@@ -60,8 +60,8 @@ def test_name_must_fit_along_every_covariate_that_may_drive_it() -> None:
     assert names(other)[0] == ("contact_friction", None)
 
 
-def test_name_stays_if_the_rest_is_small() -> None:
-    """At most 15 % of both gains, as along the mechanism's own covariate."""
+def test_name_is_withdrawn_from_a_rest_of_15_percent() -> None:
+    """It stays with at most 15 % of both gains, as along the mechanism's own covariate."""
     small, large = ([term("tilted_surface", "push_index", 85.0), term(None, "slider_heading", g)] for g in (14.0, 16.0))
     assert names(small)[0] == SLOPE
     assert names(large)[0] == UNKNOWN_SLOPE

@@ -241,7 +241,7 @@ def _objective(residual: Array, ridge: Array, coefficients: Array) -> float:
 
 
 def _groups(values: Array) -> IntArray:
-    """Groups (n,) of equal size of windows with similar values; of angles, left and right slip are apart."""
+    """At most GROUPS groups (n,) of windows with similar values, of about equal size; left and right slip are apart."""
     return np.searchsorted(np.quantile(values, np.arange(1, GROUPS) / GROUPS), values)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
@@ -42,8 +43,8 @@ class MotionFinding:
     terms: in the order of selection. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
-    confounded: covariates that were not tried, because the inputs explain them. uncompared: because they share noise
-    with the residual, and training does not show how much. remaining: the strongest significant candidate after all
+    confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
+    not show how the outcome depends on them without a change. remaining: the strongest significant candidate after all
     terms.
     """
 
@@ -84,10 +85,13 @@ def motion_effects(
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
     every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
     candidates = [c for c in every if not baseline.lacks(c.covariate)]
+    if not candidates:
+        raise RequestError("covariate", ", ".join(names or ()), "one that training recorded, too")
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
-    found = replace(found, terms=with_fitting_names(needed_terms(found.terms, evidence)))
+    found = replace(found, terms=needed_terms(found.terms, evidence))
     if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
         found = climbed(found, ForwardSelection(TermChoice(evidence, found.candidates, inputs, seed), share, baseline))
+    found = replace(found, terms=with_fitting_names(found.terms))  # last: the ladder may explain what a name leaves
     spread = _spread(model, evidence.take(known), found.unexplained[known], alpha, names, seed, baseline)
     notable = tuple(s for s in spread.found if not 1.0 / NOTABLE < s.ratio < NOTABLE)
     first = found.terms[0] if found.terms else None

@@ -47,7 +47,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"On held-out training pushes the standardised residuals of dx, dy and dtheta have standard deviations "
             f"{values}; a calibrated model has 1."
         )
-    if own := [effect_phrase(*term.best.label) for term in motion.terms if term.own]:
+    if own := [effect_phrase(term.mechanism, term.best.covariate) for term in motion.terms if term.own]:
         notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
@@ -58,8 +58,8 @@ def _of_motion(motion: MotionFinding) -> list[str]:
     if motion.uncompared:
         names = listed([covariate_phrase(name) for name in motion.uncompared])
         notes.append(
-            f"Not tested: {names}. Its noise is also that of the outcome. How both are related without a change, only "
-            f"training pushes of several windows show, and the model has too few."
+            f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
+            f"they lack the covariate, or have too few windows per push."
         )
     if rivals := motion.experiment.inseparable:
         names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])

@@ -53,7 +53,7 @@ class Baseline:
         return (own and self.inputs.learnt) or candidate.covariate in LOCAL
 
     def lacks(self, covariate: str) -> bool:
-        """Whether a covariate shares noise with the residual, but training does not show how much."""
+        """Whether a covariate is local to a push, and training does not show its relation with the residual."""
         return covariate in LOCAL and covariate not in self.evidence.table.covariates
 
     def compares(self, candidate: Candidate) -> bool:
