@@ -15,6 +15,7 @@ from push_predictor.models.train import train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.candidates.enumeration import candidates_of
+from push_predictor.residuals.channels import motion
 from push_predictor.residuals.channels.motion import motion_effects
 from push_predictor.residuals.evidence.drivers import standard_basis
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
@@ -171,3 +172,23 @@ def test_training_is_compared_as_a_whole_with_pushes_everywhere_and_with_pushes_
     mechanics, faster = evidence_of(deployed, later).mechanics, later.inputs * [5.0, 1.0, 1.0]
     for inputs in (later.inputs, faster):
         assert len(baseline_of(deployed, mechanics, inputs).evidence.table) == len(deployed.training)
+
+
+def test_name_of_a_mechanism_stays_if_the_ladder_explains_what_it_leaves(
+    deployed: PushModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Several parameters that are wrong at once look like one of them and an unknown rest, until all are fitted."""
+    table = pushes(60, 3)
+    evidence = evidence_of(deployed, table)
+    friction = chosen(evidence, "contact_friction", "elapsed_time")
+    friction = replace(friction, rivals=(Judged(friction.best, np.array([100.0])),))
+    unknown = replace(
+        friction, best=replace(friction.best, mechanism=None), naming=Naming(("elapsed_time",), (None,), False, 1.0)
+    )
+    before = searched(deployed, table, ["elapsed_time"])
+    monkeypatch.setattr(motion, "search", lambda *_, **__: replace(before, terms=(friction, unknown)))
+    monkeypatch.setattr(motion, "needed_terms", lambda terms, _: terms)
+    monkeypatch.setattr(motion, "climbed", lambda found, _: replace(found, terms=found.terms[:1]))
+    assert [t.mechanism for t in motion_effects(deployed, evidence, 0.01).terms] == ["contact_friction"]
+    monkeypatch.setattr(motion, "climbed", lambda found, _: found)
+    assert [t.mechanism for t in motion_effects(deployed, evidence, 0.01).terms] == [None, None]
