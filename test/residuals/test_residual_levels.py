@@ -9,6 +9,7 @@ import pytest
 from made_up_traces import DRIFT, planted, pushes, slippery
 from synthetic import square_rig
 
+from push_predictor.errors import RequestError
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
@@ -151,6 +152,9 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
     unknown = motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, names)
     assert not same.terms and not same.uncompared
     assert not unknown.terms and unknown.uncompared == ("contact_gap",)
+    with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
+        outside = np.zeros(len(later), dtype=np.bool_)
+        motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, ["contact_gap"], inside=outside)
     plain = replace(training, outcomes=pushes(120, 1).outcomes)
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms
