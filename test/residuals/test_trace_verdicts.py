@@ -19,13 +19,13 @@ from push_predictor.models.train_learnt import MeanChoice
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
-from push_predictor.residuals.channel_search import search_channels
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding
 from push_predictor.residuals.channels.variance import VarianceEffect
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WrenchEffect, WrenchFinding
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Sized, Trace
+from push_predictor.residuals.question import Question
 from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.page import write_trace_report
 from push_predictor.residuals.reporting.trace_json import trace_json
@@ -211,7 +211,7 @@ def test_the_gap_of_pushes_of_one_window_is_rejected_by_name() -> None:
     _, first = np.unique(whole.table.push_id, return_index=True)
     single = LoadedData(whole.table.take(np.sort(first)), None, whole.rig)
     with pytest.raises(RequestError, match=r"contact_gap.*pushes of several windows"):
-        search_channels(learnt(), single, covariates=["contact_gap"])
+        Question.of(learnt(), single, covariates=["contact_gap"])
 
 
 def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> None:
