@@ -25,8 +25,9 @@ from push_predictor.models.train_learnt import MEANS
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.residuals.channel_search import Searched, search_channels
+from push_predictor.residuals.channel_search import Searched, search_all
 from push_predictor.residuals.evidence.loading import LoadedData, cut_again
+from push_predictor.residuals.question import Question
 from push_predictor.simulation.rig_simulator import simulate
 from push_predictor.simulation.spec import SimulationSpec
 
@@ -108,7 +109,7 @@ def _found(model: PushModel, loaded: LoadedData) -> dict[str, list[str]]:
     """What is found at each level; a smaller level is tried only where the larger one found something."""
     found: dict[str, list[str]] = {}
     for alpha in ALPHAS:
-        found[str(alpha)] = _names(search_channels(model, loaded, alpha=alpha))
+        found[str(alpha)] = _names(search_all(Question.of(model, loaded, alpha)))
         if not found[str(alpha)]:
             break
     return found

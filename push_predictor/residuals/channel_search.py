@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from push_predictor.evaluation.offline import window_options
-from push_predictor.models.push_model import PushModel
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
 from push_predictor.residuals.channels.motion import NO_MOTION, MotionFinding, motion_effects
 from push_predictor.residuals.channels.wrench import NO_WRENCH, WRENCH_BIAS, WrenchFinding, wrench_effects
-from push_predictor.residuals.evidence.loading import LoadedData, corrected_data
+from push_predictor.residuals.evidence.loading import corrected_data
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.question import Question
@@ -23,20 +21,8 @@ from push_predictor.residuals.question import Question
 BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
 
 
-def search_channels(
-    model: PushModel,
-    loaded: LoadedData,
-    *,
-    alpha: float = 0.01,
-    covariates: Sequence[str] | None = None,
-    seed: int = 0,
-) -> Searched:
-    """Search the windows like `trace`, but extend no model and open no held-out pushes."""
-    return search_all(Question.of(model, loaded, alpha, covariates, seed), no_watch)
-
-
-def search_all(question: Question, watch: Watch) -> Searched:
-    """What is found on each channel; watch: see `trace`."""
+def search_all(question: Question, watch: Watch = no_watch) -> Searched:
+    """What is found on each channel, before a model is extended or a held-out push is opened; watch: see `trace`."""
     model, analysis, seed = question.model, question.windows, question.seed
     watch("measurement", 0.1)
     measured = measurement_errors(analysis, model.training, question.loaded.rig, question.share("measurement"), seed)

@@ -42,7 +42,12 @@ class Question:
 
     @classmethod
     def of(
-        cls, model: PushModel, loaded: LoadedData, alpha: float, covariates: Sequence[str] | None, seed: int
+        cls,
+        model: PushModel,
+        loaded: LoadedData,
+        alpha: float = 0.01,
+        covariates: Sequence[str] | None = None,
+        seed: int = 0,
     ) -> Question:
         """Predict all windows, add the previous push's residual to their covariates, and split them."""
         _check(model, loaded.table, alpha, covariates)

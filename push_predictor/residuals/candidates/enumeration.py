@@ -74,7 +74,7 @@ def _of_mechanism(
     response = whitened_response(evidence, mechanism)
     found = []
     for covariate, basis in bases:
-        if covariate in HEADINGS and _headed(mechanism):
+        if covariate in HEADINGS and headed(mechanism):
             continue  # times the heading, it would be an effect fixed to the body under a wrong name
         driver = _constant_driver(mechanism, response, inputs) if covariate == CONSTANT else covariate
         values = basis.values(evidence.table.covariates, len(evidence.table))
@@ -97,7 +97,7 @@ def _with_nuisance(found: Sequence[Candidate], evidence: Evidence, inputs: Input
 
 
 def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis | None) -> str:
-    if _headed(mechanism):
+    if headed(mechanism):
         return HEADED
     if inputs is None or not inputs.folds:
         return CONSTANT
@@ -105,5 +105,6 @@ def _constant_driver(mechanism: str | None, response: Array, inputs: InputsBasis
     return SIDES if outside > OUTSIDE else CONSTANT
 
 
-def _headed(mechanism: str | None) -> bool:
+def headed(mechanism: str | None) -> bool:
+    """Whether the response of a mechanism depends on the slider's heading."""
     return mechanism is not None and "slider_heading" in mechanism_named(mechanism).needs

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from push_predictor.models.effects.covariate_range import HEADINGS
-from push_predictor.models.effects.effect import mechanism_named
+from push_predictor.residuals.candidates.enumeration import headed
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.selection.naming import MOST_UNEXPLAINED
 from push_predictor.residuals.selection.term_choice import SelectedTerm
@@ -54,6 +54,4 @@ def _closest(term: SelectedTerm) -> str | None:
 
 def _dependence(term: SelectedTerm) -> set[str]:
     """The covariates that a term may depend on: its possible drivers, and those of its mechanism's response."""
-    mechanism = _closest(term)
-    turns = mechanism is not None and "slider_heading" in mechanism_named(mechanism).needs
-    return {*term.naming.drivers, *(HEADINGS if turns else ())}
+    return {*term.naming.drivers, *(HEADINGS if headed(_closest(term)) else ())}

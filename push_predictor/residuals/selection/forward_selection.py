@@ -20,11 +20,11 @@ from push_predictor.residuals.selection.term_choice import SelectedTerm, TermCho
 from push_predictor.types import Array
 
 MOST_TERMS = 3
-UNKNOWN = (None, CONSTANT)  # what a polynomial leaves of an earlier unknown effect, rather than an effect
 OWN = 2  # rank of effects in the base's own inputs, after those of a covariate (0) and those local to a push (1)
 CHANGED = 0.05  # p from which a constant effect that an analytical base lacks is a change since training
 HOPELESS = 0.5  # p from which nothing can be significant
 OBVIOUS, SURE = 30.0, 3.5  # nats, cross-validated, and in standard errors: a few pushes far off gain as much
+UNKNOWN = (None, CONSTANT)  # what a polynomial leaves of an earlier unknown effect, rather than an effect
 DWARFED = 12.0  # ratio of gains from which an effect in the base's own inputs is selected first
 
 

@@ -30,7 +30,7 @@ from push_predictor.models.mechanisms import LIBRARY, REFINEMENTS, Mechanism
 from push_predictor.models.train import training_rows
 from push_predictor.residuals.candidates.candidate import Candidate, candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
-from push_predictor.residuals.candidates.enumeration import HEADED
+from push_predictor.residuals.candidates.enumeration import HEADED, headed
 from push_predictor.residuals.candidates.parameter_changes import ParameterChanges
 from push_predictor.residuals.evidence.drivers import CONSTANT
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -118,7 +118,7 @@ def further_steps(terms: Sequence[SelectedTerm], selection: ForwardSelection) ->
 def _constants(evidence: Evidence) -> list[Candidate]:
     """Constant changes by every mechanism that these windows can show."""
     return [
-        candidate(evidence, m.name, HEADED if "slider_heading" in m.needs else CONSTANT, DriverBasis("constant"))
+        candidate(evidence, m.name, HEADED if headed(m.name) else CONSTANT, DriverBasis("constant"))
         for m in (*LIBRARY, *REFINEMENTS)
         if _shows(evidence, m)
     ]
