@@ -105,6 +105,10 @@ WORLD = {
     ),
     "grain_x": (0.2, Changes(grain=lambda moment: np.tile([0.2, 0.0], (N, 1)))),
     "grain_diagonal": (0.2, Changes(grain=lambda moment: np.tile([0.0, 0.2], (N, 1)))),
+    "much body_anisotropy": (
+        0.75,
+        Changes(grain=lambda moment: rotate(np.tile([0.75, 0.0], (N, 1)), 2.0 * moment.pose[:, 2])),
+    ),
     "slope_x": (0.5, Changes(pull=lambda moment: np.tile([0.5 * WEIGHT, 0.0, 0.0], (N, 1)))),
     "slope_y": (0.2, Changes(pull=lambda moment: np.tile([0.0, 0.2 * WEIGHT, 0.0], (N, 1)))),
 }
@@ -115,9 +119,9 @@ WORLD = {
 def test_large_effects_in_the_simulator_are_those_of_the_parameter(name: str) -> None:
     (value, changes), pushes = WORLD[name], plan(N)
     truth = simulated(RIM, pushes, changes)
-    with_it, without = (relative_error(predicted(RIM, pushes, v), truth) for v in ({name: value}, {}))
-    assert with_it < 0.04  # direction-dependent friction changes the shape of the surface, which is left out
-    assert with_it < 0.3 * without
+    with_it, without = (relative_error(predicted(RIM, pushes, v), truth) for v in ({name.split()[-1]: value}, {}))
+    assert with_it < (0.05 if name.startswith("much") else 0.01)  # the shape of the surface is linear in the stretch
+    assert with_it < 0.1 * without
 
 
 @pytest.mark.slow

@@ -7,8 +7,9 @@ import pytest
 from forward_pushes import SQUARE
 from supports import THREE_POINTS
 
+from push_predictor.models.mechanics.limit_surfaces.direction_dependence import root_of
 from push_predictor.models.mechanics.limit_surfaces.load_map import load_map
-from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface, root_of
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
 from push_predictor.models.mechanics.limit_surfaces.point_friction import load_of_twist
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import row_surfaces
 from push_predictor.models.mechanics.pressure import patch
@@ -36,7 +37,7 @@ def test_stretched_surface_is_near_the_sum_of_direction_dependent_point_friction
     found = np.stack(loaded.twist(slice(None), *f.sum(axis=1).T, moment), axis=1)
     wanted = draw * [1.0, 1.0, surface.length]
     plain = np.stack(surface.twist(*f.sum(axis=1).T, moment), axis=1)
-    share = {"patch": 0.3, "three": 0.5}[kind]  # three points keep their place on the table, not their flats
+    share = {"patch": 0.12, "three": 0.5}[kind]  # three points keep the shape of their surface
     assert np.mean(_angle(found, wanted)) < share * np.mean(_angle(plain, wanted))
 
 

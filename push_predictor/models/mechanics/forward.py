@@ -15,8 +15,9 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline, Projection
+from push_predictor.models.mechanics.limit_surfaces.direction_dependence import Root, root_of
 from push_predictor.models.mechanics.limit_surfaces.load_map import LoadMap, load_map
-from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface, Root, root_of
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import LoadedSurface
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
     PushSurfaces,
     RowSurfaces,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from push_predictor.models.mechanics.limit_surfaces.direction_dependence import stretched_arms
 from push_predictor.models.mechanics.limit_surfaces.point_friction import power_of_twist, twist_of_load
 from push_predictor.models.mechanics.limit_surfaces.surfaces import spread_by_direction
 from push_predictor.models.mechanics.pressure import PressureDistribution
@@ -17,6 +18,10 @@ AZIMUTHS, ELEVATIONS = 144, 49  # of the force's direction, and of the moment fr
 REFINED = 3  # a smooth surface is solved at every third node and interpolated by cubic splines
 SMOOTH_POINTS = 20  # with fewer points of support the surface has flats, and every node is solved
 BEYOND = 3  # coarse nodes beyond both ends of the elevation, for the splines
+STRETCH_STEP = 0.5  # of the friction's direction dependence: secants across it are right to 7 % of its effect
+STRETCH_REFINED = 2  # times fewer nodes for the secants
+
+StretchOf: TypeAlias = tuple[Array, Array] | None  # a, b (n,) of the loads' rows, see direction_dependence
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,7 @@ class LoadMap:
     nodes (ELEVATIONS, AZIMUTHS + 1, 4): unit twists (vx, vy, w times length) of loads with that azimuth of their force
     and that elevation of moment / length over force, and the size of the load on the surface. A load with a negative
     moment has the opposite twist of its opposite. centre (2,) m, length m, square (3,) m^2 and reach: see LimitSurface.
+    centred: the distribution about its centre.
     """
 
     nodes: Array
@@ -33,6 +39,7 @@ class LoadMap:
     length: float
     square: Array
     reach: Array
+    centred: PressureDistribution
 
     @cached_property
     def cells(self) -> Array:
@@ -44,13 +51,42 @@ class LoadMap:
         """Per cell of the table, the bilinear polynomial of the size of the load, (4, cells)."""
         return _polynomials(self.nodes[:, :, 3:])
 
+    @cached_property
+    def cell_slopes(self) -> Array:
+        """Change of `cells` per unit of a and of b of direction-dependent friction, (2, 12, cells)."""
+        return np.stack([_polynomials(slope[:, :, :3]) for slope in self._stretched])
+
+    @cached_property
+    def size_slopes(self) -> Array:
+        """The same of `sizes`, (2, 4, cells)."""
+        return np.stack([_polynomials(slope[:, :, 3:]) for slope in self._stretched])
+
+    @cached_property
+    def _stretched(self) -> tuple[Array, Array]:
+        """Change of the nodes per unit of a and of b; takes as long as load_map.
+
+        None for few points of support: the flats and edges of their surfaces move, and a blend would not be convex.
+        """
+        if _every(self.centred) == 1:
+            return np.zeros_like(self.nodes), np.zeros_like(self.nodes)
+        every = _every(self.centred) * STRETCH_REFINED
+
+        def nodes(a: float, b: float) -> Array:
+            shape = stretched_arms(self.centred, a, b)
+            return _refined(_solved(shape, shape.length, every), every)
+
+        h = STRETCH_STEP
+        return (nodes(h, 0.0) - nodes(-h, 0.0)) / (2.0 * h), (nodes(0.0, h) - nodes(0.0, -h)) / (2.0 * h)
+
     def twist(self, force_x: Array, force_y: Array, moment: Array) -> tuple[Array, Array, Array]:
         """See LimitSurface."""
-        return interpolated(self.cells, 0, place_of(force_x, force_y, moment))
+        place = place_of(force_x, force_y, moment)
+        return interpolated(self.cells.take(place.cell, axis=1), place)
 
     def gauge(self, force_x: Array, force_y: Array, moment: Array) -> Array:
         """See LimitSurface."""
-        return interpolated_gauge(self.sizes, 0, place_of(force_x, force_y, moment))
+        place = place_of(force_x, force_y, moment)
+        return interpolated_gauge(self.sizes.take(place.cell, axis=1), place)
 
 
 def load_map(pressure: PressureDistribution) -> LoadMap:
@@ -60,9 +96,9 @@ def load_map(pressure: PressureDistribution) -> LoadMap:
     (x, y), shares = centred.points.T, centred.shares
     square = np.array([shares @ (x * x), shares @ (x * y), shares @ (y * y)])
     square += [pressure.spread**2, 0.0, pressure.spread**2]
-    every = REFINED if len(pressure.points) >= SMOOTH_POINTS else 1
+    every = _every(centred)
     reach = spread_by_direction(centred.points, shares)
-    return LoadMap(_refined(_solved(centred, length, every), every), centre, length, square, reach)
+    return LoadMap(_refined(_solved(centred, length, every), every), centre, length, square, reach, centred)
 
 
 class Place(NamedTuple):
@@ -75,18 +111,17 @@ class Place(NamedTuple):
     up: Array
 
 
-def interpolated(cells: Array, first: IntArray | int, place: Place) -> tuple[Array, Array, Array]:
-    """Twists (n,) each, from tables in `cells` that begin at the cell `first`; linear in the size of the load."""
-    sign, size, cell, right, up = place
-    part, both, size = cells.take(first + cell, axis=1), right * up, sign * size
+def interpolated(part: Array, place: Place) -> tuple[Array, Array, Array]:
+    """Twists (n,) each, from the polynomials (12, n) of their cells; linear in the size of the load."""
+    sign, size, _, right, up = place
+    both, size = right * up, sign * size
     vx, vy, spin = (size * (part[k] + right * part[k + 3] + up * part[k + 6] + both * part[k + 9]) for k in range(3))
     return vx, vy, spin
 
 
-def interpolated_gauge(sizes: Array, first: IntArray | int, place: Place) -> Array:
-    """Sizes (n,) of loads in units of the load on the limit surface in the same direction."""
-    _, size, cell, right, up = place
-    part = sizes.take(first + cell, axis=1)
+def interpolated_gauge(part: Array, place: Place) -> Array:
+    """Sizes (n,) of loads in units of the load on the limit surface in the same direction; part (4, n)."""
+    _, size, _, right, up = place
     return np.asarray(size / (part[0] + right * part[1] + up * part[2] + right * up * part[3]))
 
 
@@ -102,6 +137,10 @@ def place_of(force_x: Array, force_y: Array, moment: Array) -> Place:
     np.minimum(column, AZIMUTHS - 1, out=column)
     np.minimum(row, ELEVATIONS - 2, out=row)
     return Place(sign, np.sqrt(force * force + m * m), row * AZIMUTHS + column, turn - column, rise - row)
+
+
+def _every(pressure: PressureDistribution) -> int:
+    return REFINED if len(pressure.points) >= SMOOTH_POINTS else 1
 
 
 def _polynomials(nodes: Array) -> Array:

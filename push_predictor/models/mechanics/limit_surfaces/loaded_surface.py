@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
+from push_predictor.models.mechanics.limit_surfaces.direction_dependence import Root
+from push_predictor.models.mechanics.limit_surfaces.load_map import StretchOf
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces
-from push_predictor.models.mechanics.limit_surfaces.surfaces import DIRECTIONS
 from push_predictor.models.mechanics.motion.contact_solution import Rows
 from push_predictor.types import Array, IntArray
 
-MOST_STRETCH = 0.95  # at 1 the friction along one direction is infinite
 PULL_ROUNDS = 4  # the first is exact on an ellipsoid
 SMALLEST_MARGIN = 1e-6  # of a pull to the friction that it cannot overcome alone
-_TURN = 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
-COS, SIN = np.cos(_TURN), np.sin(_TURN)  # of twice the direction of an arm
 
 Parts: TypeAlias = tuple[Array, Array, Array]  # of a load or a twist
 
@@ -26,7 +24,7 @@ Parts: TypeAlias = tuple[Array, Array, Array]  # of a load or a twist
 class LoadedSurface:
     """The limit surfaces of some rows (k,), as a pusher feels them.
 
-    root: of the direction-dependent friction, see root_of. pull (k, 3): a steady load in units of the largest force,
+    root: of the direction-dependent friction. pull (k, 3): a steady load in units of the largest force,
     and of that times the length. height (k,) m: the centre of pressure moves by it along the pusher's force, in units
     of the largest.
     """
@@ -58,10 +56,13 @@ class LoadedSurface:
     def _driven(self, chosen: Rows, load: Parts) -> tuple[Array, Parts]:
         """Factor that brings the pusher's load onto the surface (see on_surface), and the twist there."""
         if self._stretched_pull is None and self.height is not None:
-            twist, size = self.surfaces.twist_and_gauge(self.rows[chosen], *load)
+            twist, size = self.surfaces.twist_and_gauge(self.rows[chosen], *load, self._stretch(chosen))
             return 1.0 / size, twist
         factor, load = self.on_surface(chosen, load)
-        return factor, self.surfaces.twist(self.rows[chosen], *load)
+        return factor, self.surfaces.twist(self.rows[chosen], *load, self._stretch(chosen))
+
+    def _stretch(self, chosen: Rows) -> StretchOf:
+        return None if self.root is None else (self.root.a[chosen], self.root.b[chosen])
 
     @cached_property
     def _stretched_pull(self) -> Array | None:
@@ -74,7 +75,7 @@ class LoadedSurface:
 
         Without a pull the load stays as it is, and nothing needs the factor.
         """
-        rows = self.rows[chosen]
+        rows, stretch = self.rows[chosen], self._stretch(chosen)
         if self._stretched_pull is None:
             return np.ones(0), pusher
         pull, given = self._stretched_pull[:, chosen], np.sqrt(sum(part * part for part in pusher))
@@ -84,41 +85,5 @@ class LoadedSurface:
         for _ in range(PULL_ROUNDS):
             share = -dot + np.sqrt(np.maximum(dot * dot + radius * radius - square, SMALLEST_MARGIN))
             load = share * x + pull[0], share * y + pull[1], share * m + pull[2]
-            radius = np.sqrt(sum(part * part for part in load)) / self.surfaces.gauge(rows, *load)
+            radius = np.sqrt(sum(part * part for part in load)) / self.surfaces.gauge(rows, *load, stretch)
         return share / given, (given * load[0], given * load[1], given * load[2])
-
-
-class Root(NamedTuple):
-    """The root R of W (k,) each: xx, xy, yy; and the inverse of the factor by which W stretches the arms' length.
-
-    With isotropic friction at the velocities R^-1 u, a body with the arms R r / det R has the load R f and the same
-    moment. The stretched arms change the length c, by the reach of the pressure; the change of their surface's shape
-    is left out.
-    """
-
-    xx: Array
-    xy: Array
-    yy: Array
-    turn: Array
-
-    def of(self, rows: Rows) -> Root:
-        """Those of some of the rows."""
-        return Root(*(part[rows] for part in self))
-
-    def times(self, x: Array, y: Array, m: Array) -> Parts:
-        """The root times forces or velocities, and moments or spins in the stretched arms' units."""
-        return self.xx * x + self.xy * y, self.xy * x + self.yy * y, self.turn * m
-
-
-def root_of(stretch: Array, reach: Array) -> Root:
-    """The root of W = [[1 + a, b], [b, 1 - a]] for each stretch (k, 2: a, b), at most MOST_STRETCH long.
-
-    A point at velocity u resists with W^-1 u / sqrt(u' W^-1 u). reach (k, DIRECTIONS): of the pressure.
-    """
-    size = np.sqrt(np.sum(stretch * stretch, axis=1))
-    a, b = (stretch * np.minimum(1.0, MOST_STRETCH / np.maximum(size, MOST_STRETCH))[:, None]).T
-    determinant = np.sqrt(1.0 - a * a - b * b)
-    trace = np.sqrt(2.0 + 2.0 * determinant)
-    arms = np.sqrt(1.0 + a[:, None] * COS + b[:, None] * SIN)
-    turn = determinant / np.sum(reach * arms, axis=1)
-    return Root((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)

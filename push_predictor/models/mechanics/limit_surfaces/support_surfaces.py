@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from push_predictor.models.mechanics.limit_surfaces.load_map import (
     LoadMap,
     Place,
+    StretchOf,
     interpolated,
     interpolated_gauge,
     place_of,
@@ -36,84 +38,120 @@ class RowQuantities:
 
 
 class PushSurfaces(Protocol):
-    """Limit surfaces of n pushes."""
+    """Limit surfaces of n pushes.
+
+    stretch: a and b (k,) of the direction-dependent friction that gives the surface another shape.
+    """
 
     @property
     def of_rows(self) -> RowQuantities:
         """Quantities of each push."""
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Twist:
         """See LimitSurface, for some of the rows (k,)."""
 
-    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Array:
         """See LimitSurface, for some of the rows (k,)."""
 
-    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+    def twist_and_gauge(
+        self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None
+    ) -> tuple[Twist, Array]:
         """Both for the same loads."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowSurfaces:
-    """Limit surfaces of n pushes: row k blends the tables `low` and `high` (n,) by `share` (n,).
+    """Limit surfaces of n pushes: row k blends the tables `low` and `high` (n,) of `maps` by `share` (n,)."""
 
-    cells, sizes: those of all tables, one after the other.
-    """
-
-    cells: Array
-    sizes: Array
-    per_table: int
+    maps: Sequence[LoadMap]
     low: IntArray
     high: IntArray
     share: Array
     of_rows: RowQuantities
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
-        """See PushSurfaces."""
-        return self._twist(rows, place_of(x, y, moment))
+    @cached_property
+    def cells(self) -> Array:
+        """Those of all tables, one after the other."""
+        return joined([one.cells for one in self.maps])
 
-    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
-        """See PushSurfaces."""
-        return self._gauge(rows, place_of(x, y, moment))
+    @cached_property
+    def cell_slopes(self) -> Array:
+        """See `cells`."""
+        return joined([one.cell_slopes for one in self.maps])
 
-    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+    @cached_property
+    def sizes(self) -> Array:
+        """See `cells`."""
+        return joined([one.sizes for one in self.maps])
+
+    @cached_property
+    def size_slopes(self) -> Array:
+        """See `cells`."""
+        return joined([one.size_slopes for one in self.maps])
+
+    @property
+    def per_table(self) -> int:
+        """Cells of a table."""
+        return int(self.maps[0].cells.shape[1])
+
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Twist:
+        """See PushSurfaces."""
+        return self._twist(rows, place_of(x, y, moment), stretch)
+
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Array:
+        """See PushSurfaces."""
+        return self._gauge(rows, place_of(x, y, moment), stretch)
+
+    def twist_and_gauge(
+        self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None
+    ) -> tuple[Twist, Array]:
         """See PushSurfaces: the loads are looked up once."""
         place = place_of(x, y, moment)
-        return self._twist(rows, place), self._gauge(rows, place)
+        return self._twist(rows, place, stretch), self._gauge(rows, place, stretch)
 
-    def _twist(self, rows: IntArray, place: Place) -> Twist:
-        one = interpolated(self.cells, self.low[rows] * self.per_table, place)
-        share = self.share[rows]
+    def _twist(self, rows: IntArray, place: Place, stretch: StretchOf) -> Twist:
+        def of(table: IntArray) -> Twist:
+            at = table[rows] * self.per_table + place.cell
+            part = self.cells.take(at, axis=1)
+            return interpolated(part if stretch is None else _stretched(part, self.cell_slopes, at, stretch), place)
+
+        one, share = of(self.low), self.share[rows]
         if not share.any():
             return one
-        other = interpolated(self.cells, self.high[rows] * self.per_table, place)
-        vx, vy, spin = (a + share * (b - a) for a, b in zip(one, other, strict=True))
+        vx, vy, spin = (a + share * (b - a) for a, b in zip(one, of(self.high), strict=True))
         return vx, vy, spin
 
-    def _gauge(self, rows: IntArray, place: Place) -> Array:
-        one = interpolated_gauge(self.sizes, self.low[rows] * self.per_table, place)
-        share = self.share[rows]
+    def _gauge(self, rows: IntArray, place: Place, stretch: StretchOf) -> Array:
+        def of(table: IntArray) -> Array:
+            at = table[rows] * self.per_table + place.cell
+            part = self.sizes.take(at, axis=1)
+            part = part if stretch is None else _stretched(part, self.size_slopes, at, stretch)
+            return interpolated_gauge(part, place)
+
+        one, share = of(self.low), self.share[rows]
         if not share.any():
             return one
-        other = interpolated_gauge(self.sizes, self.high[rows] * self.per_table, place)
-        return np.asarray(one + share * (other - one))
+        return np.asarray(one + share * (of(self.high) - one))
 
 
 @dataclass(frozen=True, eq=False)
 class SameSurface:
-    """One approximate limit surface for n pushes."""
+    """One approximate limit surface for n pushes, which keeps its shape under direction-dependent friction."""
 
     surface: PowerSurface
     of_rows: RowQuantities
 
-    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Twist:
+    def twist(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Twist:
         """See PushSurfaces."""
         return self.surface.twist(x, y, moment)
 
-    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> Array:
+    def gauge(self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None) -> Array:
         """See PushSurfaces."""
         return self.surface.gauge(x, y, moment)
 
-    def twist_and_gauge(self, rows: IntArray, x: Array, y: Array, moment: Array) -> tuple[Twist, Array]:
+    def twist_and_gauge(
+        self, rows: IntArray, x: Array, y: Array, moment: Array, stretch: StretchOf = None
+    ) -> tuple[Twist, Array]:
         """See PushSurfaces."""
         return self.twist(rows, x, y, moment), self.gauge(rows, x, y, moment)
 
@@ -132,12 +170,16 @@ def row_surfaces(maps: Sequence[LoadMap], low: IntArray, high: IntArray, share: 
         part = share.reshape(-1, *[1] * (values.ndim - 1))
         return np.asarray((1.0 - part) * values[low] + part * values[high])
 
-    return RowSurfaces(
-        maps[0].cells if len(maps) == 1 else np.concatenate([one.cells for one in maps], axis=1),
-        maps[0].sizes if len(maps) == 1 else np.concatenate([one.sizes for one in maps], axis=1),
-        maps[0].cells.shape[1],
-        low,
-        high,
-        share,
-        RowQuantities(blend("centre"), blend("length"), blend("square"), blend("reach")),
-    )
+    quantities = RowQuantities(blend("centre"), blend("length"), blend("square"), blend("reach"))
+    return RowSurfaces(maps, low, high, share, quantities)
+
+
+def joined(tables: Sequence[Array]) -> Array:
+    """Tables, one after the other along the cells."""
+    return tables[0] if len(tables) == 1 else np.concatenate(tables, axis=-1)
+
+
+def _stretched(part: Array, slopes: Array, at: IntArray, stretch: tuple[Array, Array]) -> Array:
+    """Polynomials (12 or 4, k) of the cells `at`, changed by the stretch."""
+    a, b = stretch
+    return np.asarray(part + a * slopes[0].take(at, axis=1) + b * slopes[1].take(at, axis=1))

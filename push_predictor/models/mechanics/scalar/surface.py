@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import atan2, pi, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from push_predictor.models.mechanics.limit_surfaces.direction_dependence import COS, MOST_STRETCH, SIN
 from push_predictor.models.mechanics.limit_surfaces.load_map import AZIMUTHS, ELEVATIONS
-from push_predictor.models.mechanics.limit_surfaces.loaded_surface import (
-    COS,
-    MOST_STRETCH,
-    PULL_ROUNDS,
-    SIN,
-    SMALLEST_MARGIN,
+from push_predictor.models.mechanics.limit_surfaces.loaded_surface import PULL_ROUNDS, SMALLEST_MARGIN
+from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
+    PushSurfaces,
+    RowQuantities,
+    RowSurfaces,
+    SameSurface,
 )
-from push_predictor.models.mechanics.limit_surfaces.support_surfaces import PushSurfaces, RowSurfaces, SameSurface
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.motion.contact_solution import ROOT_TOLERANCE
 from push_predictor.types import Array
@@ -26,12 +27,17 @@ EXACT = 1e-13  # rad: on an ellipsoid the velocity is linear in the force, so th
 
 Three: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = Callable[[float, float, float], Three]  # of a load (force x, y, moment over length)
+Shape: TypeAlias = Callable[[float, float], tuple[Twist, "Gauge"]]  # of a surface by a, b, see direction_dependence
 Gauge: TypeAlias = Callable[[float, float, float], float]
+Cells: TypeAlias = list[tuple[float, ...]]  # the polynomials of a table
 
 
 @dataclass(frozen=True, eq=False)
 class ScalarSurface:
-    """One limit surface: see LimitSurface. tolerance: rad, of a contact that sticks."""
+    """One limit surface: see LimitSurface. shape: the twist and gauge under direction-dependent friction.
+
+    tolerance: rad, of a contact that sticks.
+    """
 
     centre: tuple[float, float]
     length: float
@@ -39,12 +45,15 @@ class ScalarSurface:
     reach: Array
     twist: Twist
     gauge: Gauge
+    shape: Shape
     tolerance: float = ROOT_TOLERANCE
 
 
 class Stretch(NamedTuple):
-    """The root of the direction-dependent friction: see loaded_surface."""
+    """The root of the direction-dependent friction: see direction_dependence.Root."""
 
+    a: float
+    b: float
     xx: float
     xy: float
     yy: float
@@ -55,33 +64,34 @@ def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
     """The surface of the first push."""
     of_rows, tolerance = surfaces.of_rows, ROOT_TOLERANCE
     if isinstance(surfaces, RowSurfaces):
-        twist, gauge = _of_cells(_cells(surfaces, surfaces.cells)), _gauge_of_cells(_cells(surfaces, surfaces.sizes))
-    elif not isinstance(surfaces, SameSurface):
+        shape = _tabulated(surfaces)
+        twist, gauge = shape(0.0, 0.0)
+        return _scalar(of_rows, twist, gauge, shape, tolerance)
+    if not isinstance(surfaces, SameSurface):
         raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
-    elif surfaces.surface.power == 2.0:
+    if surfaces.surface.power == 2.0:
         twist, gauge, tolerance = _ellipsoid, _norm, EXACT
     else:
         twist, gauge = _of_arrays(surfaces.surface), _gauge_of_arrays(surfaces.surface)
-    x, y = of_rows.centre[0].tolist()
-    xx, xy, yy = of_rows.square[0].tolist()
-    return ScalarSurface((x, y), float(of_rows.length[0]), (xx, xy, yy), of_rows.reach[0], twist, gauge, tolerance)
+    return _scalar(of_rows, twist, gauge, lambda a, b: (twist, gauge), tolerance)
 
 
 def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
-    """See loaded_surface."""
+    """See direction_dependence."""
     factor = min(1.0, MOST_STRETCH / max(sqrt(a * a + b * b), MOST_STRETCH))
     a, b = a * factor, b * factor
     determinant = sqrt(1.0 - a * a - b * b)
     trace = sqrt(2.0 + 2.0 * determinant)
     turn = determinant / float(reach @ np.sqrt(1.0 + a * COS + b * SIN))
-    return Stretch((1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)
+    return Stretch(a, b, (1.0 + a + determinant) / trace, b / trace, (1.0 - a + determinant) / trace, turn)
 
 
 def loaded(surface: ScalarSurface, stretch: Stretch | None, pull: Three | None, height: float) -> Twist:
     """The twist of the surface under a pusher's load; see LoadedSurface."""
     if stretch is None and pull is None and height == 0.0:
         return surface.twist
-    xx, xy, yy, turn = stretch or Stretch(1.0, 0.0, 1.0, 1.0)
+    a, b, xx, xy, yy, turn = stretch or Stretch(0.0, 0.0, 1.0, 0.0, 1.0, 1.0)
+    twist_of, gauge_of = (surface.twist, surface.gauge) if stretch is None else surface.shape(a, b)
     if pull is not None:
         pull = xx * pull[0] + xy * pull[1], xy * pull[0] + yy * pull[1], turn * pull[2]
 
@@ -89,10 +99,10 @@ def loaded(surface: ScalarSurface, stretch: Stretch | None, pull: Three | None, 
         load = xx * force_x + xy * force_y, xy * force_x + yy * force_y, turn * moment
         factor = 0.0
         if pull is not None:
-            factor, load = _with_pull(surface.gauge, load, pull)
+            factor, load = _with_pull(gauge_of, load, pull)
         elif height:
-            factor = 1.0 / surface.gauge(*load)
-        vx, vy, spin = surface.twist(*load)
+            factor = 1.0 / gauge_of(*load)
+        vx, vy, spin = twist_of(*load)
         vx, vy, spin = xx * vx + xy * vy, xy * vx + yy * vy, turn * spin
         shift = height * factor * spin / surface.length
         return vx + shift * force_y, vy - shift * force_x, spin
@@ -113,14 +123,43 @@ def _with_pull(gauge: Gauge, pusher: Three, pull: Three) -> tuple[float, Three]:
     return share / given, (given * lx, given * ly, given * lm)
 
 
-def _cells(surfaces: RowSurfaces, tables: Array) -> list[tuple[float, ...]]:
-    """The first push's table, blended; a tuple of coefficients per cell."""
+def _scalar(of_rows: RowQuantities, twist: Twist, gauge: Gauge, shape: Shape, tolerance: float) -> ScalarSurface:
+    x, y = of_rows.centre[0].tolist()
+    xx, xy, yy = of_rows.square[0].tolist()
+    length = float(of_rows.length[0])
+    return ScalarSurface((x, y), length, (xx, xy, yy), of_rows.reach[0], twist, gauge, shape, tolerance)
+
+
+def _tabulated(surfaces: RowSurfaces) -> Shape:
+    """The first push's tables, blended; the slopes are prepared when a surface is stretched first."""
+    cells, sizes = _cells(surfaces, surfaces.cells), _cells(surfaces, surfaces.sizes)
+
+    @cache
+    def slopes() -> tuple[tuple[Cells, Cells], tuple[Cells, Cells]]:
+        (ca, cb), (sa, sb) = surfaces.cell_slopes, surfaces.size_slopes
+        return (_cells(surfaces, ca), _cells(surfaces, cb)), (_cells(surfaces, sa), _cells(surfaces, sb))
+
+    def shape(a: float, b: float) -> tuple[Twist, Gauge]:
+        if a == b == 0.0:
+            return _of_cells(cells.__getitem__), _gauge_of_cells(sizes.__getitem__)
+        of_cells, of_sizes = slopes()
+        return _of_cells(_changed(cells, of_cells, a, b)), _gauge_of_cells(_changed(sizes, of_sizes, a, b))
+
+    return shape
+
+
+def _changed(cells: Cells, slopes: tuple[Cells, Cells], a: float, b: float) -> Callable[[int], Sequence[float]]:
+    by_a, by_b = slopes
+    return lambda k: [c + a * p + b * q for c, p, q in zip(cells[k], by_a[k], by_b[k], strict=True)]
+
+
+def _cells(surfaces: RowSurfaces, tables: Array) -> Cells:
     count, share = surfaces.per_table, float(surfaces.share[0])
     low, high = (tables[:, int(k[0]) * count : (int(k[0]) + 1) * count] for k in (surfaces.low, surfaces.high))
     return [tuple(cell) for cell in ((1.0 - share) * low + share * high).T.tolist()]
 
 
-def _of_cells(cells: list[tuple[float, ...]]) -> Twist:
+def _of_cells(cell: Callable[[int], Sequence[float]]) -> Twist:
     per_turn, per_rise = AZIMUTHS / (2.0 * pi), (ELEVATIONS - 1) / (0.5 * pi)
     last_column, last_row = AZIMUTHS - 1, ELEVATIONS - 2
 
@@ -137,7 +176,7 @@ def _of_cells(cells: list[tuple[float, ...]]) -> Twist:
             column = last_column
         if row > last_row:
             row = last_row
-        a, b, c, ar, br, cr, au, bu, cu, ab, bb, cb = cells[row * AZIMUTHS + column]
+        a, b, c, ar, br, cr, au, bu, cu, ab, bb, cb = cell(row * AZIMUTHS + column)
         right, up, size = turn - column, rise - row, sign * sqrt(force + m * m)
         both = right * up
         return (
@@ -149,7 +188,7 @@ def _of_cells(cells: list[tuple[float, ...]]) -> Twist:
     return twist
 
 
-def _gauge_of_cells(cells: list[tuple[float, ...]]) -> Gauge:
+def _gauge_of_cells(cell: Callable[[int], Sequence[float]]) -> Gauge:
     per_turn, per_rise = AZIMUTHS / (2.0 * pi), (ELEVATIONS - 1) / (0.5 * pi)
 
     def gauge(x: float, y: float, m: float) -> float:
@@ -159,7 +198,7 @@ def _gauge_of_cells(cells: list[tuple[float, ...]]) -> Gauge:
         turn, rise = atan2(y, x) * per_turn, atan2(m, sqrt(force)) * per_rise
         turn += AZIMUTHS * (turn < 0.0)
         column, row = min(int(turn), AZIMUTHS - 1), min(int(rise), ELEVATIONS - 2)
-        low, along, above, across = cells[row * AZIMUTHS + column]
+        low, along, above, across = cell(row * AZIMUTHS + column)
         right, up = turn - column, rise - row
         return sqrt(force + m * m) / (low + right * along + up * above + right * up * across)
 
