@@ -52,7 +52,7 @@ class Question:
         """Predict all windows, add the previous push's residual to their covariates, and split them."""
         _check(model, loaded.table, alpha, covariates)
         shift = input_shift(model, loaded.table)
-        searched = about_mechanics(model) if shift.inputs else model
+        searched = about_mechanics(model) if shift.outside.any() else model
         every = widened(evidence_of(searched, loaded.table), model.training, shift)
         every = replace(every, chosen=loaded.chosen)
         before = previous_residual(loaded.table, every.z)

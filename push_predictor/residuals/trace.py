@@ -35,7 +35,7 @@ from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
-from push_predictor.residuals.selection.absolute_fit import left_by
+from push_predictor.residuals.selection.absolute_fit import parts_of_others
 
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 
@@ -200,7 +200,7 @@ def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[Shi
         return "wrench_only"
     if motion.variance:
         return "variance"
-    return "input_shift" if shifted else "none"
+    return "input_shift" if any(each.extrapolates for each in shifted) else "none"
 
 
 def _rival_covariates(forces: WrenchFinding) -> tuple[str, ...]:
@@ -225,8 +225,8 @@ def _found_effects(
                 term.share,
                 term.naming.resembles,
             )
-            for k, (term, effect) in enumerate(zip(motion.terms, effects, strict=True))
-            if not any(left_by(earlier, term) for earlier in motion.terms[:k])
+            for term, effect, part in zip(motion.terms, effects, parts_of_others(motion.terms), strict=True)
+            if not part
         )
     if motion.variance and not forces.effects:
         return tuple(

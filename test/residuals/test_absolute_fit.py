@@ -8,7 +8,7 @@ import numpy as np
 
 from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.residuals.candidates.candidate import Candidate
-from push_predictor.residuals.selection.absolute_fit import left_by, with_fitting_names
+from push_predictor.residuals.selection.absolute_fit import left_by, parts_of_others, with_fitting_names
 from push_predictor.residuals.selection.cross_validation import Judged
 from push_predictor.residuals.selection.naming import Naming
 from push_predictor.residuals.selection.term_choice import SelectedTerm
@@ -21,9 +21,10 @@ def term(
     *,
     rivals: Sequence[str] = (),
     resembles: str | None = None,
+    basis: str = "linear",
 ) -> SelectedTerm:
     """A term that gains as much; resembles: for an unknown effect, whose model is the polynomial."""
-    best = Candidate(mechanism, covariate, DriverBasis("linear", (covariate,)), np.ones((1, 3, 1)))
+    best = Candidate(mechanism, covariate, DriverBasis(basis, (covariate,)), np.ones((1, 3, 1)))
     naming = Naming((covariate, *rivals), (mechanism,), mechanism is not None, 0.0, resembles)
     return SelectedTerm(best, (Judged(best, np.array([gain])),), 0.001, np.ones(1), np.ones((1, 3)), 0.1, naming, False)
 
@@ -111,6 +112,31 @@ def test_rest_of_an_effect_is_no_effect_of_its_own() -> None:
     assert not left_by(slope, term(None, "topic:/temperature", 10.0))
     assert not left_by(slope, term(None, "model_inputs", 10.0))
     assert not left_by(slope, term("anisotropic_friction", "push_heading", 10.0))
+
+
+def test_constant_part_of_an_effect_is_no_effect_of_its_own() -> None:
+    changing = term("centre_of_friction", "velocity", 300.0)
+    constant = term("centre_of_friction", "edge", 50.0, basis="constant")
+    temperature = term("centre_of_friction", "topic:/temperature", 50.0)
+    other = term("pressure_spread", "edge", 20.0, basis="constant")
+    assert parts_of_others([changing, constant, temperature, other]) == [False, True, True, False]
+    large = term("centre_of_friction", "topic:/temperature", 60.0)
+    assert parts_of_others([changing, constant, large, other]) == [False, True, False, False]
+    assert [t.best.covariate for t in with_fitting_names([changing, constant, large])][-1] == "edge"
+    assert names([changing, constant]) == 2 * [("centre_of_friction", None)]
+
+
+def test_change_of_a_constant_effect_is_an_effect() -> None:
+    """It tells what the effect depends on."""
+    assert parts_of_others([
+        term("centre_of_friction", "edge", 300.0, basis="constant"),
+        term("centre_of_friction", "velocity", 60.0),
+    ]) == [False, False]  # fmt: skip
+
+
+def test_map_in_two_terms_is_one_effect() -> None:
+    found = [term("tilted_surface", "slider_x", 300.0), term("tilted_surface", "slider_x", 50.0, basis="quadratic")]
+    assert parts_of_others(found) == [False, True]
 
 
 def test_rest_of_an_unknown_effect_is_no_effect_of_its_own() -> None:

@@ -56,6 +56,28 @@ def test_a_few_windows_outside_are_no_shift(known: PushTable) -> None:
     assert input_shift(model, with_inputs(known, 0, speeds)).inputs == ()
 
 
+@pytest.mark.parametrize(("column", "low", "high"), [(1, 0.0, 0.3), (2, -0.2, 0.3)])
+def test_pushes_in_a_part_of_training_are_listed_and_lie_inside(
+    known: PushTable, column: int, low: float, high: float
+) -> None:
+    part = known.take((known.inputs[:, column] >= low) & (known.inputs[:, column] <= high))
+    shift = input_shift(trained(known), part)
+    (one,) = (each for each in shift.inputs if each.covariate == ("velocity", "contact", "angle")[column])
+    assert one.share_outside == 0.0 and not one.extrapolates and not shift.outside.any()
+    margin = {1: 0.03, 2: 0.1}[column]
+    beyond = np.mean((known.inputs[:, column] > high + margin) | (known.inputs[:, column] < low - margin))
+    assert 0.7 * beyond < one.share_unvisited <= beyond  # the margin grows where contacts are few
+
+
+def test_one_side_of_a_symmetric_slider_is_a_part(known: PushTable) -> None:
+    one_side = known.take(known.inputs[:, 1] < 0.25)
+    assert [each.covariate for each in input_shift(trained(known), one_side).inputs] == ["contact"]
+
+
+def test_nearly_all_of_training_is_no_part(known: PushTable) -> None:
+    assert input_shift(trained(known), known.take(known.inputs[:, 1] < 0.9)).inputs == ()
+
+
 def test_the_most_shifted_input_comes_first(known: PushTable) -> None:
     narrow = known.take(np.abs(known.inputs[:, 2]) < 0.3)
     new = with_inputs(known, 0, np.where(np.arange(len(known)) % 10 == 0, 3.0, 1.0) * narrow.inputs[:, 0].max())

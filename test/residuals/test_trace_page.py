@@ -341,7 +341,15 @@ def test_input_shift_reaches_json_and_terminal() -> None:
 
 def test_json_lists_the_input_shift() -> None:
     listed = trace_json(shifted(trace_of("effect"), "effect"))["input_shift"]
-    assert listed == [{"covariate": "velocity", "training": [0.01, 0.05], "now": [0.1, 0.15], "share_outside": 0.97}]
+    assert listed == [
+        {
+            "covariate": "velocity",
+            "training": [0.01, 0.05],
+            "now": [0.1, 0.15],
+            "share_outside": 0.97,
+            "share_unvisited": 0.0,
+        }
+    ]
     assert trace_json(trace_of("none"))["input_shift"] == []
 
 

@@ -14,7 +14,7 @@ from push_predictor.residuals.candidates.candidate import Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import SESSION
+from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
@@ -28,7 +28,8 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
-MOSTLY = 0.5  # share inside training's inputs from which a constant effect is more than extrapolation
+MOSTLY = 0.5  # share inside training's inputs from which an effect of the inputs is more than extrapolation
+OF_INPUTS = ("velocity", *LOCAL)  # covariates that a shift of the inputs changes
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
@@ -122,6 +123,8 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
 
 def _separable(candidate: Candidate, inside: float) -> bool:
     """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
+    if candidate.covariate in OF_INPUTS:
+        return inside >= MOSTLY
     if not candidate.basis.is_constant or inside == 1.0:
         return True
     return inside >= MOSTLY and candidate.mechanism is not None

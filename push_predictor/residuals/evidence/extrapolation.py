@@ -30,7 +30,7 @@ def about_mechanics(model: PushModel) -> PushModel:
 
 def widened(evidence: Evidence, training: PushTable, shift: InputShift) -> Evidence:
     """The evidence with predicted deviations in proportion to the tip's travel, where that is beyond training."""
-    if not any(each.covariate == "velocity" for each in shift.inputs):
+    if not any(each.covariate == "velocity" and each.extrapolates for each in shift.inputs):
         return evidence
     longest = float(np.max(training.inputs[:, 0] * training.duration))
     travel = evidence.table.inputs[:, 0] * evidence.table.duration

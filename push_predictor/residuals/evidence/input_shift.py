@@ -1,4 +1,7 @@
-"""Whether new pushes lie outside the inputs that a model was trained on: there its error is extrapolation."""
+"""Whether new pushes lie outside the inputs that a model was trained on, or in a part of them only.
+
+Outside them the model's error is extrapolation. About the rest of them the new pushes say nothing.
+"""
 
 from __future__ import annotations
 
@@ -14,18 +17,28 @@ SPEED_MARGIN = 0.15  # relative: speeds are estimated from few samples
 ANGLE_MARGIN = 0.1  # rad
 CONTACT_MARGIN = 0.03  # of the perimeter
 WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
-ONE_SIDED = 0.2  # share of training outside the new inputs from which it is compared only where these lie
+ONE_SIDED = 0.2  # share of training outside the new inputs from which these are a part of them only
 NOTABLE = 0.05  # share of the windows outside from which an input has shifted
 
 
 @dataclass(frozen=True)
 class ShiftedInput:
-    """An input whose new values leave those of training: both ranges, and the share of new windows outside."""
+    """An input whose new values leave those of training, or are a part of them only: both ranges.
+
+    share_outside: of the new windows outside those of training. share_unvisited: of the training windows outside the
+    new ones.
+    """
 
     covariate: str
     training: tuple[float, float]
     now: tuple[float, float]
     share_outside: float
+    share_unvisited: float = 0.0
+
+    @property
+    def extrapolates(self) -> bool:
+        """Whether new windows lie outside, rather than in a part only."""
+        return self.share_outside >= NOTABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +53,23 @@ def input_shift(model: PushModel, table: PushTable) -> InputShift:
     """Compare the inputs of n new windows with those of a model's training windows."""
     training = model.training.inputs
     outside = _outside(table.inputs, training, model.rig.outline.rotational_symmetry)
-    shifted = [
-        ShiftedInput(name, _range(training[:, k]), _range(table.inputs[:, k]), float(outside[name].mean()))
+    unvisited = _outside(training, table.inputs, 1)  # real sides differ, although a model takes them for the same
+    every = [
+        ShiftedInput(
+            name,
+            _range(training[:, k]),
+            _range(table.inputs[:, k]),
+            float(outside[name].mean()),
+            float(unvisited[name].mean()),
+        )
         for k, name in enumerate(outside)
-        if outside[name].mean() >= NOTABLE
     ]
-    shifted.sort(key=lambda each: -each.share_outside)
+    shifted = [each for each in every if each.extrapolates or each.share_unvisited >= ONE_SIDED]
+    shifted.sort(key=lambda each: (-each.share_outside, -each.share_unvisited))
     rows = np.zeros(len(table), dtype=np.bool_)
     for each in shifted:
-        rows |= outside[each.covariate]
+        if each.extrapolates:
+            rows |= outside[each.covariate]
     return InputShift(tuple(shifted), rows)
 
 

@@ -1,4 +1,4 @@
-"""The inputs that left the range of training: which, from where to where, and for which share of the windows."""
+"""The inputs that differ from those of training: which, from where to where, and for which share of the windows."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ def input_shift_json(trace: Trace) -> list[dict[str, Any]]:
             "training": [float(end) for end in shift.training],
             "now": [float(end) for end in shift.now],
             "share_outside": float(shift.share_outside),
+            "share_unvisited": float(shift.share_unvisited),
         }
         for shift in trace.input_shift
     ]
@@ -31,7 +32,9 @@ def shift_clause(shift: ShiftedInput) -> str:
 
 
 def share_clause(shift: ShiftedInput) -> str:
-    """The share of windows outside."""
+    """The share of windows outside, or of those of training that the new ones leave out."""
+    if not shift.extrapolates:
+        return f"{100.0 * shift.share_unvisited:.0f} % of the training windows have no new ones near them"
     return f"{100.0 * shift.share_outside:.0f} % of the windows lie outside the range of training"
 
 

@@ -14,6 +14,7 @@ from push_predictor.residuals.reporting.phrases import (
     listed,
     mechanism_phrase,
 )
+from push_predictor.residuals.selection.absolute_fit import parts_of_others
 from push_predictor.residuals.selection.experiment import PUSHES
 
 CUT_AGAIN = (
@@ -49,6 +50,11 @@ def _of_motion(motion: MotionFinding) -> list[str]:
         )
     if own := [effect_phrase(term.mechanism, term.best.covariate) for term in motion.terms if term.own]:
         notes.append(f"Retraining on such pushes is enough for {listed(own)}: no extension is needed.")
+    parts = parts_of_others(motion.terms)
+    if left := [
+        effect_phrase(t.mechanism, t.best.covariate) for t, part in zip(motion.terms, parts, strict=True) if part
+    ]:
+        notes.append(f"Part of a listed effect, and therefore not listed, but contained in the model: {listed(left)}.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
         notes.append(

@@ -22,13 +22,24 @@ def with_fitting_names(terms: Sequence[SelectedTerm]) -> tuple[SelectedTerm, ...
     """
     misfits = {term.mechanism for k, term in enumerate(terms) if any(_withdraws(t, term) for t in terms[k + 1 :])}
     fitting = [_unnamed(term) if term.mechanism in misfits else term for term in terms]
-    left = [any(left_by(earlier, term) for earlier in fitting[:k]) for k, term in enumerate(fitting)]
-    return tuple(fitting[k] for k in np.argsort(left, kind="stable"))
+    return tuple(fitting[k] for k in np.argsort(parts_of_others(fitting), kind="stable"))
+
+
+def parts_of_others(terms: Sequence[SelectedTerm]) -> list[bool]:
+    """For each term whether the fit of an earlier one left it, so that it is no effect of its own."""
+    return [any(left_by(earlier, term) for earlier in terms[:k]) for k, term in enumerate(terms)]
 
 
 def left_by(effect: SelectedTerm, later: SelectedTerm) -> bool:
-    """Whether a term found later is what the fit of an effect leaves of it, rather than another effect."""
+    """Whether a term found later is what the fit of an effect leaves of it, rather than another effect.
+
+    For a named effect: an unknown one along the same dependence, or one of its own mechanism that is constant, along
+    the same covariate, or small.
+    """
     if effect.mechanism is not None:
+        if later.mechanism == effect.mechanism:
+            same = later.best.basis.is_constant or later.best.covariate == effect.best.covariate
+            return same or not _large_beside(later, effect)
         return later.mechanism is None and later.best.covariate in _dependence(effect)
     same = _closest(effect) is not None and _closest(later) == _closest(effect)
     return same or (later.mechanism is None and later.best.covariate in {CONSTANT, *_dependence(effect)})
@@ -36,9 +47,14 @@ def left_by(effect: SelectedTerm, later: SelectedTerm) -> bool:
 
 def _withdraws(later: SelectedTerm, named: SelectedTerm) -> bool:
     """Whether a name does not fit: a later term is a large part of what depends on the same."""
-    if named.mechanism is None or not left_by(named, later):
+    if named.mechanism is None or named.mechanism == later.mechanism or not left_by(named, later):
         return False
-    left, explained = (max(term.rivals[0].gain, 0.0) for term in (later, named))
+    return _large_beside(later, named)
+
+
+def _large_beside(later: SelectedTerm, effect: SelectedTerm) -> bool:
+    """Whether a term found later has more of both gains than the fit of one effect may leave."""
+    left, explained = (max(term.rivals[0].gain, 0.0) for term in (later, effect))
     return left > MOST_UNEXPLAINED * (left + explained)
 
 
