@@ -168,6 +168,7 @@ def test_repeated_samples_are_used_once(which: str, name: str, share: float, cou
     count=st.integers(1, 3),
     ahead=st.sampled_from([5 * PERIOD, SECOND, 30 * SECOND, DAY, 3650 * DAY]),
 )
+@example(which="made up", name="wrench", share=0.1266, count=3, ahead=5 * PERIOD)  # the force's last zeros are missing
 def test_future_stamp_discards_only_its_sample(which: str, name: str, share: float, count: int, ahead: int) -> None:
     truth, stream = CLEAN[which], of(CLEAN[which].recording, name)
     place = place_in(stream, share, 12)
