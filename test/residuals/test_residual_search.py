@@ -25,9 +25,10 @@ from push_predictor.residuals.channels.variance import variance_effects
 from push_predictor.residuals.evidence.inputs_basis import inputs_basis
 from push_predictor.residuals.evidence.standardised import evidence_of
 from push_predictor.residuals.selection.baseline import Baseline, baseline_of
-from push_predictor.residuals.selection.forward_selection import SearchResult, search
+from push_predictor.residuals.selection.forward_selection import ForwardSelection, SearchResult, search
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.screening import block_scores, screen
+from push_predictor.residuals.selection.term_choice import TermChoice
 
 WINDOWS = 2
 SIDE = 0.09
@@ -285,6 +286,13 @@ class TestBasis:
         assert (term.best.mechanism, term.best.basis.name) == ("contact_friction", "step")
         assert set(term.naming.drivers) == {"elapsed_time", "topic:/valve"}
         assert not term.own and term.share > 0.5
+        evidence, inputs = evidence_of(base, table, PHYSICS), inputs_basis(base, table)
+        choice = TermChoice(evidence, tuple(candidates_of(evidence, [*DRIVERS, "topic:/valve"], inputs)), inputs, 0)
+        screened = ForwardSelection(choice, 0.01, baseline(base)).screened(evidence.z)
+        found = np.flatnonzero(screened.p_value <= 0.01).tolist()
+        for used in ("elapsed_time", "topic:/valve"):
+            again = choice.term(found, screened, evidence.z, {used})
+            assert (again.naming.drivers[0], again.best.covariate, again.best.basis.name) == (used, used, "step")
 
     @pytest.mark.slow
     def test_onset_of_an_effect_that_is_fixed_to_the_world_is_found(self) -> None:

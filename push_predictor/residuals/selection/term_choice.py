@@ -246,10 +246,11 @@ class TermChoice:
         first = {c.label: c for c in reversed(self.candidates)}
         along = [_if_growing(c, growing) for c in first.values() if c.covariate == driver]
         refined = {j.candidate.label: j for j in reversed(judged)}
-        if judged[0].exact:  # a whole effect: the others are compared with it as such
+        whole = next((j for j in judged if j.exact and j.candidate.covariate == driver), None)
+        if whole:  # the others are compared with it as such
             others = [self._by_onset(c, z) for c in along if c.mechanism is not None and c.label not in refined]
             best = sorted(others, key=lambda j: -j.gain)[:MOST_RIVALS]
-            return sorted([judged[0], *(self._whole(j.candidate, z) for j in best)], key=lambda j: -j.gain)
+            return sorted([whole, *(self._whole(j.candidate, z) for j in best)], key=lambda j: -j.gain)
         linear = sorted((refined.get(c.label) or self._with_simplest_basis(c, z) for c in along), key=lambda j: -j.gain)
         exact = (self._exact(j, z) if j.gain > 0.0 and not j.exact else j for j in linear[:MOST_NAMED])
         return sorted(exact, key=lambda j: -j.gain)
