@@ -78,6 +78,16 @@ def test_nearly_all_of_training_is_no_part(known: PushTable) -> None:
     assert input_shift(trained(known), known.take(known.inputs[:, 1] < 0.9)).inputs == ()
 
 
+def test_few_windows_outside_are_no_extrapolation_where_the_others_are_a_part(known: PushTable) -> None:
+    speeds = np.where(np.arange(len(known)) % 3 == 0, 0.05, 0.02)
+    model = trained(with_inputs(known, 0, speeds))
+    new = np.where(np.arange(len(known)) % 50 == 49, 0.005, 0.02)
+    shift = input_shift(model, with_inputs(known, 0, new))
+    (one,) = shift.inputs
+    assert one.covariate == "velocity" and 0.0 < one.share_outside < 0.05
+    assert not one.extrapolates and not shift.outside.any()
+
+
 def test_the_most_shifted_input_comes_first(known: PushTable) -> None:
     narrow = known.take(np.abs(known.inputs[:, 2]) < 0.3)
     new = with_inputs(known, 0, np.where(np.arange(len(known)) % 10 == 0, 3.0, 1.0) * narrow.inputs[:, 0].max())

@@ -154,6 +154,17 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     assert judged[0].inputs[:, 0].max() < 2.0 * data.table.inputs[:, 0].max()
 
 
+def test_pushes_on_one_side_are_listed_and_are_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model was trained there, too, so that nothing is extrapolation; about the other sides nothing is known."""
+    data = faultless()
+    one_side = replace(data, table=data.table.take(data.table.inputs[:, 1] < 0.3), recordings=None)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: NO_WRENCH)
+    monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
+    found = trace(learnt(), one_side)
+    assert [each.covariate for each in found.input_shift] == ["contact"]
+    assert found.verdict == "none" and found.model is learnt()
+
+
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
     zero = tuple(Sized(f"force read too much along {axis}", 0.5, 0.4, 0.6, "N") for axis in "xy")
     found = WrenchFinding((), (), 0.1, True, WrenchEffect("wrench_bias", "model_inputs", "constant", zero, 1e-9, ()))
