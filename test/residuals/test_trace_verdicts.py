@@ -235,6 +235,8 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
     assert shift["training"] == pytest.approx([0.02, 0.02], rel=0.1)
     assert shift["now"] == pytest.approx([0.06, 0.06], rel=0.1)
     assert not result["motion_model_changed"]
+    depends_on_speed = {"velocity", "time_since_contact", "contact_gap", "previous_residual"}
+    assert not depends_on_speed & {tested["covariate"] for tested in result["tested"]}
 
 
 def test_a_large_effect_on_an_informed_model_is_one_change_of_its_mechanics() -> None:

@@ -1,0 +1,61 @@
+"""Displacements over pieces of 0.2 s, and how large an effect is compared with the noise."""
+
+import numpy as np
+
+from benchmarks.points_rig.arrays import Array, IntArray, rotate
+from benchmarks.points_rig.effects import Effect
+from benchmarks.points_rig.rigs import Rig
+from benchmarks.points_rig.sessions import Session
+from benchmarks.points_rig.simulation import Tracks, draw_noise, simulate
+
+PIECE = 0.2  # s
+JUDGED_PUSHES = 120
+
+
+def displacements(session: Session, tracks: Tracks) -> Array:
+    """(dx, dy, dtheta) of all whole pieces (W, 3) from the first touch on, in the frame of the push: m, m, rad."""
+    counts = np.floor(session.travel / session.speed / PIECE).astype(np.int64)
+    pushes = np.repeat(np.arange(len(session)), counts)
+    number = np.arange(len(pushes)) - np.repeat(np.cumsum(counts) - counts, counts)
+    length = PIECE * session.speed[pushes]
+    begin = session.gap[pushes] + number * length
+    moved = tracks.at(pushes, begin + length) - tracks.at(pushes, begin)
+    return np.column_stack([rotate(moved[:, :2], -tracks.heading[pushes]), moved[:, 2]])
+
+
+def noise_share(rig: Rig, session: Session, seed: int) -> float:
+    """Noise of the pieces as a share of their displacement, turning counted at the load's mean radius."""
+    first, second = (_pieces(rig, session, seed + draw) for draw in range(2))
+    scale = np.array([1.0, 1.0, rig.load_radius])
+    noise = np.sum(((first - second) * scale) ** 2) / 2
+    return float(np.sqrt(noise / np.sum((first * scale) ** 2)))
+
+
+def clean_ratio(rig: Rig, session: Session, seed: int, effects: tuple[Effect, ...], ratio: float) -> float:
+    """Size of the change in displacement over the difference between two noise draws without the change.
+
+    Both are root mean squares over the pieces of some of the session's pushes, each begun where it is planned; the
+    three outputs are pooled in units of the latter.
+    """
+    if not effects and ratio == 1.0:
+        return 0.0
+    chosen = np.linspace(0, len(session) - 1, min(JUDGED_PUSHES, len(session))).astype(np.int64)
+    plain = _pieces(rig, session, seed, chosen)
+    other = _pieces(rig, session, seed + 1, chosen)
+    changed = _pieces(rig, session, seed, chosen, effects, ratio)
+    return float(np.sqrt(np.mean(np.sum((changed - plain) ** 2, axis=0) / np.sum((other - plain) ** 2, axis=0))))
+
+
+def _pieces(
+    rig: Rig,
+    session: Session,
+    seed: int,
+    chosen: IntArray | None = None,
+    effects: tuple[Effect, ...] = (),
+    ratio: float = 1.0,
+) -> Array:
+    """Pieces of the chosen pushes with noise drawn from a seed."""
+    rows = np.arange(len(session)) if chosen is None else chosen
+    part = session.unchained(rows)
+    noise = draw_noise(np.random.default_rng(seed), rig, part, ratio)
+    return displacements(part, simulate(rig, part, noise, effects))

@@ -1,0 +1,107 @@
+"""The independent simulator: reproducible bags, plausible forces, an honest truth."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.points_rig.arrays import GRAVITY, dot, quarter_turn, rotate
+from benchmarks.points_rig.drivers import Driver
+from benchmarks.points_rig.effects import Effect
+from benchmarks.points_rig.outlines import rectangle
+from benchmarks.points_rig.pairs import make_pair, write_pair
+from benchmarks.points_rig.pieces import clean_ratio
+from benchmarks.points_rig.rigs import Rig, draw_rig
+from benchmarks.points_rig.sessions import Session, plan_session
+from benchmarks.points_rig.simulation import STEP, Tracks, draw_noise, simulate
+
+TRUTH_KEYS = {
+    "number", "group", "seed", "engine", "shape", "surface", "friction", "pushes", "kind", "channel", "names",
+    "covariates", "form", "size", "value", "unit", "place", "second", "clean_ratio",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    """A square with even pressure and no noise."""
+    line = np.linspace(-0.04, 0.04, 6)
+    supports = np.array([[x, y] for x in line for y in line])
+    square = rectangle("square", 0.09, 0.09)
+    drawn = draw_rig(np.random.default_rng(0))
+    return replace(drawn, outline=square, supports=supports, loads=np.full(36, 1 / 36), noise=0.0, chain=1, mass=1.0)
+
+
+@pytest.fixture(scope="module")
+def session(rig: Rig) -> Session:
+    """Twenty pushes, the first four through the centre of each side."""
+    plan = plan_session(np.random.default_rng(1), rig, 20)
+    contact, angle = plan.contact.copy(), plan.angle.copy()
+    contact[:4], angle[:4] = np.arange(4) / 4 + 1 / 8, 0.0
+    return replace(plan, contact=contact, angle=angle, travel=np.full(20, 0.02))
+
+
+@pytest.fixture(scope="module")
+def tracks(rig: Rig, session: Session) -> Tracks:
+    """The pushes, simulated without noise."""
+    noise = draw_noise(np.random.default_rng(2), rig, session)
+    return simulate(rig, session, replace(noise, surface=0 * noise.surface))
+
+
+def test_a_push_through_the_centre_moves_an_even_slider_straight(rig: Rig, session: Session, tracks: Tracks) -> None:
+    moved = (tracks.pose[-1] - tracks.pose[0])[:4]
+    straight = rotate(moved[:, :2], -tracks.heading[:4])
+    np.testing.assert_allclose(straight[:, 0], session.travel[:4], atol=1e-9)
+    np.testing.assert_allclose(straight[:, 1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(moved[:, 2], 0.0, atol=1e-9)
+    force = np.linalg.norm(tracks.force[60, :4], axis=1)
+    np.testing.assert_allclose(force, rig.surface_friction * GRAVITY, rtol=1e-3)
+
+
+def test_contact_forces_lie_in_the_friction_cone_and_press_on_the_tip(rig: Rig, tracks: Tracks) -> None:
+    touching = np.linalg.norm(tracks.normal, axis=2) > 0
+    on_slider = -tracks.force[touching]
+    normal, tangential = (dot(on_slider, axis(tracks.normal[touching])) for axis in (lambda n: n, quarter_turn))
+    assert not tracks.failed.any()
+    assert np.all(normal >= 0)
+    assert np.all(np.abs(tangential) <= rig.contact_friction * normal + 1e-3)
+
+
+def test_the_tip_neither_enters_nor_moves_a_slider_it_does_not_touch(
+    rig: Rig, session: Session, tracks: Tracks
+) -> None:
+    step = int(0.015 / STEP)
+    tip = tracks.origin + step * STEP * np.stack([np.cos(tracks.heading), np.sin(tracks.heading)], axis=1)
+    pose = tracks.pose[step]
+    gap = rig.outline.nearest(rotate(tip - pose[:, :2], -pose[:, 2])).distance - 0.00475
+    assert np.all(gap > -2e-5)
+    np.testing.assert_array_equal(tracks.pose[int(session.gap.min() / STEP) - 1], tracks.pose[0])
+
+
+def test_friction_never_returns_power(tracks: Tracks) -> None:
+    moved = np.diff(tracks.pose, axis=0)
+    step = np.arange(len(moved))[:, None, None] * STEP
+    tip = tracks.origin + step * np.stack([np.cos(tracks.heading), np.sin(tracks.heading)], axis=1)
+    arm = tip + 0.00475 * tracks.normal - tracks.pose[:-1, :, :2]
+    work = dot(-tracks.force, moved[..., :2] + moved[..., 2:] * quarter_turn(arm))
+    assert work.min() >= -1e-9
+
+
+def test_the_clean_ratio_is_zero_without_a_change_and_large_with_a_large_one(rig: Rig, session: Session) -> None:
+    noisy = replace(rig, noise=1.0)
+    change = Effect("centre_of_friction", 0.018, Driver("constant"), 0.0)
+    assert clean_ratio(noisy, session, 3, (), 1.0) == 0.0
+    assert clean_ratio(noisy, session, 3, (replace(change, value=0.0),), 1.0) < 1e-9
+    assert clean_ratio(noisy, session, 3, (change,), 1.0) > 1.0
+
+
+def test_the_same_seed_writes_the_same_bag_and_a_whole_truth(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_pair(make_pair(6, 21, 4, 4), tmp_path / name / "data", tmp_path / name / "truth")
+    files = sorted(path.relative_to(tmp_path / "first") for path in (tmp_path / "first").rglob("*.*"))
+    assert len(files) == 5
+    for file in files:
+        assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes()
+    truth = json.loads((tmp_path / "first" / "truth" / "021.json").read_text())
+    assert truth.keys() >= TRUTH_KEYS
