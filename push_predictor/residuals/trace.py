@@ -200,7 +200,7 @@ def _verdict(motion: MotionFinding, forces: WrenchFinding, shifted: Sequence[Shi
         return "wrench_only"
     if motion.variance:
         return "variance"
-    return "input_shift" if any(each.extrapolates for each in shifted) else "none"
+    return "input_shift" if shifted else "none"
 
 
 def _rival_covariates(forces: WrenchFinding) -> tuple[str, ...]:

@@ -154,15 +154,17 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     assert judged[0].inputs[:, 0].max() < 2.0 * data.table.inputs[:, 0].max()
 
 
-def test_pushes_on_one_side_are_listed_and_are_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The model was trained there, too, so that nothing is extrapolation; about the other sides nothing is known."""
+def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model was trained there, too. About the other sides the new pushes show nothing."""
     data = faultless()
     one_side = replace(data, table=data.table.take(data.table.inputs[:, 1] < 0.3), recordings=None)
     monkeypatch.setattr("push_predictor.residuals.channel_search.wrench_effects", lambda *_: NO_WRENCH)
     monkeypatch.setattr("push_predictor.residuals.channel_search.motion_effects", lambda *_, **__: NO_MOTION)
     found = trace(learnt(), one_side)
     assert [each.covariate for each in found.input_shift] == ["contact"]
-    assert found.verdict == "none" and found.model is learnt()
+    assert found.verdict == "input_shift" and found.extended is None
+    assert answer(found)[2].startswith("Keep the deployed model, and push in the rest of its range")
+    assert "Push in the rest of it" in worth_sentence(found)
 
 
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -191,7 +191,9 @@ _ACTIONS: dict[str, Callable[[Trace], str]] = {
     "wrench_only": lambda _: "Keep the motion model: only what uses the force needs the new value.",
     "measurement": _action_on_measurement,
     "variance": lambda _: "Retrain the model on the new pushes, so that it predicts the new noise.",
-    "input_shift": lambda _: (
+    "input_shift": lambda trace: (
         "Train on pushes in the new range, then trace again: outside its range a model extrapolates."
+        if trace.input_shift[0].extrapolates
+        else "Keep the deployed model, and push in the rest of its range, too: there these pushes show nothing."
     ),
 }
