@@ -24,6 +24,7 @@ CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)
 MOST_LEVELS = 12
+ENDS = (0.05, 0.95)  # quantiles of the covariate between which a change is reported
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 
 
@@ -52,6 +53,15 @@ def standard_basis(name: str, driver: str, values: Array) -> DriverBasis:
     """A basis of one scalar covariate, centred and scaled on its values (n,)."""
     scale = float(np.ptp(values)) / 3.0 if name == "logarithmic" else float(values.std())
     return DriverBasis(name, (driver,), (float(values.mean()),), (scale,), place=float(values.min()))
+
+
+def between_ends(basis: DriverBasis, table: PushTable) -> Array | None:
+    """Values (m,) of a basis at the upper end of its covariate less those at the lower; None if it has no ends."""
+    if basis.name not in ("linear", "logarithmic", "quadratic", "step"):
+        return None
+    values, driver = basis.values(table.covariates, len(table)), np.asarray(table.covariates[basis.drivers[0]])
+    low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
+    return np.asarray(values[high] - values[low])
 
 
 def _bases_of(name: str, values: Array) -> list[DriverBasis]:

@@ -6,10 +6,10 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.drivers import between_ends
 from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
-ENDS = (0.05, 0.95)  # quantiles of the covariate between which a change is reported
 DRAWS = 2000
 
 
@@ -41,13 +41,11 @@ def _name(effect: Effect) -> str:
 def _change(effect: Effect, table: PushTable) -> Array:
     """Difference (m,) of the basis between the two ends that are compared."""
     basis = effect.basis
-    values = basis.values(table.covariates, len(table))
     if basis.is_constant:
         return np.ones(1)
-    if basis.name in ("linear", "logarithmic", "quadratic", "step"):
-        driver = np.asarray(table.covariates[basis.drivers[0]])
-        low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
-        return np.asarray(values[high] - values[low])
+    if (change := between_ends(basis, table)) is not None:
+        return change
+    values = basis.values(table.covariates, len(table))
     strength = values @ effect.coefficients.reshape(-1, values.shape[1])[0]
     return np.asarray(values[int(np.argmax(strength))] - values[int(np.argmin(strength))])
 
