@@ -94,7 +94,7 @@ def test_drift_of_surface_friction_is_found_and_sized(drift: float, baseline: Pu
     assert size.unit == "1"
 
 
-@pytest.mark.parametrize(("step", "place"), [(-0.5, 0.33), (0.2, 0.6), (-0.25, 0.7)])
+@pytest.mark.parametrize(("step", "place"), [(-0.5, 0.35), (0.2, 0.65), (-0.25, 0.75)])
 def test_step_of_surface_friction_is_a_step_of_its_size_and_sign(step: float, place: float) -> None:
     table = made(2)
     later = table.covariates["elapsed_time"] > 2.0 * place * PUSHES
@@ -104,8 +104,10 @@ def test_step_of_surface_friction_is_a_step_of_its_size_and_sign(step: float, pl
     assert effect.parameters[0].low < np.expm1(step) < effect.parameters[0].high
 
 
-def test_drift_of_surface_friction_is_no_step() -> None:
-    (effect,) = found(made(2, drift=0.3), made(1)).effects
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_drift_of_surface_friction_is_no_step(seed: int) -> None:
+    """A step may fit better by chance; it must fit surely better."""
+    (effect,) = found(made(seed, drift=0.15), made(1)).effects
     assert effect.basis == "linear"
 
 
