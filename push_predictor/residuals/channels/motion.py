@@ -28,9 +28,8 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
-MOSTLY = 0.5  # share inside training's inputs from which an effect of the inputs is more than extrapolation
+OF_INPUTS = ("velocity", *LOCAL)  # an error of extrapolation depends on them, too
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
-VELOCITY = "velocity"
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
 
@@ -123,15 +122,8 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
 
 def _separable(candidate: Candidate, inside: float) -> bool:
     """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
-    if inside == 1.0:
-        return True
-    if candidate.covariate in LOCAL:  # they vary along a push as the error of extrapolation does
-        return False
-    if candidate.covariate == VELOCITY:
-        return inside >= MOSTLY
-    if not candidate.basis.is_constant:
-        return True
-    return inside >= MOSTLY and candidate.mechanism is not None
+    of_inputs = candidate.basis.is_constant or candidate.covariate in OF_INPUTS
+    return inside == 1.0 or not (of_inputs or candidate.mechanism is None)
 
 
 def _spread(
