@@ -16,6 +16,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import held_out_gain
 from push_predictor.residuals.extension.recalibration import (
@@ -135,3 +136,21 @@ def test_a_refit_takes_as_many_rows_as_the_model_had_within_bounds() -> None:
     large = replace(small, training=noisy_pushes(700))
     assert len(spread_rows(large, many)) == 500
     assert len(spread_rows(large, many).pushes) > 330
+
+
+@pytest.mark.parametrize("size", [0.2, -0.2])
+def test_interval_of_a_size_contains_errors_of_the_mechanics(size: float) -> None:
+    """2.5 % remain where the data determine the coefficient exactly."""
+    exact = Effect(
+        "contact_friction",
+        "session",
+        DriverBasis("constant"),
+        np.array([size]),
+        np.full((1, 1), 1e-12),
+        np.ones(3),
+        True,
+    )
+    sized = size_of(exact, pushes(2, 0))
+    assert sized is not None and sized.value == pytest.approx(size)
+    assert sized.high - size == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)
+    assert size - sized.low == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)

@@ -172,7 +172,14 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
     assert not unknown.terms and unknown.uncompared == ("contact_gap",)
     with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
         outside = np.zeros(len(later), dtype=np.bool_)
-        motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, ["contact_gap"], inside=outside)
+        motion_effects(
+            single,
+            evidence_of(single, with_instrument(later)),
+            0.01,
+            ["contact_gap"],
+            inside=outside,
+            extrapolated=True,
+        )
     plain = replace(training, outcomes=pushes(120, 1).outcomes)
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms

@@ -28,7 +28,7 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
-OF_INPUTS = ("velocity", *LOCAL)  # an error of extrapolation depends on them, too
+VELOCITY = "velocity"
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
@@ -73,17 +73,19 @@ def motion_effects(
     seed: int = 0,
     *,
     inside: BoolArray | None = None,
+    extrapolated: bool = False,
 ) -> MotionFinding:
     """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None.
 
     inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: its noise is not
-    judged, and an error that depends on the inputs alone is no effect.
+    judged. extrapolated: whether such windows were recorded, searched or not: an error that depends on the inputs alone
+    is then no effect.
     """
     inputs = inputs_basis(model, evidence.table)
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
+    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()), extrapolated)]
     candidates = [c for c in every if not baseline.lacks(c.covariate)]
     if not candidates:
         raise RequestError("covariate", ", ".join(names or ()), "one that training recorded, too")
@@ -120,10 +122,17 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
     return {"noise": {"value": spread.detectable, "unit": "times training", "covariate": SESSION}}
 
 
-def _separable(candidate: Candidate, inside: float) -> bool:
-    """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
-    of_inputs = candidate.basis.is_constant or candidate.covariate in OF_INPUTS
-    return inside == 1.0 or not (of_inputs or candidate.mechanism is None)
+def _separable(candidate: Candidate, inside: float, extrapolated: bool) -> bool:
+    """Whether an effect differs from what other inputs than those of training do to a model.
+
+    Where some pushes lie outside, many lie at the ends of training's range: there the errors of a model are larger, and
+    differ along a push. inside: share of windows among training's inputs.
+    """
+    if not extrapolated:
+        return True
+    if candidate.basis.is_constant or candidate.covariate in LOCAL:
+        return False
+    return inside == 1.0 or (candidate.mechanism is not None and candidate.covariate != VELOCITY)
 
 
 def _spread(
