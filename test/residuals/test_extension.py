@@ -25,6 +25,7 @@ from push_predictor.residuals.extension.recalibration import (
     uncertainty_of_effects,
 )
 from push_predictor.residuals.extension.refit import refit_base, spread_rows
+from push_predictor.residuals.outcome import Sized
 
 CONSTANT = DriverBasis("constant")
 ANALYSIS, HELD_OUT = (pushes(count, seed, slippery(0.0)) for count, seed in ((120, 3), (60, 4)))
@@ -154,3 +155,9 @@ def test_interval_of_a_size_contains_errors_of_the_mechanics(size: float) -> Non
     assert sized is not None and sized.value == pytest.approx(size)
     assert sized.high - size == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)
     assert size - sized.low == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)
+
+
+def test_interval_of_a_size_is_widened_by_independent_errors() -> None:
+    sized = Sized("lateness", 0.040, 0.038, 0.043, "s").with_errors_of_mechanics()
+    assert (sized.low, sized.value, sized.high) == pytest.approx((0.040 - 0.0028, 0.040, 0.040 + 0.0036), abs=5e-5)
+    assert Sized("bias", 0.0, -0.1, 0.2, "N").with_errors_of_mechanics() == Sized("bias", 0.0, -0.1, 0.2, "N")

@@ -11,9 +11,6 @@ from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
 DRAWS = 2000
-# Relative standard deviation of a size on rigs whose friction and support are not those of the mechanics: with more
-# pushes the interval of the coefficients shrinks, and this does not (docs/results/residual_loop.md).
-DISCREPANCY = 0.025
 
 
 def size_of(effect: Effect, table: PushTable) -> Sized | None:
@@ -31,9 +28,9 @@ def size_of(effect: Effect, table: PushTable) -> Sized | None:
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, size=DRAWS, method="svd")
     lengths = np.array([_length(row, change, len(parameters)) for row in drawn])
-    lengths *= 1.0 + DISCREPANCY * rng.standard_normal(DRAWS)
     low, high = np.quantile(lengths, [0.025, 0.975])
-    return Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
+    sized = Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
+    return sized.with_errors_of_mechanics()
 
 
 def _name(effect: Effect) -> str:
