@@ -305,12 +305,12 @@ class TestBasis:
         )
         push = Push(plain.inputs, plain.duration, plain.covariates)
         shift = joint_shift(MECHANICS, [effect], push)
-        reached = 1.0 - np.exp(-(time - time.min()) / (0.1 * np.ptp(time))) if grows else np.ones(len(time))
+        reached = 1.0 - np.exp(-(time - time.min()) / (0.05 * np.ptp(time))) if grows else np.ones(len(time))
         table = replace(plain, outcomes=plain.outcomes + reached[:, None] * shift)
         base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
         (term,) = searched(base, table).terms
-        assert term.mechanism == "contact_friction"
-        assert set(term.naming.drivers) - {term.best.covariate} == rivals - {term.best.covariate}
+        assert term.best.label == ("contact_friction", "model_inputs")
+        assert set(term.naming.drivers) == {"model_inputs", *rivals}
 
     @pytest.mark.slow
     def test_onset_of_an_effect_that_is_fixed_to_the_world_is_found(self) -> None:
