@@ -74,6 +74,17 @@ def test_one_side_of_a_symmetric_slider_is_a_part(known: PushTable) -> None:
     assert [each.covariate for each in input_shift(trained(known), one_side).inputs] == ["contact"]
 
 
+def test_the_input_with_the_smallest_part_comes_first(known: PushTable) -> None:
+    """A few windows outside do not decide, unless they are an extrapolation."""
+    part = known.take((known.inputs[:, 1] < 0.2) & (known.inputs[:, 2] > 0.0))
+    angle = part.inputs[:, 2].copy()
+    angle[0] = known.inputs[:, 2].max() + 0.15
+    shift = input_shift(trained(known), with_inputs(part, 2, angle))
+    one, other = shift.inputs
+    assert (one.covariate, other.covariate) == ("contact", "angle") and other.share_outside > 0.0
+    assert one.share_unvisited > other.share_unvisited
+
+
 def test_nearly_all_of_training_is_no_part(known: PushTable) -> None:
     assert input_shift(trained(known), known.take(known.inputs[:, 1] < 0.9)).inputs == ()
 

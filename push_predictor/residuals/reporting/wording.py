@@ -60,7 +60,9 @@ def worth_sentence(trace: Trace) -> str:
     if trace.verdict == "measurement":
         return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
     if trace.verdict == "input_shift":
-        further = "Train on pushes in the new range" if trace.input_shift[0].extrapolates else "Push in the rest of it"
+        further = (
+            "Train on pushes in the new range" if trace.input_shift[0].extrapolates else "Push in the rest of its range"
+        )
         return f"The motion model stays unchanged. {further}, then trace again."
     if not trace.terms:
         retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
