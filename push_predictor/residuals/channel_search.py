@@ -32,13 +32,7 @@ def search_all(question: Question, watch: Watch = no_watch) -> Searched:
             return Searched(measured, NO_MOTION, NO_WRENCH, corrected)
     watch("motion", 0.15)
     motion = motion_effects(
-        model,
-        question.evidence,
-        question.share("motion"),
-        question.covariates,
-        seed,
-        inside=question.inside,
-        extrapolated=any(shift.extrapolates for shift in question.shifted),
+        model, question.evidence, question.share("motion"), question.covariates, seed, inside=question.inside
     )
     watch("force", 0.6)
     known = analysis.take(question.inside)  # faster pushes need more force, and training does not show how much

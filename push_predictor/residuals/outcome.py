@@ -32,8 +32,8 @@ CHANNELS: dict[Verdict, str] = {
 }
 
 
-# Relative standard deviation of a size on rigs whose friction and support are not those of the mechanics: with more
-# pushes the interval of an estimate shrinks, and this does not (docs/results/residual_loop.md).
+# Relative standard deviation of a size by errors of the mechanics; more pushes do not reduce it. Chosen from misses on
+# rigs with other laws of friction (docs/results/residual_loop.md).
 DISCREPANCY = 0.025
 
 
@@ -114,7 +114,7 @@ class Trace:
     the better of the two models without the effects, with which the gain compares. extended: the model with the
     effects, None if the motion model does not change. remaining: mechanism and covariate of the strongest effect that
     is still significant. input_shift:
-    inputs whose new values leave those of training. notes: further sentences for the reader.
+    inputs that differ from those of training. notes: further sentences for the reader.
     """
 
     verdict: Verdict

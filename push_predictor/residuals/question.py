@@ -25,7 +25,7 @@ class Question:
     """Analysis pushes, their evidence, and held-out pushes.
 
     model: the deployed one, or one about mechanics where that cannot extrapolate. windows: of the analysis, as they
-    were measured: those among the inputs of training, unless few are. inside: which of them are.
+    were measured. inside: those among the inputs of training.
     """
 
     deployed: PushModel
@@ -58,7 +58,6 @@ class Question:
         before = previous_residual(loaded.table, every.z)
         table = replace(loaded.table, covariates={**loaded.table.covariates, "previous_residual": before})
         held, usable = held_out_rows(table, loaded.chosen), with_instrument(table)
-        analysed = ~held & shift.searched
         if GAP in (covariates or ()) and GAP not in usable.covariates:
             raise RequestError(
                 "covariate", GAP, "pushes of several windows: a window's own gap shares the outcome's noise"
@@ -70,9 +69,9 @@ class Question:
             alpha=alpha,
             covariates=None if covariates is None else tuple(covariates),
             seed=seed,
-            windows=table.take(analysed),
-            evidence=replace(every.take(analysed), table=usable.take(analysed)),
-            inside=~shift.outside[analysed],
+            windows=table.take(~held),
+            evidence=replace(every.take(~held), table=usable.take(~held)),
+            inside=~shift.outside[~held],
             held_out=table.take(held),
             shifted=shift.inputs,
         )

@@ -178,7 +178,6 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
             0.01,
             ["contact_gap"],
             inside=outside,
-            extrapolated=True,
         )
     plain = replace(training, outcomes=pushes(120, 1).outcomes)
     new = replace(model, training=plain)

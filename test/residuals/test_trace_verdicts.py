@@ -164,7 +164,7 @@ def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytes
     assert [each.covariate for each in found.input_shift] == ["contact"]
     assert found.verdict == "input_shift" and found.extended is None
     assert answer(found)[2].startswith("Keep the deployed model, and push in the rest of its range")
-    assert "Push in the rest of its range" in worth_sentence(found)
+    assert "Push in the rest of training's range" in worth_sentence(found)
 
 
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
@@ -25,10 +25,10 @@ from push_predictor.residuals.selection.forward_selection import ForwardSelectio
 from push_predictor.residuals.selection.further_steps import climbed
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
+from push_predictor.residuals.selection.term_choice import GROWN, SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
-VELOCITY = "velocity"
+MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
@@ -73,22 +73,21 @@ def motion_effects(
     seed: int = 0,
     *,
     inside: BoolArray | None = None,
-    extrapolated: bool = False,
 ) -> MotionFinding:
     """Search the evidence of a model on windows that it was not trained on; names: covariates, all recorded if None.
 
     inside (n,): windows among the inputs of training, all if None. Elsewhere the model extrapolates: its noise is not
-    judged. extrapolated: whether such windows were recorded, searched or not: an error that depends on the inputs alone
-    is then no effect.
+    judged, and an error that depends on the inputs alone is no effect.
     """
     inputs = inputs_basis(model, evidence.table)
     baseline = baseline_of(model, evidence.mechanics, evidence.table.inputs)
     share = (1.0 - VARIANCE_SHARE) * alpha
     known = np.ones(len(evidence.table), dtype=np.bool_) if inside is None else inside
-    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()), extrapolated)]
+    every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
     candidates = [c for c in every if not baseline.lacks(c.covariate)]
     if not candidates:
-        raise RequestError("covariate", ", ".join(names or ()), "one that training recorded, too")
+        accepted = "one that training recorded, too" if every else "one that the inputs do not change, as they shifted"
+        raise RequestError("covariate", ", ".join(names or ()), accepted)
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
     found = replace(found, terms=needed_terms(found.terms, evidence))
     if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
@@ -122,17 +121,17 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
     return {"noise": {"value": spread.detectable, "unit": "times training", "covariate": SESSION}}
 
 
-def _separable(candidate: Candidate, inside: float, extrapolated: bool) -> bool:
-    """Whether an effect differs from what other inputs than those of training do to a model.
+def _separable(candidate: Candidate, inside: float) -> bool:
+    """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs.
 
-    Where some pushes lie outside, many lie at the ends of training's range: there the errors of a model are larger, and
-    differ along a push. inside: share of windows among training's inputs.
+    Where some windows lie outside, many lie at the ends of training's range. There the errors of a model are larger,
+    and differ along a push.
     """
-    if not extrapolated:
+    if inside == 1.0:
         return True
-    if candidate.basis.is_constant or candidate.covariate in LOCAL:
+    if candidate.mechanism is None or candidate.basis.is_constant or candidate.covariate in LOCAL:
         return False
-    return inside == 1.0 or (candidate.mechanism is not None and candidate.covariate != VELOCITY)
+    return candidate.covariate != SPEED or inside >= MOSTLY
 
 
 def _spread(
@@ -188,6 +187,8 @@ def _experiment(
         return Experiment()
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
+        if first.best.basis.is_constant and judged.candidate.covariate in GROWN:
+            continue  # that a constant effect grew early shows only in a session that begins anew
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
     controls = inputs.columns if inputs.absorbs else None
     fitted = [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()]

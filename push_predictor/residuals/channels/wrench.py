@@ -250,7 +250,7 @@ def _chosen(force: _Force, z: Array, significant: Sequence[Contrast], seed: int)
 
 
 def _as_step(force: _Force, z: Array, best: Contrast, seed: int) -> Contrast:
-    """The change of the friction as a step along its covariate, unless a straight line fits as well."""
+    """The change of the friction as a step along its covariate, unless a line fits as well or a curve surely better."""
     if best.mechanism != SURFACE_FRICTION or best.basis.name not in ("linear", "quadratic"):
         return best
 
@@ -296,6 +296,7 @@ def _over_range(force: _Force, best: Contrast) -> Array:
     """Rows (k, p) of the basis over the new windows, in units of z; one difference where its covariate has ends."""
     if best.covariate == CONSTANT:
         return np.array([[1.0 / force.unit[0]]])
-    change = between_ends(best.basis, force.table)
+    # A curve may begin and end at the same force.
+    change = None if best.basis.name == "quadratic" else between_ends(best.basis, force.table)
     values = best.basis.values(force.table.covariates, len(force.table)) if change is None else change[None]
     return np.asarray(values / force.unit[0])

@@ -59,6 +59,8 @@ def between_ends(basis: DriverBasis, table: PushTable) -> Array | None:
     """Values (m,) of a basis at the upper end of its covariate less those at the lower; None if it has no ends."""
     if basis.name not in ("linear", "logarithmic", "quadratic", "step"):
         return None
+    if basis.name == "step":
+        return np.ones(1)  # wherever it is
     values, driver = basis.values(table.covariates, len(table)), np.asarray(table.covariates[basis.drivers[0]])
     low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
     return np.asarray(values[high] - values[low])

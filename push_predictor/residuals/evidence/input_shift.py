@@ -18,7 +18,6 @@ ANGLE_MARGIN = 0.1  # rad
 CONTACT_MARGIN = 0.03  # of the perimeter
 WIDEST_GAPS = 2.0  # contacts this many times farther from a training push than training pushes from each other
 ONE_SIDED = 0.2  # share of training outside the new inputs from which these are a part of them only
-MOSTLY = 0.5  # share of windows inside from which the others are not searched for effects
 NOTABLE = 0.05  # share of the windows outside from which an input has shifted
 
 
@@ -51,11 +50,6 @@ class InputShift:
 
     inputs: tuple[ShiftedInput, ...]
     outside: BoolArray
-
-    @property
-    def searched(self) -> BoolArray:
-        """The windows (n,) that are searched for effects: those inside, if these are most of them, else all."""
-        return ~self.outside if np.mean(~self.outside) >= MOSTLY else np.ones(len(self.outside), dtype=np.bool_)
 
 
 def input_shift(model: PushModel, table: PushTable) -> InputShift:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect, mechanism_named
@@ -30,7 +32,8 @@ def size_of(effect: Effect, table: PushTable) -> Sized | None:
     lengths = np.array([_length(row, change, len(parameters)) for row in drawn])
     low, high = np.quantile(lengths, [0.025, 0.975])
     sized = Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
-    return sized.with_errors_of_mechanics()
+    sized = sized.with_errors_of_mechanics()
+    return sized if len(parameters) == 1 else replace(sized, low=max(sized.low, 0.0))  # a length is never negative
 
 
 def _name(effect: Effect) -> str:

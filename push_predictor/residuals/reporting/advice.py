@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from push_predictor.residuals.outcome import FoundEffect
 from push_predictor.residuals.reporting.phrases import covariate_phrase, listed
 
 DRIFTING = ("elapsed_time", "push_index", "slid_distance")
@@ -38,6 +39,14 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two 
         "Repeat the setting of an early recording in a new one: an effect of the setting recurs, a drift does not.",
     ),
 )
+
+
+ANEW = "To decide, restore the rig to its state at the start of the session, and push again."
+
+
+def grew_early(effect: FoundEffect, equivalent: Sequence[str]) -> bool:
+    """Whether all that rivals a constant effect is that it grew early in the session."""
+    return effect.basis == "constant" and bool(equivalent) and {*equivalent} <= {*DRIFTING}
 
 
 def separating_words(rivals: Sequence[str]) -> list[str]:

@@ -54,7 +54,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
     if left := [
         effect_phrase(t.mechanism, t.best.covariate) for t, part in zip(motion.terms, parts, strict=True) if part
     ]:
-        notes.append(f"Part of a listed effect, and therefore not listed, but contained in the model: {listed(left)}.")
+        notes.append(f"Fitted together with a listed effect, and not listed separately: {listed(left)}.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
         notes.append(
@@ -67,7 +67,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
             f"they lack the covariate, or have too few windows per push."
         )
-    if rivals := motion.experiment.inseparable:
+    if (rivals := motion.experiment.inseparable) and not motion.terms[0].best.basis.is_constant:
         names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])
         notes.append(
             f"{PUSHES} further pushes would not separate {names}: at all values that can be set, their predictions are "

@@ -12,6 +12,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.outcome import FoundEffect, Gain, Trace, Verdict
+from push_predictor.residuals.reporting.advice import grew_early
 from push_predictor.residuals.reporting.input_shift import share_clause, shift_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import (
@@ -61,7 +62,9 @@ def worth_sentence(trace: Trace) -> str:
         return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
     if trace.verdict == "input_shift":
         further = (
-            "Train on pushes in the new range" if trace.input_shift[0].extrapolates else "Push in the rest of its range"
+            "Train on pushes in the new range"
+            if trace.input_shift[0].extrapolates
+            else "Push in the rest of training's range"
         )
         return f"The motion model stays unchanged. {further}, then trace again."
     if not trace.terms:
@@ -246,7 +249,9 @@ EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
 def rivals_sentence(trace: Trace, where: str = "below") -> str:
     """The covariates and mechanisms that fit as well, and how many pushes would decide."""
     text = ""
-    if trace.equivalent:
+    if trace.effects and grew_early(trace.effects[0], trace.equivalent):
+        text = " It was there from the first push, or it grew early in the session: these pushes do not decide."
+    elif trace.equivalent:
         names = listed([covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)])
         pushes = count(len(trace.experiment), "push that would decide is", "pushes that would decide are")
         text = f" {capitalised(names)} fit equally well{f'; {pushes} listed {where}' if trace.experiment else ''}."

@@ -113,9 +113,9 @@ class TermChoice:
         refined = self._refined([_if_growing(self.candidates[k], growing) for k in chosen], z)
         judged, grown = self._with_onset(refined, z)
         rivals = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
-        rivals = [*rivals, *(j for j in grown if j.candidate.covariate not in {r.candidate.covariate for r in rivals})]
         rivals = self._separated(rivals, z) if self.evidence.chosen else rivals
         driver = next((j for j in rivals if j.candidate.covariate in used), rivals[0]).candidate.covariate
+        rivals = [*rivals, *(j for j in grown if j.candidate.covariate not in {r.candidate.covariate for r in rivals})]
         best, naming = self._named(judged, driver, z, growing)
         drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in rivals)]))
         labels = {j.candidate.label for j in judged}
@@ -167,7 +167,7 @@ class TermChoice:
         """With whole effects in front that surely begin with some value of a covariate; and rivals of a constant one.
 
         Where a base absorbs no constant effect, the constant and the changing part of an effect are found apart. The
-        rivals grow from zero in the session, and soon have their full size.
+        rivals grow from zero in the session, soon have their full size, and fit better, though not surely.
         """
         first = judged[0].candidate
         if self.inputs.absorbs or not (first.basis.is_constant or first.covariate in OF_SESSION):
@@ -184,7 +184,7 @@ class TermChoice:
         if surely or not first.basis.is_constant:
             return [*surely, *judged], []
         growing = [self._growing_from_zero(c, z) for c in along if c.covariate in GROWN]
-        return judged, [j for j in growing if not surely_larger(always, j)]
+        return judged, [j for j in growing if j.gain > always.gain]
 
     def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
         """The constant effects found, if one comes first; else that of the first one's mechanism."""

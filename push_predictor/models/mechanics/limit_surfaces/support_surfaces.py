@@ -76,7 +76,7 @@ class RowSurfaces:
 
     @cached_property
     def cell_slopes(self) -> Array:
-        """See `cells`."""
+        """Those of all tables along the last axis, (2, 12, cells)."""
         return joined([one.cell_slopes for one in self.maps])
 
     @cached_property
@@ -86,7 +86,7 @@ class RowSurfaces:
 
     @cached_property
     def size_slopes(self) -> Array:
-        """See `cells`."""
+        """Those of all tables along the last axis, (2, 4, cells)."""
         return joined([one.size_slopes for one in self.maps])
 
     @property
