@@ -161,3 +161,28 @@ def test_interval_of_a_size_is_widened_by_independent_errors() -> None:
     sized = Sized("lateness", 0.040, 0.038, 0.043, "s").with_errors_of_mechanics()
     assert (sized.low, sized.value, sized.high) == pytest.approx((0.040 - 0.0028, 0.040, 0.040 + 0.0036), abs=5e-5)
     assert Sized("bias", 0.0, -0.1, 0.2, "N").with_errors_of_mechanics() == Sized("bias", 0.0, -0.1, 0.2, "N")
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.98])
+def test_size_of_a_step_does_not_depend_on_its_place(share: float) -> None:
+    """Near the ends of its covariate, too, where drifts are not followed."""
+    table = pushes(60, 0)
+    place = float(np.quantile(table.covariates["elapsed_time"], share))
+    basis = DriverBasis("step", ("elapsed_time",), place=place)
+    step = Effect("contact_friction", "elapsed_time", basis, np.array([0.1]), np.full((1, 1), 1e-6), np.ones(3), True)
+    sized = size_of(step, table)
+    assert sized is not None and sized.value == pytest.approx(0.1)
+
+
+def test_length_of_a_vector_is_not_negative() -> None:
+    small = Effect(
+        "tilted_surface",
+        "push_heading",
+        DriverBasis("constant"),
+        np.array([1e-4, 0.0]),
+        np.eye(2) * 1e-6,
+        np.ones(3),
+        True,
+    )
+    sized = size_of(small, pushes(2, 0))
+    assert sized is not None and sized.low >= 0.0
