@@ -34,7 +34,7 @@ from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
 from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
-from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
+from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
 from push_predictor.residuals.selection.absolute_fit import parts_of_others
 
 NO_GAIN = Gain(0.0, 0.0, 0.0)
@@ -168,7 +168,7 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         experiment=motion.experiment.pushes,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=notes_of(question.loaded, motion, measured, forces),
+        notes=(*notes_of(question.loaded, motion, measured, forces), *notes_of_shift(question.shifted)),
     )
 
 

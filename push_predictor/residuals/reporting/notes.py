@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from push_predictor.residuals.channels.measurement import MeasurementFinding
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.wrench import WrenchFinding
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.reporting.phrases import (
@@ -22,6 +25,10 @@ CUT_AGAIN = (
     "unchanged, on the held-out pushes of the corrected recordings."
 )
 NO_STREAMS = "A push table contains no streams, so the error is reported but not corrected. Give the recording."
+NOT_TRIED = (
+    "Not tested, because some pushes lie outside the inputs of training: constant effects, unknown mechanisms, and "
+    "effects that vary along a push."
+)
 NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
@@ -38,6 +45,11 @@ def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
     experiment = (f"{chosen} pushes of the designed experiment are analysed and never held out.",) if chosen else ()
     dropped = (f"{capitalised(covariate_phrase(name))} was dropped: {why}." for name, why in loaded.dropped.items())
     return (f"Split: {RULE}. Windows of one push stay together.", *experiment, *dropped)
+
+
+def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:
+    """What was not tried because the inputs extrapolate."""
+    return (NOT_TRIED,) if any(shift.extrapolates for shift in shifted) else ()
 
 
 def _of_motion(motion: MotionFinding) -> list[str]:
