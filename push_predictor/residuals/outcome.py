@@ -108,13 +108,13 @@ class HeldOut:
 class Trace:
     """All that a trace found.
 
-    effects: in the order of selection; terms: the same as effects of a model, empty if the mean of the motion is
-    unchanged. equivalent: rivals of the first effect's covariate; mechanisms: rivals of its mechanism. analysis: the
-    windows that were searched; residual, unexplained (n, 3): their standardised residuals before and after. gain_over:
-    the better of the two models without the effects, with which the gain compares. extended: the model with the
-    effects, None if the motion model does not change. remaining: mechanism and covariate of the strongest effect that
-    is still significant. input_shift:
-    inputs that differ from those of training. notes: further sentences for the reader.
+    effects: in the order of selection; terms: the same as effects of a model, then parts of these; empty if the mean
+    of the motion is unchanged. equivalent: rivals of the first effect's covariate; mechanisms: rivals of its
+    mechanism. analysis: the windows that were searched; residual, unexplained (n, 3): their standardised residuals
+    before and after. gain_over: the better of the two models without the effects, with which the gain compares.
+    extended: the model with the effects, None if the motion model does not change. remaining: mechanism and covariate
+    of the strongest effect that is still significant. input_shift: inputs that differ from those of training. notes:
+    further sentences for the reader.
     """
 
     verdict: Verdict

@@ -14,7 +14,7 @@ from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
+from push_predictor.residuals.evidence.drivers import CUMULATIVE, LOCAL, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
@@ -25,7 +25,7 @@ from push_predictor.residuals.selection.forward_selection import ForwardSelectio
 from push_predictor.residuals.selection.further_steps import climbed
 from push_predictor.residuals.selection.power import detectable_json, minimum_detectable
 from push_predictor.residuals.selection.pruning import needed_terms
-from push_predictor.residuals.selection.term_choice import GROWN, SelectedTerm, TermChoice
+from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
 MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
@@ -40,7 +40,8 @@ Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: in the order of selection. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism.
+    terms: in the order of selection, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
+    and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
     confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
@@ -187,7 +188,7 @@ def _experiment(
         return Experiment()
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
-        if first.best.basis.is_constant and judged.candidate.covariate in GROWN:
+        if first.best.basis.is_constant and judged.candidate.covariate in CUMULATIVE:
             continue  # that a constant effect grew early shows only in a session that begins anew
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
     controls = inputs.columns if inputs.absorbs else None

@@ -35,7 +35,15 @@ from push_predictor.residuals.channels.contrast import (
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.channels.sensor_zero import zero_shift
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, between_ends, screening_bases
+from push_predictor.residuals.evidence.drivers import (
+    CONSTANT,
+    CUMULATIVE,
+    LOCAL,
+    PLACE,
+    SESSION,
+    between_ends,
+    screening_bases,
+)
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
 from push_predictor.residuals.selection.basis_choice import SIMPLEST_FIRST, step_places, step_places_near
@@ -50,7 +58,7 @@ FEWEST_PUSHES = 12
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
-PROGRESS = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
+PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
 
 
 @dataclass(frozen=True)

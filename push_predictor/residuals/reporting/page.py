@@ -99,7 +99,7 @@ def _facts(trace: Trace) -> dict[str, str]:
 
 
 def _shifted_inputs(trace: Trace) -> list[str]:
-    """Inputs outside the range of training, where they are not the verdict itself."""
+    """Inputs that differ from those of training, where they are not the verdict itself."""
     shifts = () if trace.verdict == "input_shift" else trace.input_shift
     texts = [f"{capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in shifts]
     return [html.paragraph(text, "warning") for text in texts]

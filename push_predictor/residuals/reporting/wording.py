@@ -228,7 +228,7 @@ def _variance(trace: Trace) -> str:
 
 
 def _shifted(trace: Trace) -> str:
-    """The share of windows outside the range of training, for each input."""
+    """The share of windows that tell each input from training."""
     first, *others = trace.input_shift
     further = [f" {capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in others]
     return f"{share_clause(first)}.{''.join(further)}"
