@@ -40,9 +40,3 @@ def standardised(mean: Array, covariance: Array, outcomes: Array) -> Array:
 def coverage(mean: Array, variance: Array, outcomes: Array, half_width: Array) -> Array:
     """Share (k,) of outcomes inside central intervals of half_width (k,), in predicted standard deviations."""
     return np.asarray(np.mean(np.abs(outcomes - mean) <= half_width * np.sqrt(variance), axis=0))
-
-
-def joint_coverage(mean: Array, covariance: Array, outcomes: Array, radius: float) -> float:
-    """Share of outcomes (n, k) within a Mahalanobis distance of the mean, under covariance (n, k, k)."""
-    distance = np.linalg.norm(standardised(mean, covariance, outcomes), axis=1)
-    return float(np.mean(distance <= radius))

@@ -12,9 +12,9 @@ from push_predictor.evaluation.metrics import (
     COVERAGE_LEVELS,
     coverage,
     gaussian_nlpd,
-    joint_coverage,
     joint_nlpd,
     nmse,
+    standardised,
 )
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.models.predictors.tails import IntervalKind, Tails, half_widths, joint_radius
@@ -57,6 +57,11 @@ class Comparison:
         """Whether each outcome lies in its central interval, (n, 3, levels)."""
         half = np.stack([half_widths(self.tails, float(level), kind) for level in levels], axis=-1)
         return np.asarray(np.abs(self.residuals)[..., None] <= half)
+
+    def joint_covered(self, levels: Sequence[float]) -> BoolArray:
+        """Whether each outcome lies in the joint region of the three outputs, (n, levels)."""
+        away = np.linalg.norm(standardised(self.mean, self.covariance, self.observed), axis=1)
+        return np.asarray(away[:, None] <= [joint_radius(self.tails, level) for level in levels])
 
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
@@ -105,7 +110,7 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
         "exact_nlpd": exact,
         "joint_nlpd": _number(np.mean(joint_nlpd(c.mean, c.covariance, c.observed))) if count else None,
         "coverage": {str(level): _coverage(c, level) if count else None for level in COVERAGE_LEVELS},
-        "joint_coverage": {str(level): _joint_coverage(c, level) if count else None for level in COVERAGE_LEVELS},
+        "joint_coverage": _joint_coverage(c),
         "interval": _intervals(c, nlpd),
     }
 
@@ -162,8 +167,12 @@ def _coverage(c: Comparison, level: float) -> dict[str, float | None]:
     return {name: _number(share) for name, share in zip(OUTPUTS, shares, strict=True)}
 
 
-def _joint_coverage(c: Comparison, level: float) -> float | None:
-    return _number(joint_coverage(c.mean, c.covariance, c.observed, joint_radius(c.tails, level)))
+def _joint_coverage(c: Comparison) -> dict[str, float | None]:
+    inside = c.joint_covered(COVERAGE_LEVELS)
+    return {
+        str(level): _number(np.mean(column)) if len(column) else None
+        for level, column in zip(COVERAGE_LEVELS, inside.T, strict=True)
+    }
 
 
 def _named(values: Array) -> dict[str, float | None]:
