@@ -387,11 +387,11 @@ def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list
     for comparison in comparisons[::2]:
         metrics = metrics_json(comparison)
         assert metrics["model"] in text
-        coverage = metrics.pop("coverage")
+        coverage, joint = metrics.pop("coverage"), metrics.pop("joint_coverage")
         interval = metrics.pop("interval")
         for value in _numbers(metrics):
             assert float(f"{value:.4g}") in shown
-        for value in [*_numbers(coverage), *_numbers([interval["nmse"], interval["nlpd"]])]:
+        for value in [*_numbers(coverage), *_numbers(joint), *_numbers([interval["nmse"], interval["nlpd"]])]:
             assert float(f"{value:.3g}") in shown
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import ndtri
 from scipy.stats import binom
 
 from push_predictor.evaluation.splits import push_bootstrap
@@ -46,8 +45,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
 
 def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Array, Array, Array]:
     """Observed share and the ends of its 95 % interval from resampling whole pushes, (levels, 3) each."""
-    away = np.abs(comparison.observed - comparison.mean) / np.sqrt(comparison.variance)
-    hit = (away[:, None, :] <= ndtri(0.5 + levels / 2.0)[None, :, None]).astype(np.float64)
+    hit = np.swapaxes(comparison.covered(levels), 1, 2).astype(np.float64)
     weights = push_bootstrap(comparison.push_id, draws=DRAWS)
     draws = np.einsum("dn,nlk->dlk", weights, hit, optimize=True) / weights.sum(axis=1)[:, None, None]
     low, high = np.quantile(draws, [0.025, 0.975], axis=0)
