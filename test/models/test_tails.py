@@ -113,6 +113,9 @@ def test_joint_region_has_its_probability() -> None:
     drawn = 0.7 * stats.multivariate_t(shape=np.eye(3), df=5.0, seed=0).rvs(40_000)
     inside = np.linalg.norm(drawn, axis=1) <= joint_radius(made_up(), 0.9)
     assert np.mean(inside) == pytest.approx(0.9, abs=0.006)
+    of_two = np.linalg.norm(drawn[:, :2], axis=1) <= joint_radius(made_up(), 0.9, 2)
+    assert np.mean(of_two) == pytest.approx(0.9, abs=0.006)
+    assert joint_radius(None, 0.95, 2) == pytest.approx(np.sqrt(-2.0 * np.log(0.05)))
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 1.5, float("nan")])

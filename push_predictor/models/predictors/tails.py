@@ -75,12 +75,13 @@ class Tails:
             return self._conformal(level)
         raise RequestError("interval", kind, " or ".join(INTERVAL_KINDS))
 
-    def joint_radius(self, level: float) -> float:
+    def joint_radius(self, level: float, outputs: int = 3) -> float:
         """Mahalanobis distance, under the reported covariance, within which the outcome lies with that probability.
 
-        For a t distribution, the squared distance over three is F-distributed (Kotz and Nadarajah 2004, section 1.4).
+        outputs: how many are looked at together. For a t distribution, the squared distance over their number is
+        F-distributed (Kotz and Nadarajah 2004, section 1.4).
         """
-        return self.joint_scale * float(np.sqrt(3.0 * fdtri(3.0, self.joint_degrees, level)))
+        return self.joint_scale * float(np.sqrt(outputs * fdtri(outputs, self.joint_degrees, level)))
 
     def _conformal(self, level: float) -> Array:
         """The quantile at which the training pushes and a new one, of infinite residual, reach the level.
@@ -112,9 +113,9 @@ def half_widths(tails: Tails | None, level: float, kind: IntervalKind = "student
     return np.full(3, float(ndtri(0.5 + 0.5 * level)))
 
 
-def joint_radius(tails: Tails | None, level: float) -> float:
+def joint_radius(tails: Tails | None, level: float, outputs: int = 3) -> float:
     """See Tails; that of a Gaussian without tails."""
-    return float(np.sqrt(chdtri(3.0, 1.0 - level))) if tails is None else tails.joint_radius(level)
+    return float(np.sqrt(chdtri(outputs, 1.0 - level))) if tails is None else tails.joint_radius(level, outputs)
 
 
 def student_log_density(residuals: Array, scale: Array | float, degrees: Array | float) -> Array:

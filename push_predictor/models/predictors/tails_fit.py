@@ -20,7 +20,7 @@ from scipy.special import gammaln
 from push_predictor.models.predictors.tails import STEPS, Tails, student_log_density
 from push_predictor.types import Array, IntArray
 
-FEWEST_PUSHES = 4
+FEWEST_PUSHES = 3
 RESEMBLANCE = 0.45  # correlation of windows of a push, as is typical (planning/persistence.py)
 USUAL_EXCESS, EXCESS_SD = 2.0, 0.5  # prior of the degrees: log-normal of what they are above 2
 LEAST_FREE = 0.5  # of the effective windows that stay, however many hyperparameters there are

@@ -1,4 +1,4 @@
-"""Calibration: share of outcomes in the predicted intervals, and histograms of the PIT."""
+"""Calibration: share of outcomes in the predicted intervals, and histograms of the PIT, both by push."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import binom
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, pit
@@ -21,6 +20,7 @@ LEVELS = np.linspace(0.02, 0.98, 49)
 WINDOWS_PER_BAR = 10
 FEWEST_BARS, MOST_BARS = 4, 10
 DRAWS = 400
+NORMAL_95 = 1.96
 
 
 def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None:
@@ -31,7 +31,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
         values = pit(comparison)
         tallest = max(histogram(values[:, k])[0].max() for k in range(3))
         for k, ax in enumerate(row[1:]):
-            _paint_pit(ax, values[:, k], k, tallest)
+            _paint_pit(ax, values[:, k], comparison.push_id, k, tallest)
         row[0].set_ylabel(f"{comparison.model}\nobserved share")
         row[1].set_ylabel("windows")
     for k, ax in enumerate(axes[0, 1:]):
@@ -59,6 +59,21 @@ def histogram(values: Array) -> tuple[Array, Array]:
     return counts.astype(np.float64), edges
 
 
+def expected_counts(values: Array, push_id: np.ndarray) -> tuple[float, float]:
+    """Ends of the 95 % interval of a bar's count if the predicted probabilities hold; see `histogram`.
+
+    Windows of a push are counted together, since they resemble each other: the variance of a count is the sum, over
+    pushes, of the squared difference between a push's windows in the bar and its share, averaged over the bars.
+    """
+    bars = len(histogram(values)[0])
+    push = np.unique(push_id, return_inverse=True)[1]
+    bar = np.minimum((values * bars).astype(np.int64), bars - 1)
+    found = np.bincount(push * bars + bar, minlength=bars * (int(push.max()) + 1)).reshape(-1, bars)
+    away = found - found.mean(axis=1, keepdims=True)
+    middle, half = len(values) / bars, NORMAL_95 * float(np.sqrt(np.sum(away**2) / bars))
+    return max(middle - half, 0.0), middle + half
+
+
 def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
     share, low, high = coverage_curve(comparison)
     grid(ax)
@@ -71,9 +86,9 @@ def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
     ax.set_aspect("equal")
 
 
-def _paint_pit(ax: Axes, values: Array, output: int, tallest: float) -> None:
+def _paint_pit(ax: Axes, values: Array, push_id: np.ndarray, output: int, tallest: float) -> None:
     counts, edges = histogram(values)
-    low, high = binom.ppf([0.025, 0.975], len(values), 1.0 / len(counts))
+    low, high = expected_counts(values, push_id)
     look: dict[str, Any] = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
     ax.bar(edges[:-1], counts, np.diff(edges), align="edge", **look)
     ax.axhspan(low, high, color="0.2", alpha=0.18, linewidth=0.0)
