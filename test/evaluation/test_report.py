@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from scipy.stats import f, kstest, multivariate_t
 
 from push_predictor.errors import PushPredictorError, TableError
+from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts
 from push_predictor.evaluation.report.figures.ellipses import ellipse, inside
 from push_predictor.evaluation.report.figures.nearby import examples, spread_rows
@@ -386,6 +387,15 @@ def test_band_of_the_pit_counts_the_windows_of_a_push_together() -> None:
     assert np.diff(together)[0] == pytest.approx(np.sqrt(5.0) * np.diff(alone)[0], rel=0.01)
     one_push = expected_counts(np.append(rng.random(39), 1.0), np.zeros(40, dtype=np.str_))
     assert one_push[0] >= 0.0
+
+
+def test_joint_region_is_that_of_the_tails() -> None:
+    c = gaussian_comparison(1.0)
+    tails = Tails(np.ones(3), np.full(3, 4.0), 0.8, 3.0, 20, np.zeros((STEPS, 3)))
+    away = np.linalg.norm(standardised(c.mean, c.covariance, c.observed), axis=1)
+    np.testing.assert_array_equal(replace(c, tails=tails).joint_covered([0.9])[:, 0], away <= tails.joint_radius(0.9))
+    assert c.joint_covered([0.9]).mean() == pytest.approx(0.9, abs=0.02)
+    assert replace(c, tails=tails).joint_covered([0.9]).mean() > 0.91
 
 
 def test_trend_detects_a_drift_and_none_without_one() -> None:

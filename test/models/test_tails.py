@@ -187,12 +187,14 @@ def test_fit_finds_scale_and_degrees_of_many_pushes() -> None:
 
 
 def test_joint_region_is_fitted_under_the_correlation() -> None:
-    root = np.linalg.cholesky(COVARIANCE)
+    covariance = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 0.25]])
+    root = np.linalg.cholesky(covariance)
     drawn = stats.multivariate_t(shape=np.eye(3), df=6.0, seed=0).rvs(6000) @ root.T
     names = np.array([f"p{k}" for k in range(4000)])
-    tails = fit_tails(drawn[:4000], np.tile(COVARIANCE, (4000, 1, 1)), names, (0, 0, 0))
+    tails = fit_tails(drawn[:4000], np.tile(covariance, (4000, 1, 1)), names, (0, 0, 0))
     assert tails is not None
-    reported = COVARIANCE * np.outer(tails.factor, tails.factor)
+    assert tails.joint_degrees == pytest.approx(6.0, rel=0.1)
+    reported = covariance * np.outer(tails.factor, tails.factor)
     away = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(reported), drawn[4000:].T), axis=0)
     assert np.mean(away <= tails.joint_radius(0.95)) == pytest.approx(0.95, abs=0.015)
 
