@@ -120,7 +120,7 @@ def _paint_story(axes: Axes, story: Story, change: int) -> None:
     axes.set(
         xlabel="push",
         xlim=(-2, last + 2),
-        ylabel="mean squared standardised residual\nof a push (1: calibrated)",
+        ylabel="mean squared standardised residual\nof a push (calibrated: 1 on average)",
     )
     axes.legend(loc="lower center", ncols=2)
     grid(axes)
@@ -167,6 +167,7 @@ def _paint_error(axes: Axes, story: Story, key: str, name: str) -> None:
         yticks=range(len(story.later)),
         yticklabels=list(story.later),
     )
+    axes.margins(x=0.12)
     axes.set_ylim(len(story.later) - 0.5, -0.7)
     grid(axes)
 

@@ -81,12 +81,16 @@ def rows(cases: Sequence[Case], n: int, models: Sequence[str]) -> None:
             print(f"| {n} | {model} minus {kind}:zero | {_differences(plain[kind], scores)} | | | |", flush=True)
 
 
-def trained(case: Case, n: int, kind: str, mean: str) -> tuple[PushModel, float]:
+def trained(case: Case, n: int, kind: str, mean: str, tails: bool = False) -> tuple[PushModel, float]:
     """A model of the first n training windows, and CPU s of training."""
     table = case.training.take(np.arange(n)) if n else empty_table()
     start = time.process_time()
     model = train_model(
-        table, case.rig, kind, name=kind, options=TrainingOptions(seed=case.seed, mean=cast(MeanChoice, mean))
+        table,
+        case.rig,
+        kind,
+        name=kind,
+        options=TrainingOptions(seed=case.seed, mean=cast(MeanChoice, mean), tails=tails),
     )
     return model, time.process_time() - start
 

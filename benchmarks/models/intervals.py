@@ -126,7 +126,7 @@ def found(cases: Sequence[Case], n: int, kind: str, mean: str) -> Found:
     """Train on n windows of each case, and predict its test windows without and with tails."""
     before, after, pushes = [], [], []
     for case in cases:
-        model, _ = trained(case, n, kind, mean)
+        model, _ = trained(case, n, kind, mean, tails=True)
         assert isinstance(model.predictor, GaussianProcessPredictor)
         after.append(compare(model, case.test))
         before.append(compare(replace(model, predictor=replace(model.predictor, tails=None)), case.test))

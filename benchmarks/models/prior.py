@@ -79,7 +79,9 @@ def _scored(case: Case, n: int, kind: str) -> tuple[PushScores, int, float]:
     names = np.random.default_rng(case.seed).permutation(np.array(sorted(case.training.pushes)))[:n]
     rows = case.training.take(np.isin(case.training.push_id, names)) if n else empty_table()
     start = time.process_time()
-    model = train_model(rows, case.rig, kind, name=kind, options=TrainingOptions(seed=case.seed, mean="zero"))
+    model = train_model(
+        rows, case.rig, kind, name=kind, options=TrainingOptions(seed=case.seed, mean="zero", tails=False)
+    )
     cpu = time.process_time() - start
     reference = (case.training if len(case.training) else case.test).outcomes.mean(axis=0)
     comparison = replace(compare(model, case.test), training_mean=reference)

@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def print_row(cases: Sequence[Case], n: int, mean: str) -> None:
     """Print the row of a size and mean."""
-    pairs = [compared(trained(case, n, "vhgp", mean)[0], case.test) for case in cases]
+    pairs = [compared(trained(case, n, "vhgp", mean, tails=True)[0], case.test) for case in cases]
     alone, given = (pooled([push_scores(pair[k]) for pair in pairs]) for k in (0, 1))
     windows = sum(len(pair[0].observed) for pair in pairs)
     change = [difference_by_push(alone, given, figure) for figure in (total_nmse, total_exact_nlpd)]
