@@ -1,0 +1,88 @@
+"""Updates of the posterior by pushes: the same as conditioning a Gaussian on their outcomes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from push_predictor.design.batch import greedy
+from push_predictor.design.information import Information
+from push_predictor.types import Array
+
+C, K, Q, M = 6, 4, 5, 7
+
+
+@pytest.fixture
+def parts() -> tuple[Array, Array, Array]:
+    """Features and noise of candidates, features of what matters."""
+    rng = np.random.default_rng(0)
+    root = rng.standard_normal((C, K, K))
+    return rng.standard_normal((C, K, Q)), root @ root.transpose(0, 2, 1) + np.eye(K), rng.standard_normal((M, Q))
+
+
+def left_over(parts: tuple[Array, Array, Array], chosen: list[int]) -> Array:
+    """Posterior covariance of the weights after the outcomes of some candidates, in information form."""
+    features, noise, _ = parts
+    precision = np.eye(Q)
+    for k in chosen:
+        precision += features[k].T @ np.linalg.inv(noise[k]) @ features[k]
+    return np.linalg.inv(precision)
+
+
+def loss(parts: tuple[Array, Array, Array], chosen: list[int]) -> float:
+    return float(np.trace(parts[2] @ left_over(parts, chosen) @ parts[2].T) / M)
+
+
+def test_the_loss_before_is_the_mean_variance_of_what_matters(parts: tuple[Array, Array, Array]) -> None:
+    assert Information(*parts).loss == pytest.approx(np.sum(parts[2] ** 2) / M)
+
+
+def test_each_gain_is_the_fall_of_the_loss_when_that_push_is_known(parts: tuple[Array, Array, Array]) -> None:
+    expected = [loss(parts, []) - loss(parts, [k]) for k in range(C)]
+    np.testing.assert_allclose(Information(*parts).gains(), expected)
+
+
+def test_updates_in_turn_equal_conditioning_on_all(parts: tuple[Array, Array, Array]) -> None:
+    found = Information(*parts)
+    for chosen in ([2], [2, 5], [2, 5, 2]):
+        found.observe(chosen[-1])
+        assert found.loss == pytest.approx(loss(parts, chosen))
+        covariance = left_over(parts, chosen)
+        np.testing.assert_allclose(found.covariance, parts[0] @ covariance @ parts[0].transpose(0, 2, 1))
+        expected = [loss(parts, chosen) - loss(parts, [*chosen, k]) for k in range(C)]
+        np.testing.assert_allclose(found.gains(), expected)
+
+
+def test_observing_returns_the_gain(parts: tuple[Array, Array, Array]) -> None:
+    found = Information(*parts)
+    expected = found.gains()[3]
+    assert found.observe(3) == pytest.approx(expected)
+
+
+def test_the_greedy_batch_takes_the_largest_gain_each_time(parts: tuple[Array, Array, Array]) -> None:
+    order, losses = greedy(Information(*parts), 4)
+    chosen: list[int] = []
+    for k, after in zip(order.tolist(), losses, strict=True):
+        best = min(range(C), key=lambda other: loss(parts, [*chosen, other]))
+        assert k == best
+        chosen.append(k)
+        assert after == pytest.approx(loss(parts, chosen))
+
+
+def test_the_greedy_batch_may_count_gain_per_second(parts: tuple[Array, Array, Array]) -> None:
+    gains, slow = Information(*parts).gains(), np.ones(C)
+    best = int(np.argmax(gains))
+    slow[best] = 1.01 * gains[best] / np.sort(gains)[-2]
+    assert greedy(Information(*parts), 1)[0][0] == best
+    assert greedy(Information(*parts), 1, lambda last: slow)[0][0] == np.argsort(gains)[-2]
+
+
+def test_the_time_of_a_push_may_depend_on_the_one_before(parts: tuple[Array, Array, Array]) -> None:
+    asked: list[int | None] = []
+
+    def seconds(last: int | None) -> Array:
+        asked.append(last)
+        return np.ones(C)
+
+    order, _ = greedy(Information(*parts), 3, seconds)
+    assert asked == [None, *order[:2].tolist()]
