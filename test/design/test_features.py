@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting_models import extended, slippery
+from drifting_models import extended, grain, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
@@ -88,19 +88,27 @@ def test_a_prior_model_has_about_the_variance_of_its_draws() -> None:
     np.testing.assert_allclose(np.diagonal(ratio), 1.0, atol=0.25)
 
 
-def test_the_derivative_of_the_mechanics_is_that_by_the_parameters() -> None:
+def test_features_of_the_mechanics_are_derivatives_by_the_parameters() -> None:
     model, push = trained("analytical", fit=True), some(10)
     fitted = model.predictor.mechanics
-    name = next(iter(fitted.values))
-    one = np.zeros_like(fitted.covariance)
-    one[0, 0] = 1e-4
-    alone = replace(model, predictor=replace(model.predictor, fitted=replace(fitted, covariance=one)))
-    found = features_of(alone, push)
-    step = DIFFERENCE * BY_NAME[name].spread
-    ends = [fitted.displacement(push.inputs, push.duration, {}, {name: np.full(10, end)}) for end in (-step, step)]
-    slope = 0.01 * (ends[1] - ends[0]) / (2.0 * step) / found.noise_sd
-    along = found.values[:, :, np.argmax(np.abs(found.values).sum(axis=(0, 1)))]
-    np.testing.assert_allclose(np.abs(along), np.abs(slope), atol=0.02 * np.abs(slope).max())
+    assert len(fitted.values) > 1
+    for k, name in enumerate(fitted.values):
+        one = np.zeros_like(fitted.covariance)
+        one[k, k] = 1e-4
+        alone = replace(fitted, covariance=one)
+        found = features_of(replace(model, predictor=replace(model.predictor, fitted=alone)), push)
+        ends = within(name, fitted.values[name])
+        changes = [{name: np.full(10, end - fitted.values[name])} for end in ends]
+        low, high = (fitted.displacement(push.inputs, push.duration, {}, change) for change in changes)
+        slope = 0.01 * (high - low) / (ends[1] - ends[0]) / found.noise_sd
+        along = found.values[:, :, np.argmax(np.abs(found.values).sum(axis=(0, 1)))]
+        np.testing.assert_allclose(np.abs(along), np.abs(slope), atol=1e-3 * np.abs(slope).max())
+
+
+def within(name: str, value: float) -> tuple[float, float]:
+    """Values below and above, in the plausible range."""
+    known = BY_NAME[name]
+    return max(value - DIFFERENCE * known.spread, known.low), min(value + DIFFERENCE * known.spread, known.high)
 
 
 def test_residuals_and_mechanics_add_up() -> None:
@@ -113,8 +121,12 @@ def test_residuals_and_mechanics_add_up() -> None:
     of_mechanics = squares(both.values[:, :, residual.values.shape[2] :])
     assert of_mechanics.max() > 0.0
     np.testing.assert_allclose(squares(both.values), squares(residual.values) + of_mechanics, atol=1e-9)
-    sd = np.sqrt(np.diagonal(model.predictor.moments(push).process_covariance, axis1=1, axis2=2))
-    np.testing.assert_allclose(both.noise_sd, sd)
+    moments = model.predictor.moments(push)
+    np.testing.assert_allclose(both.noise_sd**2, np.diagonal(moments.process_covariance, axis1=1, axis2=2))
+    of_function = np.diagonal(moments.covariance - moments.process_covariance, axis1=1, axis2=2)
+    variance = np.sum(residual.values**2, axis=2)
+    np.testing.assert_allclose(variance, of_function / both.noise_sd**2, atol=1.1 * NEGLIGIBLE)
+    assert variance.max() > 5 * NEGLIGIBLE
 
 
 def test_an_effect_adds_its_uncertainty_and_scales_that_of_the_base() -> None:
@@ -127,6 +139,19 @@ def test_an_effect_adds_its_uncertainty_and_scales_that_of_the_base() -> None:
     uncertainty = model.predictor.shift(push).covariance / found.noise_sd[:, :, None] / found.noise_sd[:, None]
     assert uncertainty.max() > NEGLIGIBLE
     np.testing.assert_allclose(squares(found.values), squares(alone.values) + uncertainty, rtol=1e-6, atol=1e-9)
+
+
+def test_effects_that_were_estimated_together_share_their_uncertainty() -> None:
+    base = trained("gp", drifting_pushes(40))
+    model = extended(base, slippery(0.1, 0.05), grain(0.1))
+    together = replace(model.predictor, cross={(0, 1): np.array([[4e-4, -3e-4]])})  # type: ignore[type-var]
+    covariates = {"elapsed_time": np.full(40, 800.0), "slider_heading": np.linspace(-3.0, 3.0, 40)}
+    push = Push(some().inputs, some().duration, covariates)
+    found = features_of(replace(model, predictor=together), push)
+    units = found.noise_sd[:, :, None] * found.noise_sd[:, None]
+    expected = squares(features_of(base, push).values) + together.shift(push).covariance / units
+    np.testing.assert_allclose(squares(found.values), expected, rtol=1e-6, atol=1e-9)
+    assert np.abs(together.shift(push).covariance - model.predictor.shift(push).covariance).max() > 0.0
 
 
 def test_a_textbook_model_has_nothing_to_learn() -> None:
