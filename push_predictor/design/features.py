@@ -109,8 +109,7 @@ def _of_effects(extended: ExtendedPredictor, push: Push) -> Array:
     covariance = block_diag(*(effect.covariance for effect in extended.effects))
     begin = np.cumsum([0, *(len(effect.coefficients) for effect in extended.effects)])
     for (i, j), shared in extended.cross.items():
-        covariance[begin[i] : begin[i + 1], begin[j] : begin[j + 1]] = shared
-        covariance[begin[j] : begin[j + 1], begin[i] : begin[i + 1]] = shared.T
+        covariance[begin[j] : begin[j + 1], begin[i] : begin[i + 1]] = shared.T  # i < j: eigh reads this triangle
     return np.asarray(np.concatenate(designs, axis=2) @ _symmetric_root(covariance))
 
 
