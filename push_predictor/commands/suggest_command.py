@@ -34,8 +34,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "suggest",
-        "Propose the pushes that a model learns most from. They most reduce the variance of its mean function, in "
-        "units of the process noise. Without a model, --rig gives a slider that nobody has pushed yet.",
+        "Propose the pushes that a model learns most from. They most reduce what its uncertain mean function costs in "
+        "log predictive density. Without a model, --rig gives a slider that nobody has pushed yet.",
         "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
     )
     parser.add_argument("model", type=Path, nargs="?", metavar="MODEL", help="a model file")

@@ -1,7 +1,7 @@
 """The batch of pushes that a model learns most from.
 
 Greedy selection: each push is the one that most reduces what is left of the expected loss when the pushes before it are
-known. The reduction has diminishing returns, so that the batch is nearly as good as the best of its size.
+known.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ def suggest_pushes(
     covariates: Mapping[str, float] | None = None,
     seed: int = 0,
 ) -> Suggested:
-    """The pushes that a model would learn most from: those that most reduce the variance of its mean function.
+    """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
 
-    The variance is in units of the process noise, which no push reduces. It is the mean over the pushes that matter:
-    `matter`, or by default all that the robot can make, evenly. covariates: of all pushes, as an extended model needs
-    them. seed: of the candidates. Raises RequestError that names the field.
+    The cost is in log predictive density: the process noise, which no push reduces, is no part of it. It is the mean
+    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. covariates: of all pushes,
+    as an extended model needs them. seed: of the candidates. Raises RequestError that names the field.
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
@@ -73,9 +73,9 @@ def suggest_pushes(
     relevant = _matter(model, limits, seed) if matter is None else Push(matter.inputs, matter.duration, {})
     tried = courses(model, inputs, np.full(len(inputs), limits.travel))
     found = information_of(model, tried, relevant, covariates or {})
-    before = found.loss
-    order, losses = greedy(found, count, _seconds(model, inputs, limits))
-    return Suggested(inputs[order], tried.travel[order], losses / before)
+    before = found.variance
+    order, variances = greedy(found, count, _seconds(model, inputs, limits))
+    return Suggested(inputs[order], tried.travel[order], variances / before)
 
 
 def information_of(
@@ -94,19 +94,19 @@ def information_of(
 def greedy(
     information: Information, count: int, seconds: Callable[[int | None], Array] | None = None
 ) -> tuple[IntArray, Array]:
-    """Candidates (count,) in the order chosen, and the loss (count,) after each.
+    """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
 
     seconds: time (c,) that each candidate takes after the last chosen one (None at first); the largest reduction per
     second is chosen. Without it, the largest reduction.
     """
-    order, losses = np.empty(count, dtype=np.int64), np.empty(count)
+    order, variances = np.empty(count, dtype=np.int64), np.empty(count)
     last: int | None = None
     for k in range(count):
         gains = information.gains()
         last = int(np.argmax(gains if seconds is None else gains / seconds(last)))
         information.observe(last)
-        order[k], losses[k] = last, information.loss
-    return order, losses
+        order[k], variances[k] = last, information.variance
+    return order, variances
 
 
 def _matter(model: PushModel, limits: Limits, seed: int) -> Push:
