@@ -26,7 +26,7 @@ from push_predictor.models.request import check_requests
 from push_predictor.planning.persistence import Persistence, persistence_of
 from push_predictor.types import Array, IntArray
 
-CANDIDATES, MATTER = 256, 256  # pushes
+CANDIDATES, MATTER = 256, 128  # pushes
 MOST_PUSHES = 1000
 
 
