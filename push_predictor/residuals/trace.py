@@ -32,9 +32,9 @@ from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import HeldOutGain, compared, held_out_gain
 from push_predictor.residuals.extension.recalibration import held_out_windows
 from push_predictor.residuals.extension.refit import refit_base
-from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Tested, Trace, Verdict
+from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, Tested, Trace, Verdict
 from push_predictor.residuals.question import SHARES, Question
-from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data
+from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
 from push_predictor.residuals.selection.absolute_fit import parts_of_others
 
 NO_GAIN = Gain(0.0, 0.0, 0.0)
@@ -111,7 +111,7 @@ def _of_measurement(question: Question, corrected: Corrected) -> Trace:
         effects=tuple(
             FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "measurement"), 0.0)
             for e in measured.errors
-            for parameter in e.parameters
+            for parameter in map(Sized.with_errors_of_mechanics, e.parameters)
         ),
         terms=(),
         equivalent=(),
@@ -168,7 +168,7 @@ def _of_motion(question: Question, found: Searched) -> Trace:
         experiment=motion.experiment.pushes,
         alpha=question.alpha,
         input_shift=question.shifted,
-        notes=notes_of(question.loaded, motion, measured, forces),
+        notes=(*notes_of(question.loaded, motion, measured, forces), *notes_of_shift(question.shifted)),
     )
 
 
@@ -236,7 +236,7 @@ def _found_effects(
     return tuple(
         FoundEffect(e.mechanism, e.covariate, (), e.basis, parameter, _of_trace(e.p_value, "wrench"), 0.0)
         for e in forces.effects
-        for parameter in e.parameters
+        for parameter in map(Sized.with_errors_of_mechanics, e.parameters)
     )
 
 

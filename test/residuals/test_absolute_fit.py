@@ -126,12 +126,19 @@ def test_constant_part_of_an_effect_is_no_effect_of_its_own() -> None:
     assert names([changing, constant]) == 2 * [("centre_of_friction", None)]
 
 
-def test_change_of_a_constant_effect_is_an_effect() -> None:
-    """It tells what the effect depends on."""
-    assert parts_of_others([
-        term("centre_of_friction", "edge", 300.0, basis="constant"),
-        term("centre_of_friction", "velocity", 60.0),
-    ]) == [False, False]  # fmt: skip
+def test_constant_effect_that_also_changes_is_the_changing_one() -> None:
+    """That part tells what the effect depends on."""
+    always = term("centre_of_friction", "edge", 300.0, basis="constant")
+    other, later = (
+        term("contact_friction", "session", 90.0, basis="constant"),
+        term("centre_of_friction", "velocity", 20.0),
+    )
+    found = with_fitting_names([always, other, later])
+    assert [t.best.covariate for t in found] == ["velocity", "session", "edge"]
+    assert parts_of_others(found) == [False, False, True]
+    assert [t.best.covariate for t in with_fitting_names([always, other])] == ["edge", "session"]
+    before = term("contact_friction", "velocity", 20.0)
+    assert [t.best.covariate for t in with_fitting_names([before, other])] == ["velocity", "session"]
 
 
 def test_map_in_two_terms_is_one_effect() -> None:

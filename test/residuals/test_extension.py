@@ -16,6 +16,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.standardised import evidence_of
+from push_predictor.residuals.extension.effect_size import size_of
 from push_predictor.residuals.extension.extended_model import extend
 from push_predictor.residuals.extension.held_out_gain import held_out_gain
 from push_predictor.residuals.extension.recalibration import (
@@ -24,6 +25,7 @@ from push_predictor.residuals.extension.recalibration import (
     uncertainty_of_effects,
 )
 from push_predictor.residuals.extension.refit import refit_base, spread_rows
+from push_predictor.residuals.outcome import Sized
 
 CONSTANT = DriverBasis("constant")
 ANALYSIS, HELD_OUT = (pushes(count, seed, slippery(0.0)) for count, seed in ((120, 3), (60, 4)))
@@ -135,3 +137,52 @@ def test_a_refit_takes_as_many_rows_as_the_model_had_within_bounds() -> None:
     large = replace(small, training=noisy_pushes(700))
     assert len(spread_rows(large, many)) == 500
     assert len(spread_rows(large, many).pushes) > 330
+
+
+@pytest.mark.parametrize("size", [0.2, -0.2])
+def test_interval_of_a_size_contains_errors_of_the_mechanics(size: float) -> None:
+    """2.5 % remain where the data determine the coefficient exactly."""
+    exact = Effect(
+        "contact_friction",
+        "session",
+        DriverBasis("constant"),
+        np.array([size]),
+        np.full((1, 1), 1e-12),
+        np.ones(3),
+        True,
+    )
+    sized = size_of(exact, pushes(2, 0))
+    assert sized is not None and sized.value == pytest.approx(size)
+    assert sized.high - size == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)
+    assert size - sized.low == pytest.approx(1.96 * 0.025 * abs(size), rel=0.1)
+
+
+def test_interval_of_a_size_is_widened_by_independent_errors() -> None:
+    sized = Sized("lateness", 0.040, 0.038, 0.043, "s").with_errors_of_mechanics()
+    assert (sized.low, sized.value, sized.high) == pytest.approx((0.040 - 0.0028, 0.040, 0.040 + 0.0036), abs=5e-5)
+    assert Sized("bias", 0.0, -0.1, 0.2, "N").with_errors_of_mechanics() == Sized("bias", 0.0, -0.1, 0.2, "N")
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.98])
+def test_size_of_a_step_does_not_depend_on_its_place(share: float) -> None:
+    """Near the ends of its covariate, too, where drifts are not followed."""
+    table = pushes(60, 0)
+    place = float(np.quantile(table.covariates["elapsed_time"], share))
+    basis = DriverBasis("step", ("elapsed_time",), place=place)
+    step = Effect("contact_friction", "elapsed_time", basis, np.array([0.1]), np.full((1, 1), 1e-6), np.ones(3), True)
+    sized = size_of(step, table)
+    assert sized is not None and sized.value == pytest.approx(0.1)
+
+
+def test_length_of_a_vector_is_not_negative() -> None:
+    small = Effect(
+        "tilted_surface",
+        "push_heading",
+        DriverBasis("constant"),
+        np.array([1e-4, 0.0]),
+        np.eye(2) * 1e-6,
+        np.ones(3),
+        True,
+    )
+    sized = size_of(small, pushes(2, 0))
+    assert sized is not None and sized.low >= 0.0

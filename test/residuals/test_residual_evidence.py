@@ -74,6 +74,17 @@ def test_one_side_of_a_symmetric_slider_is_a_part(known: PushTable) -> None:
     assert [each.covariate for each in input_shift(trained(known), one_side).inputs] == ["contact"]
 
 
+def test_the_input_with_the_smallest_part_comes_first(known: PushTable) -> None:
+    """A few windows outside do not decide, unless they are an extrapolation."""
+    two_speeds = with_inputs(known, 0, np.where(np.arange(len(known)) % 3 == 0, 0.02, 0.05))
+    part = with_inputs(known, 0, np.full(len(known), 0.02)).take(known.inputs[:, 2] > -0.2)
+    angle = part.inputs[:, 2].copy()
+    angle[0] = known.inputs[:, 2].max() + 0.15
+    speed, other = input_shift(trained(two_speeds), with_inputs(part, 2, angle)).inputs
+    assert (speed.covariate, other.covariate) == ("velocity", "angle")
+    assert speed.share_unvisited > other.share_unvisited and other.share_outside > speed.share_outside == 0.0
+
+
 def test_nearly_all_of_training_is_no_part(known: PushTable) -> None:
     assert input_shift(trained(known), known.take(known.inputs[:, 1] < 0.9)).inputs == ()
 

@@ -101,6 +101,24 @@ def test_an_effect_that_may_be_zero_beside_another_is_dropped_and_one_of_the_bas
     assert needed_terms([idle], evidence) == (idle,)
 
 
+@pytest.mark.parametrize(("size", "everywhere"), [(1.0, True), (4.0, False)])
+def test_effect_that_only_some_contacts_show_is_an_error_of_the_mechanics(
+    deployed: PushModel, size: float, everywhere: bool
+) -> None:
+    """From push to push both are sure; the size of the second disagrees between contacts, so that it may be zero."""
+    evidence = evidence_of(deployed, pushes(120, 4, slippery(0.06)))
+    acting, second = (
+        chosen(evidence, "contact_friction", "elapsed_time"),
+        chosen(evidence, "pressure_spread", "slider_x"),
+    )
+    contact = evidence.table.inputs[:, 1]
+    there = np.ones(len(contact)) if everywhere else (contact < np.quantile(contact, 0.15)).astype(float)
+    unit = second.best.plain[:, :, 0] / np.sqrt(np.mean(second.best.plain**2))
+    added = np.linalg.solve(evidence.whitener, (size * there[:, None] * unit)[:, :, None])[:, :, 0]
+    found = replace(evidence, residual=evidence.residual + added)
+    assert needed_terms([acting, second], found) == ((acting, second) if everywhere else (acting,))
+
+
 @pytest.mark.parametrize("before, session", [(0.0, True), (-0.12, False)])
 def test_a_constant_effect_of_an_analytical_base_is_new_unless_training_shows_it(before: float, session: bool) -> None:
     always = planted("contact_friction", "elapsed_time", replace(DRIFT, name="constant", drivers=()), -0.12)
@@ -154,7 +172,13 @@ def test_gap_is_a_cause_only_where_training_shows_how_it_is_related_to_the_outco
     assert not unknown.terms and unknown.uncompared == ("contact_gap",)
     with pytest.raises(RequestError, match="contact_gap"):  # beyond training's inputs no constant effect is tried
         outside = np.zeros(len(later), dtype=np.bool_)
-        motion_effects(single, evidence_of(single, with_instrument(later)), 0.01, ["contact_gap"], inside=outside)
+        motion_effects(
+            single,
+            evidence_of(single, with_instrument(later)),
+            0.01,
+            ["contact_gap"],
+            inside=outside,
+        )
     plain = replace(training, outcomes=pushes(120, 1).outcomes)
     new = replace(model, training=plain)
     (term,) = motion_effects(new, evidence_of(new, with_instrument(later)), 0.01, names).terms

@@ -295,6 +295,24 @@ class TestBasis:
             assert (again.naming.drivers[0], again.best.covariate, again.best.basis.name) == (used, used, "step")
 
     @pytest.mark.slow
+    @pytest.mark.parametrize(("grows", "rivals"), [(True, {"elapsed_time"}), (False, set())])
+    def test_constant_effect_may_also_have_grown_early_in_the_session(self, grows: bool, rivals: set[str]) -> None:
+        """An effect that soon has its full size looks constant; one that is there from the first push is constant."""
+        plain = pushes(200, 302)
+        time, always = plain.covariates["elapsed_time"], DriverBasis("constant")
+        effect = Effect(
+            "contact_friction", "elapsed_time", always, np.array([0.15]), np.zeros((1, 1)), np.ones(3), True
+        )
+        push = Push(plain.inputs, plain.duration, plain.covariates)
+        shift = joint_shift(MECHANICS, [effect], push)
+        reached = 1.0 - np.exp(-(time - time.min()) / (0.05 * np.ptp(time))) if grows else np.ones(len(time))
+        table = replace(plain, outcomes=plain.outcomes + reached[:, None] * shift)
+        base = replace(ANALYTICAL, predictor=AnalyticalPredictor(PHYSICS, ANALYTICAL.predictor.covariance))
+        (term,) = searched(base, table).terms
+        assert term.best.label == ("contact_friction", "model_inputs")
+        assert set(term.naming.drivers) == {"model_inputs", *rivals}
+
+    @pytest.mark.slow
     def test_onset_of_an_effect_that_is_fixed_to_the_world_is_found(self) -> None:
         """A slope that is there from the 25th of 200 pushes on looks constant, too."""
         plain = pushes(200, 302)

@@ -94,6 +94,28 @@ def test_drift_of_surface_friction_is_found_and_sized(drift: float, baseline: Pu
     assert size.unit == "1"
 
 
+@pytest.mark.parametrize(("step", "place"), [(-0.5, 0.35), (0.2, 0.65), (-0.25, 0.75)])
+def test_step_of_surface_friction_is_a_step_of_its_size_and_sign(step: float, place: float) -> None:
+    table = made(2)
+    later = table.covariates["elapsed_time"] > 2.0 * place * PUSHES
+    table = with_force(table, np.exp(step * later))
+    (effect,) = found(table, made(1)).effects
+    assert (effect.mechanism, effect.covariate, effect.basis) == ("surface_friction", "elapsed_time", "step")
+    assert effect.parameters[0].low < np.expm1(step) < effect.parameters[0].high
+
+
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_drift_of_surface_friction_is_no_step(seed: int) -> None:
+    """A step may fit better by chance; it must fit surely better."""
+    (effect,) = found(made(seed, drift=0.15), made(1)).effects
+    assert effect.basis == "linear"
+
+
+def with_force(table: PushTable, factor: Array) -> PushTable:
+    forces = {name: table.covariates[name] * factor for name in ("normal_force", "tangential_force")}
+    return replace(table, covariates={**table.covariates, **forces})
+
+
 def test_changed_level_is_found_only_against_training() -> None:
     table = made(2, level=0.15)
     effects = found(table, made(1)).effects

@@ -41,6 +41,7 @@ from push_predictor.residuals.reporting.quantities import interval_cell
 from push_predictor.residuals.reporting.shift_size import shift_sizes
 from push_predictor.residuals.reporting.summary import comparisons_of, summary_lines
 from push_predictor.residuals.reporting.trace_json import trace_json
+from push_predictor.residuals.reporting.wording import rivals_sentence
 
 ROW = '<tr><th scope="row">'
 RAW = r"\bNone\b|\bnan\b|\binf\b|\bTrue\b|\bFalse\b|np\.|array\(|`|\b[a-z]+_[a-z_]+\b|Sized\(|\{|\}"
@@ -318,6 +319,16 @@ def test_held_out_section_shows_errors_before_and_after_and_scores_with_interval
     assert section.count('class="dot before"') == section.count('class="dot after"') > 50
     scores = re.findall(r'data-column="squared error \(NMSE\)">([\d.]+)<span class="interval">\[', section)
     assert len(scores) == 3 and float(scores[2]) < float(scores[0])
+
+
+def test_constant_effect_that_may_have_grown_early_is_said_so_in_words() -> None:
+    trace = trace_of("effect")
+    always = replace(trace.effects[0], covariate="session", basis="constant")
+    early = replace(trace, effects=(always,), equivalent=("elapsed_time", "push_index"), experiment=())
+    assert "It was there from the first push, or it grew early in the session" in rivals_sentence(early)
+    assert answer(early)[2].endswith("restore the rig to its state at the start of the session, and push again.")
+    with_place = replace(early, equivalent=("elapsed_time", "slider_x"))
+    assert "fit equally well" in rivals_sentence(with_place) and "vary" in answer(with_place)[2]
 
 
 def test_further_shifted_inputs_are_counted() -> None:

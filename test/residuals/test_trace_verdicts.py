@@ -163,8 +163,9 @@ def test_pushes_on_one_side_are_a_shift_without_extrapolation(monkeypatch: pytes
     found = trace(learnt(), one_side)
     assert [each.covariate for each in found.input_shift] == ["contact"]
     assert found.verdict == "input_shift" and found.extended is None
+    assert not any("Not tested" in note for note in found.notes)
     assert answer(found)[2].startswith("Keep the deployed model, and push in the rest of its range")
-    assert "Push in the rest of it" in worth_sentence(found)
+    assert "Push in the rest of training's range" in worth_sentence(found)
 
 
 def test_harmless_zero_of_the_sensor_is_only_noted_next_to_another_change(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -237,6 +238,7 @@ def test_faster_pushes_than_those_of_training_are_a_shift_of_the_inputs() -> Non
     assert shift["training"] == pytest.approx([0.02, 0.02], rel=0.1)
     assert shift["now"] == pytest.approx([0.06, 0.06], rel=0.1)
     assert not result["motion_model_changed"]
+    assert any("some pushes lie outside the inputs of training: constant effects" in note for note in result["notes"])
     depends_on_speed = {"velocity", "time_since_contact", "contact_gap", "previous_residual"}
     assert not depends_on_speed & {tested["covariate"] for tested in result["tested"]}
 

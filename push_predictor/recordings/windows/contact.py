@@ -17,7 +17,7 @@ NEAR = 0.05  # s around a sample that determine motion and gap
 FORWARD_SPAN = 0.03  # s after a sample in which the pusher must already move
 FIT_SPAN = 0.020  # s of a window that determine its velocity and angle (docs/reference/recordings.md)
 NEAR_SHARE, REACH_SHARE = 0.8, 0.5  # of the speed until NEAR, and from FIT_SPAN to REACH: slower is accelerating
-MISSED = 2.5  # periods between samples of the force from which some are missing
+MISSING_PERIODS = 2.5  # periods between samples of the force from which some are missing
 SHORTEST_SPAN = 1e-3  # s; a shorter difference determines no speed
 
 
@@ -103,16 +103,14 @@ def _breaks(tracks: list[Track], before: Array, time: Array) -> tuple[BoolArray,
 
 
 def _forces(wrench: Track | None, time: Array) -> Array:
-    """Forces (n, 2) N; next to missing samples the smaller neighbour, which may lie before the touch or after it."""
+    """Forces (n, 2) N; where samples are missing the last one before, as the touch may lie between it and the next."""
     if wrench is None:
         return np.full((len(time), 2), np.nan)
     last = len(wrench.time) - 1
     before = np.clip(np.searchsorted(wrench.time, time, side="right") - 1, 0, last)
     after = np.minimum(before + 1, last)
-    missing = wrench.time[after] - wrench.time[before] > MISSED * wrench.period
-    size = np.linalg.norm(wrench.values, axis=1)
-    smaller = np.where(size[before] <= size[after], before, after)
-    return np.asarray(np.where(missing[:, None], wrench.values[smaller], wrench.at(time)))
+    missing = wrench.time[after] - wrench.time[before] > MISSING_PERIODS * wrench.period
+    return np.asarray(np.where(missing[:, None], wrench.values[before], wrench.at(time)))
 
 
 def _speed(pusher: Track, start: Array, end: Array) -> Array:

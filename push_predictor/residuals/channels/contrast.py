@@ -153,6 +153,7 @@ def _gains(z: Array, each: Contrast, controls: Array, block: IntArray) -> Array:
 
 
 def _log_density(residual: Array, variance: Array) -> Array:
+    variance = np.maximum(variance, np.finfo(float).tiny)  # a quantity may follow the controls exactly
     return np.asarray(-0.5 * np.sum(np.log(variance) + residual**2 / variance, axis=1))
 
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.residuals.candidates.candidate import Candidate
+from push_predictor.residuals.candidates.candidate import SPEED, Candidate
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.candidates.enumeration import candidates_of, confounded
 from push_predictor.residuals.channels.variance import VarianceEffect, VarianceFinding, variance_effects
-from push_predictor.residuals.evidence.drivers import LOCAL, SESSION
+from push_predictor.residuals.evidence.drivers import CUMULATIVE, LOCAL, SESSION
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, inputs_basis
 from push_predictor.residuals.evidence.standardised import Evidence
 from push_predictor.residuals.outcome import Tested
@@ -28,8 +28,7 @@ from push_predictor.residuals.selection.pruning import needed_terms
 from push_predictor.residuals.selection.term_choice import SelectedTerm, TermChoice
 from push_predictor.types import Array, BoolArray
 
-MOSTLY = 0.5  # share inside training's inputs from which an effect of the inputs is more than extrapolation
-OF_INPUTS = ("velocity", *LOCAL)  # covariates that a shift of the inputs changes
+MOSTLY = 0.5  # share inside training's inputs from which an effect of the speed is more than extrapolation
 NOTABLE = 1.15  # ratio of standard deviations; a smaller change of the variance is not reported
 VARIANCE_SHARE = 0.25  # of the motion's alpha
 FEWEST_PUSHES = 12  # whose variance is judged
@@ -41,7 +40,8 @@ Label = tuple[str | None, str]  # mechanism (None: unknown) and covariate
 class MotionFinding:
     """What the search on the motion found.
 
-    terms: in the order of selection. equivalent, mechanisms: rivals of the first term's covariate and of its mechanism.
+    terms: in the order of selection, parts of others last. equivalent, mechanisms: rivals of the first term's covariate
+    and of its mechanism.
     deviation (3,): standard deviation of the cross-validated training residuals, None for an analytical base. variance:
     effects on the variance. unchanged: effects that the base lacks, but lacked in training as much, strongest first.
     confounded: covariates that were not tried, because the inputs explain them. uncompared: because training does
@@ -87,7 +87,8 @@ def motion_effects(
     every = [c for c in candidates_of(evidence, names, inputs) if _separable(c, float(known.mean()))]
     candidates = [c for c in every if not baseline.lacks(c.covariate)]
     if not candidates:
-        raise RequestError("covariate", ", ".join(names or ()), "one that training recorded, too")
+        accepted = "one that training recorded, too" if every else "one that the inputs do not change, as they shifted"
+        raise RequestError("covariate", ", ".join(names or ()), accepted)
     found = search(evidence, candidates, inputs, share, seed, baseline=baseline)
     found = replace(found, terms=needed_terms(found.terms, evidence))
     if not (inputs.learnt or inputs.absorbs):  # a refit of such a base keeps its parameters
@@ -122,12 +123,16 @@ def _detectable_noise(spread: VarianceFinding) -> dict[str, Mapping[str, Any]]:
 
 
 def _separable(candidate: Candidate, inside: float) -> bool:
-    """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs."""
-    if candidate.covariate in OF_INPUTS:
-        return inside >= MOSTLY
-    if not candidate.basis.is_constant or inside == 1.0:
+    """Whether an effect differs from an error of extrapolation; inside: share of windows among training's inputs.
+
+    Where some windows lie outside, many lie at the ends of training's range. There the errors of a model are larger,
+    and differ along a push.
+    """
+    if inside == 1.0:
         return True
-    return inside >= MOSTLY and candidate.mechanism is not None
+    if candidate.mechanism is None or candidate.basis.is_constant or candidate.covariate in LOCAL:
+        return False
+    return candidate.covariate != SPEED or inside >= MOSTLY
 
 
 def _spread(
@@ -183,6 +188,8 @@ def _experiment(
         return Experiment()
     rivals: dict[str, Candidate] = {first.best.covariate: first.best}
     for judged in first.rivals:
+        if first.best.basis.is_constant and judged.candidate.covariate in CUMULATIVE:
+            continue  # that a constant effect grew early shows only in a session that begins anew
         rivals.setdefault(judged.candidate.covariate, judged.candidate)
     controls = inputs.columns if inputs.absorbs else None
     fitted = [estimated_effects(evidence, [c], controls)[0][0] for c in rivals.values()]

@@ -35,20 +35,30 @@ from push_predictor.residuals.channels.contrast import (
 )
 from push_predictor.residuals.channels.limit_load import FORCES, inputs_of, loads
 from push_predictor.residuals.channels.sensor_zero import zero_shift
-from push_predictor.residuals.evidence.drivers import CONSTANT, LOCAL, PLACE, SESSION, screening_bases
+from push_predictor.residuals.evidence.drivers import (
+    CONSTANT,
+    CUMULATIVE,
+    LOCAL,
+    PLACE,
+    SESSION,
+    between_ends,
+    screening_bases,
+)
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.outcome import Sized, Tested
-from push_predictor.types import Array, IntArray
+from push_predictor.residuals.selection.basis_choice import SIMPLEST_FIRST, step_places, step_places_near
+from push_predictor.types import Array, BoolArray, IntArray
 
 SURFACE_FRICTION, WRENCH_BIAS = "surface_friction", "wrench_bias"
 LEAST_FORCE = 0.05  # of the median normal force; windows below it are rejected
 MOST_TERMS = 3
+MOST_NEAR = 12  # places of a step that are tried near the best of the first
 PUSHES_PER_INPUT, FEWEST_INPUTS = 10, 4  # of the controls: all windows of a push share a contact and an angle
 FEWEST_PUSHES = 12
 PARTS = 2  # of alpha: the zero of the sensor, and the force in contact
 OWN = (*LOCAL, "contact", "angle", "edge", "previous_residual")  # inputs or outcomes, not causes of surface friction
 COMPARED = (*PLACE, *HEADINGS, "velocity")  # tried only against training: friction differs with them on any table
-PROGRESS = ("elapsed_time", "push_index", "slid_distance", "dwell_time", "time_since_contact", "recording")
+PROGRESS = (*CUMULATIVE, "dwell_time", "time_since_contact", "recording")
 
 
 @dataclass(frozen=True)
@@ -91,7 +101,7 @@ class _Force:
     """z (n, 2): log load, and direction minus its prediction (rad), each in robust deviations, unit (2,).
 
     controls (n, m): of the model's inputs. level (n, 1): 1 on new windows, no column without training windows. block
-    (n,): of pushes. table: the new windows.
+    (n,): of pushes. table: the new windows. stack, rows: all windows, and which of them are used.
     """
 
     z: Array
@@ -102,6 +112,8 @@ class _Force:
     tried: tuple[Contrast, ...]
     table: PushTable
     against_training: bool
+    stack: Stacked
+    rows: BoolArray
 
     @property
     def levelled(self) -> Array:
@@ -171,9 +183,8 @@ def _force_of(stack: Stacked, physics: AnalyticalPush) -> _Force:
     rows = inliers(z / unit, np.zeros((len(z), 2, 0)), controls)
     kept = tuple(t.take(rows) for t in tried if is_identifiable(t, controls))
     compared = len(stack.tables) > 1
-    return _Force(
-        z[rows] / unit, unit, controls[rows], _level(stack)[rows], stack.block[rows], kept, stack.tables[-1], compared
-    )
+    level, block = _level(stack)[rows], stack.block[rows]
+    return _Force(z[rows] / unit, unit, controls[rows], level, block, kept, stack.tables[-1], compared, stack, rows)
 
 
 def _level(stack: Stacked) -> Array:
@@ -225,14 +236,15 @@ def _searched(force: _Force, alpha: float, seed: int) -> WrenchFinding:
         if not (driven or (significant and not effects)):
             break
         best, alike = _chosen(force, z, driven or significant, seed)
-        values, draws = estimate_with_draws(z, best.columns, force.controls, best.shared, force.block, seed)
         p_value = p_values[next(k for k, t in enumerate(remaining) if t is best)]
+        remaining = [t for t in remaining if t is not best]
+        best = _as_step(force, z, best, seed)
+        values, draws = estimate_with_draws(z, best.columns, force.controls, best.shared, force.block, seed)
         sized = _sized(force, best, values, draws)
         effects.append(
             WrenchEffect(best.mechanism, best.covariate, best.basis.name, sized, p_value, _names(best, alike))
         )
         z = z - best.columns @ values
-        remaining = [t for t in remaining if t is not best]
     noise = float(force.unit[0] * robust_deviation(Residualizer(force.levelled)(z)[:, 0]))
     return WrenchFinding(tuple(effects), tested, noise, force.against_training)
 
@@ -243,6 +255,25 @@ def _chosen(force: _Force, z: Array, significant: Sequence[Contrast], seed: int)
     alike = best_and_rivals(z, significant, controls, force.block, seed)
     same = [t for t in alike if (t.mechanism, t.covariate) == (alike[0].mechanism, alike[0].covariate)]
     return min(same, key=lambda t: t.columns.shape[2]), alike
+
+
+def _as_step(force: _Force, z: Array, best: Contrast, seed: int) -> Contrast:
+    """The change of the friction as a step along its covariate, unless a line fits as well or a curve surely better."""
+    if best.mechanism != SURFACE_FRICTION or best.basis.name not in ("linear", "quadratic"):
+        return best
+
+    def stepped(places: Sequence[float]) -> list[Contrast]:
+        bases = [DriverBasis("step", (best.covariate,), place=place) for place in places]
+        every = [_of_friction(force.stack, force.unit, best.covariate, basis).take(force.rows) for basis in bases]
+        return [each for each in every if is_identifiable(each, force.levelled)]
+
+    values = force.table.covariates[best.covariate]
+    fitting = best_and_rivals(z, [best, *stepped(step_places(values))], force.levelled, force.block, seed)
+    found = min(fitting, key=lambda t: SIMPLEST_FIRST.index(t.basis.name))
+    if found.basis.name != "step":
+        return found
+    near = stepped(step_places_near(values, found.basis.place, MOST_NEAR))
+    return best_and_rivals(z, [found, *near], force.levelled, force.block, seed)[0]
 
 
 def _is_level(tried: Contrast) -> bool:
@@ -270,11 +301,10 @@ def _sized(force: _Force, best: Contrast, values: Array, draws: Array) -> tuple[
 
 
 def _over_range(force: _Force, best: Contrast) -> Array:
-    """Rows (k, p) of the basis over the new windows, in units of z; one difference for a basis of one column."""
+    """Rows (k, p) of the basis over the new windows, in units of z; one difference where its covariate has ends."""
     if best.covariate == CONSTANT:
         return np.array([[1.0 / force.unit[0]]])
-    table = force.table
-    values = best.basis.values(table.covariates, len(table)) / force.unit[0]
-    if values.shape[1] > 1:
-        return np.asarray(values)
-    return np.asarray(np.subtract(*np.quantile(values, [0.95, 0.05], axis=0))[None])
+    # A curve may begin and end at the same force.
+    change = None if best.basis.name == "quadratic" else between_ends(best.basis, force.table)
+    values = best.basis.values(force.table.covariates, len(force.table)) if change is None else change[None]
+    return np.asarray(values / force.unit[0])

@@ -17,13 +17,15 @@ OUTCOMES = ("normal_force", "tangential_force")  # measured within the window: o
 SENSOR_ZERO = ("free_force_x", "free_force_y")  # what the window finder subtracted from the force: no cause either
 # They share noise with the residual, or vary along a push: judged against their relation in the training data.
 LOCAL = ("contact_gap", "time_since_contact", "previous_residual")
-OF_SESSION = ("elapsed_time", "push_index", "slid_distance", "recording")  # counted from the start of a session
+TIME, COUNT, DISTANCE = CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # they only grow
+OF_SESSION = (*CUMULATIVE, "recording")  # counted from the start of a session
 FOLDED = ("contact", "angle")  # every candidate depends on these inputs already
 NO_CAUSES = (*OUTCOMES, *SENSOR_ZERO, *FOLDED)
 CONSTANT = "model_inputs"
 SESSION = "session"  # the step between the training pushes and the later ones
 UNDRIVEN = (CONSTANT, SESSION)
 MOST_LEVELS = 12
+ENDS = (0.05, 0.95)  # quantiles of a covariate between which a change is reported, and pushes are proposed
 SETTLED = 0.03  # s of contact after which pusher and slider move together
 
 
@@ -52,6 +54,17 @@ def standard_basis(name: str, driver: str, values: Array) -> DriverBasis:
     """A basis of one scalar covariate, centred and scaled on its values (n,)."""
     scale = float(np.ptp(values)) / 3.0 if name == "logarithmic" else float(values.std())
     return DriverBasis(name, (driver,), (float(values.mean()),), (scale,), place=float(values.min()))
+
+
+def between_ends(basis: DriverBasis, table: PushTable) -> Array | None:
+    """Values (m,) of a basis at the upper end of its covariate less those at the lower; None if it has no ends."""
+    if basis.name == "step":
+        return np.ones(1)  # wherever it is
+    if basis.name not in ("linear", "logarithmic", "quadratic"):
+        return None
+    values, driver = basis.values(table.covariates, len(table)), np.asarray(table.covariates[basis.drivers[0]])
+    low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
+    return np.asarray(values[high] - values[low])
 
 
 def _bases_of(name: str, values: Array) -> list[DriverBasis]:

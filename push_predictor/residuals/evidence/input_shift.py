@@ -43,7 +43,10 @@ class ShiftedInput:
 
 @dataclass(frozen=True, eq=False)
 class InputShift:
-    """The inputs that have shifted, the most shifted first, and the windows (n,) outside in any of them."""
+    """The inputs that have shifted, and the windows (n,) outside in any of them.
+
+    Those that extrapolate come first, of each kind the one with the largest share.
+    """
 
     inputs: tuple[ShiftedInput, ...]
     outside: BoolArray
@@ -65,7 +68,7 @@ def input_shift(model: PushModel, table: PushTable) -> InputShift:
         for k, name in enumerate(outside)
     ]
     shifted = [each for each in every if each.extrapolates or each.share_unvisited >= ONE_SIDED]
-    shifted.sort(key=lambda each: (-each.share_outside, -each.share_unvisited))
+    shifted.sort(key=lambda each: -each.share_outside if each.extrapolates else 1.0 - each.share_unvisited)
     rows = np.zeros(len(table), dtype=np.bool_)
     for each in shifted:
         if each.extrapolates:

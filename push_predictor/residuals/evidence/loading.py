@@ -18,10 +18,9 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 from push_predictor.recordings.windows.track import NANOSECOND
+from push_predictor.residuals.evidence.drivers import CUMULATIVE
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
-
-CUMULATIVE = ("elapsed_time", "push_index", "slid_distance")  # continue from one recording to the next
 
 
 @dataclass(frozen=True, eq=False)

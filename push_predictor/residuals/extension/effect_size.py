@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from push_predictor.models.effects.effect import Effect, mechanism_named
 from push_predictor.recordings.table import PushTable
+from push_predictor.residuals.evidence.drivers import between_ends
 from push_predictor.residuals.outcome import Sized
 from push_predictor.types import Array
 
-ENDS = (0.05, 0.95)  # quantiles of the covariate between which a change is reported
 DRAWS = 2000
 
 
@@ -17,7 +19,8 @@ def size_of(effect: Effect, table: PushTable) -> Sized | None:
     """The mechanism's parameter, or its change along the covariate, with a 95 % interval; None if it is unknown.
 
     Constant: the parameter itself. One covariate: the change from its 5th to its 95th percentile. Headings, categories
-    and maps: the largest difference over the windows. The size of several parameters is the length of their vector.
+    and maps: the largest difference over the windows. The size of several parameters is the length of their vector. The
+    interval contains the errors of the mechanics, too.
     """
     if effect.mechanism is None:
         return None
@@ -28,7 +31,9 @@ def size_of(effect: Effect, table: PushTable) -> Sized | None:
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, size=DRAWS, method="svd")
     lengths = np.array([_length(row, change, len(parameters)) for row in drawn])
     low, high = np.quantile(lengths, [0.025, 0.975])
-    return Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
+    sized = Sized(_name(effect), float(estimate), float(low), float(high), parameters[0].unit)
+    sized = sized.with_errors_of_mechanics()
+    return sized if len(parameters) == 1 else replace(sized, low=max(sized.low, 0.0))  # a length is never negative
 
 
 def _name(effect: Effect) -> str:
@@ -41,13 +46,11 @@ def _name(effect: Effect) -> str:
 def _change(effect: Effect, table: PushTable) -> Array:
     """Difference (m,) of the basis between the two ends that are compared."""
     basis = effect.basis
-    values = basis.values(table.covariates, len(table))
     if basis.is_constant:
         return np.ones(1)
-    if basis.name in ("linear", "logarithmic", "quadratic", "step"):
-        driver = np.asarray(table.covariates[basis.drivers[0]])
-        low, high = (int(np.argmin(np.abs(driver - np.quantile(driver, share)))) for share in ENDS)
-        return np.asarray(values[high] - values[low])
+    if (change := between_ends(basis, table)) is not None:
+        return change
+    values = basis.values(table.covariates, len(table))
     strength = values @ effect.coefficients.reshape(-1, values.shape[1])[0]
     return np.asarray(values[int(np.argmax(strength))] - values[int(np.argmin(strength))])
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from push_predictor.residuals.evidence.drivers import CUMULATIVE
+from push_predictor.residuals.outcome import FoundEffect
 from push_predictor.residuals.reporting.phrases import covariate_phrase, listed
 
-DRIFTING = ("elapsed_time", "push_index", "slid_distance")
 HEADED = ("slider_heading", "push_heading", "edge")
 ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two rivals, one of each group
     (
-        DRIFTING,
-        DRIFTING,
+        CUMULATIVE,
+        CUMULATIVE,
         "Pause for about half a session, then continue: time passes, push count and distance do not. Then alternate "
         "blocks of short and of long pushes: in long pushes the distance grows faster than the count.",
     ),
     (
-        DRIFTING,
+        CUMULATIVE,
         ("slider_x", "slider_y"),
         "Return to places where the slider was early on: an effect of the place recurs, a drift does not.",
     ),
@@ -27,17 +28,25 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (  # for two 
         "heading and the push direction.",
     ),
     (
-        DRIFTING,
+        CUMULATIVE,
         ("velocity", "angle", "contact"),
         "Randomise speed, push angle and contact point over the session.",
     ),
-    (DRIFTING, ("dwell_time",), "Randomise the pause before each push over the session."),
+    (CUMULATIVE, ("dwell_time",), "Randomise the pause before each push over the session."),
     (
-        DRIFTING,
+        CUMULATIVE,
         ("recording",),
         "Repeat the setting of an early recording in a new one: an effect of the setting recurs, a drift does not.",
     ),
 )
+
+
+ANEW = "To decide, restore the rig to its state at the start of the session, and push again."
+
+
+def grew_early(effect: FoundEffect, equivalent: Sequence[str]) -> bool:
+    """Whether all that rivals a constant effect is that it grew early in the session."""
+    return effect.basis == "constant" and bool(equivalent) and {*equivalent} <= {*CUMULATIVE}
 
 
 def separating_words(rivals: Sequence[str]) -> list[str]:

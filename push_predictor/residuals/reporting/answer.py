@@ -12,6 +12,7 @@ from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.effects.effect import Effect
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.outcome import FoundEffect, Gain, Sized, Trace
+from push_predictor.residuals.reporting.advice import ANEW, grew_early
 from push_predictor.residuals.reporting.input_shift import share_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import capitalised, covariate_phrase, listed, mechanism_phrase
@@ -136,6 +137,8 @@ def _action(trace: Trace) -> str:
     model, reason = _model_clause(trace)
     if not trace.equivalent:
         return f"{model}: {reason}."
+    if grew_early(trace.effects[0], trace.equivalent):
+        return f"{model}. {ANEW}"
     names = _rivals(trace.effects[0], trace.equivalent)
     if trace.experiment:
         pushes = count(len(trace.experiment), "push below: it decides", "pushes below: they decide")

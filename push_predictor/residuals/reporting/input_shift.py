@@ -34,7 +34,7 @@ def shift_clause(shift: ShiftedInput) -> str:
 def share_clause(shift: ShiftedInput) -> str:
     """The share of windows outside, or of those of training that the new ones leave out."""
     if not shift.extrapolates:
-        return f"{100.0 * shift.share_unvisited:.0f} % of the training windows have no new ones near them"
+        return f"{100.0 * shift.share_unvisited:.0f} % of the training windows lie outside the range of the new pushes"
     return f"{100.0 * shift.share_outside:.0f} % of the windows lie outside the range of training"
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from push_predictor.residuals.channels.measurement import MeasurementFinding
 from push_predictor.residuals.channels.motion import MotionFinding
 from push_predictor.residuals.channels.wrench import WrenchFinding
+from push_predictor.residuals.evidence.input_shift import ShiftedInput
 from push_predictor.residuals.evidence.loading import LoadedData
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.reporting.phrases import (
@@ -22,6 +25,10 @@ CUT_AGAIN = (
     "unchanged, on the held-out pushes of the corrected recordings."
 )
 NO_STREAMS = "A push table contains no streams, so the error is reported but not corrected. Give the recording."
+NOT_TRIED = (
+    "Not tested, because some pushes lie outside the inputs of training: constant effects, unknown mechanisms, and "
+    "effects that vary along a push."
+)
 NOT_JUDGED = "The measurement could not be checked for errors: these windows contain no contact gap or no pose."
 
 
@@ -40,6 +47,11 @@ def notes_of_data(loaded: LoadedData) -> tuple[str, ...]:
     return (f"Split: {RULE}. Windows of one push stay together.", *experiment, *dropped)
 
 
+def notes_of_shift(shifted: Sequence[ShiftedInput]) -> tuple[str, ...]:
+    """What was not tried because the inputs extrapolate."""
+    return (NOT_TRIED,) if any(shift.extrapolates for shift in shifted) else ()
+
+
 def _of_motion(motion: MotionFinding) -> list[str]:
     notes = []
     if motion.deviation is not None:
@@ -54,7 +66,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
     if left := [
         effect_phrase(t.mechanism, t.best.covariate) for t, part in zip(motion.terms, parts, strict=True) if part
     ]:
-        notes.append(f"Part of a listed effect, and therefore not listed, but contained in the model: {listed(left)}.")
+        notes.append(f"Fitted together with a listed effect, and not listed separately: {listed(left)}.")
     if motion.confounded:
         names = listed([covariate_phrase(name) for name in motion.confounded])
         notes.append(
@@ -67,7 +79,7 @@ def _of_motion(motion: MotionFinding) -> list[str]:
             f"Not tested: {names}. The training windows do not show how the outcome depends on this without a change: "
             f"they lack the covariate, or have too few windows per push."
         )
-    if rivals := motion.experiment.inseparable:
+    if (rivals := motion.experiment.inseparable) and not motion.terms[0].best.basis.is_constant:
         names = listed([covariate_phrase(name) for name in (motion.terms[0].best.covariate, *rivals)])
         notes.append(
             f"{PUSHES} further pushes would not separate {names}: at all values that can be set, their predictions are "

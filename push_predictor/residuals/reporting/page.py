@@ -9,7 +9,7 @@ from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.residuals.evidence.split import RULE
 from push_predictor.residuals.outcome import Trace
-from push_predictor.residuals.reporting.advice import separating_words
+from push_predictor.residuals.reporting.advice import ANEW, grew_early, separating_words
 from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.figures.gallery import calibration_figures, effect_figures, error_figure
 from push_predictor.residuals.reporting.figures.key import key_figure
@@ -99,7 +99,7 @@ def _facts(trace: Trace) -> dict[str, str]:
 
 
 def _shifted_inputs(trace: Trace) -> list[str]:
-    """Inputs outside the range of training, where they are not the verdict itself."""
+    """Inputs that differ from those of training, where they are not the verdict itself."""
     shifts = () if trace.verdict == "input_shift" else trace.input_shift
     texts = [f"{capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in shifts]
     return [html.paragraph(text, "warning") for text in texts]
@@ -120,7 +120,9 @@ def _rivals(trace: Trace) -> list[str]:
     if trace.verdict == "driver_only":
         parts.append(html.paragraph(UNNAMED))
     if trace.equivalent:
-        parts.append(html.bullets(separating_words([trace.effects[0].covariate, *trace.equivalent])))
+        first, rivals = trace.effects[0], trace.equivalent
+        words = [ANEW] if grew_early(first, rivals) else separating_words([first.covariate, *rivals])
+        parts.append(html.bullets(words))
     if trace.experiment:
         parts += [html.paragraph(EXPERIMENT), experiment_table(trace)]
     return parts

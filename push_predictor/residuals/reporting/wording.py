@@ -12,6 +12,7 @@ from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting.html import number
 from push_predictor.residuals.evidence.drivers import UNDRIVEN
 from push_predictor.residuals.outcome import FoundEffect, Gain, Trace, Verdict
+from push_predictor.residuals.reporting.advice import grew_early
 from push_predictor.residuals.reporting.input_shift import share_clause, shift_clause
 from push_predictor.residuals.reporting.noise_ratio import noise_ratios
 from push_predictor.residuals.reporting.phrases import (
@@ -60,7 +61,11 @@ def worth_sentence(trace: Trace) -> str:
     if trace.verdict == "measurement":
         return f"The motion model stays unchanged. Correct the measurement, then trace again.{_after_correction(trace)}"
     if trace.verdict == "input_shift":
-        further = "Train on pushes in the new range" if trace.input_shift[0].extrapolates else "Push in the rest of it"
+        further = (
+            "Train on pushes in the new range"
+            if trace.input_shift[0].extrapolates
+            else "Push in the rest of training's range"
+        )
         return f"The motion model stays unchanged. {further}, then trace again."
     if not trace.terms:
         retrain = " Retrain on the new pushes to update the predicted noise." if trace.verdict == "variance" else ""
@@ -223,7 +228,7 @@ def _variance(trace: Trace) -> str:
 
 
 def _shifted(trace: Trace) -> str:
-    """The share of windows outside the range of training, for each input."""
+    """The share of windows that tell each input from training."""
     first, *others = trace.input_shift
     further = [f" {capitalised(shift_clause(shift))}: {share_clause(shift)}." for shift in others]
     return f"{share_clause(first)}.{''.join(further)}"
@@ -244,7 +249,9 @@ EVIDENCE: dict[Verdict, Callable[[Trace], str]] = {
 def rivals_sentence(trace: Trace, where: str = "below") -> str:
     """The covariates and mechanisms that fit as well, and how many pushes would decide."""
     text = ""
-    if trace.equivalent:
+    if trace.effects and grew_early(trace.effects[0], trace.equivalent):
+        text = " It was there from the first push, or it grew early in the session: these pushes do not decide."
+    elif trace.equivalent:
         names = listed([covariate_phrase(name) for name in (trace.effects[0].covariate, *trace.equivalent)])
         pushes = count(len(trace.experiment), "push that would decide is", "pushes that would decide are")
         text = f" {capitalised(names)} fit equally well{f'; {pushes} listed {where}' if trace.experiment else ''}."

@@ -18,11 +18,26 @@ def with_fitting_names(terms: Sequence[SelectedTerm]) -> tuple[SelectedTerm, ...
     """The terms without names that do not fit: what such a mechanism leaves is an unknown effect, found later.
 
     The model keeps the mechanism's response, which explained most. The mechanism is what the unknown effect resembles.
-    What the fit of an effect leaves of it comes last.
+    Of a mechanism that acts always and more along a covariate, the part that tells the covariate comes first. What the
+    fit of an effect leaves of it comes last.
     """
+    terms = _driven_first(terms)
     misfits = {term.mechanism for k, term in enumerate(terms) if any(_withdraws(t, term) for t in terms[k + 1 :])}
     fitting = [_unnamed(term) if term.mechanism in misfits else term for term in terms]
     return tuple(fitting[k] for k in np.argsort(parts_of_others(fitting), kind="stable"))
+
+
+def _driven_first(terms: Sequence[SelectedTerm]) -> list[SelectedTerm]:
+    """The terms, a constant effect behind the first of the same mechanism that depends on a covariate."""
+    ordered = list(terms)
+    for k, constant in enumerate(terms):
+        if constant.mechanism is None or not constant.best.basis.is_constant:
+            continue
+        driven = [t for t in terms[k:] if t.mechanism == constant.mechanism and not t.best.basis.is_constant]
+        if driven:
+            i, j = (next(n for n, t in enumerate(ordered) if t is one) for one in (constant, driven[0]))
+            ordered[i], ordered[j] = ordered[j], ordered[i]
+    return ordered
 
 
 def parts_of_others(terms: Sequence[SelectedTerm]) -> list[bool]:

@@ -55,7 +55,7 @@ def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray
         tried = with_basis(candidate, basis, table)
         return Judged(tried, gains_of(z, tried.columns, block))
 
-    steps = [judged(DriverBasis("step", (name,), place=place)) for place in _places(values)]
+    steps = [judged(DriverBasis("step", (name,), place=place)) for place in step_places(values)]
     step = _moved(max(steps, key=_gain), values, judged)
     return max([step, *map(judged, growing)], key=_gain)
 
@@ -71,7 +71,7 @@ def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:
     bases = [standard_basis(kind, name, values) for kind in ("linear", "logarithmic", "quadratic")]
     if candidate.grows:
         bases[0] = replace(bases[0], centre=(float(values.min()),))
-    bases += [DriverBasis("step", (name,), place=place) for place in _places(values)]
+    bases += [DriverBasis("step", (name,), place=place) for place in step_places(values)]
     if name in PLACE and all(p in table.covariates for p in PLACE):
         bases.append(two_dimensional(table))
     return bases
@@ -89,8 +89,8 @@ def with_basis(candidate: Candidate, basis: DriverBasis, table: PushTable) -> Ca
     return replace(candidate, basis=basis, values=basis.values(table.covariates, len(table)))
 
 
-def _places(values: Array) -> list[float]:
-    """Midpoints between the values at even quantiles and the values before them."""
+def step_places(values: Array) -> list[float]:
+    """Places that are tried first: midpoints between the values at even quantiles and the values before them."""
     ordered = np.unique(values)
     if len(ordered) < 2:
         return []
@@ -105,18 +105,18 @@ def _is_step(judged: Judged) -> bool:
 
 def _moved(step: Judged, values: Array, judged: Callable[[DriverBasis], Judged]) -> Judged:
     """The step at the place near its own where it gains most."""
-    near = _places_near(values, step.candidate.basis.place)
+    near = step_places_near(values, step.candidate.basis.place)
     return max([step, *(judged(replace(step.candidate.basis, place=place)) for place in near)], key=_gain)
 
 
-def _places_near(values: Array, place: float) -> list[float]:
+def step_places_near(values: Array, place: float, most: int = MOST_PLACES) -> list[float]:
     """Midpoints between neighbouring values, from the next place that was tried below to the next above."""
-    ordered, tried = np.unique(values), _places(values)
+    ordered, tried = np.unique(values), step_places(values)
     low = max((other for other in tried if other < place), default=-np.inf)
     high = min((other for other in tried if other > place), default=np.inf)
     middle = 0.5 * (ordered[1:] + ordered[:-1])
     inside = middle[(middle > low) & (middle < high)]
-    return [float(middle) for middle in inside[:: max(1, len(inside) // MOST_PLACES)]]
+    return [float(middle) for middle in inside[:: max(1, len(inside) // most)]]
 
 
 def _gain(judged: Judged) -> float:

@@ -16,7 +16,7 @@ NOT_ZERO = 0.01  # p above which an effect among others may be zero
 
 
 def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[SelectedTerm, ...]:
-    """The terms without those whose effect may be zero once all are fitted together, the least certain dropped first.
+    """The terms without those whose size may be zero once all are fitted together, the least certain dropped first.
 
     A constant effect that was selected twice is one: the first fit of it left a part to another term. Terms that a
     refit of the base learns stay.
@@ -24,7 +24,7 @@ def needed_terms(terms: Sequence[SelectedTerm], evidence: Evidence) -> tuple[Sel
     terms = _once(terms)
     fitted = [term for term in terms if not term.own]
     while len(fitted) > 1:
-        effects, _ = estimated_effects(evidence, [term.best for term in fitted])
+        effects, _ = estimated_effects(evidence, [term.best for term in fitted], of_size=True)
         p_values = [p_of_zero(effect.coefficients, effect.covariance) for effect in effects]
         if max(p_values) <= NOT_ZERO:
             break

@@ -14,13 +14,12 @@ import numpy as np
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.effects.covariate_range import HEADINGS
 from push_predictor.recordings.table import INPUTS, PushTable
+from push_predictor.residuals.evidence.drivers import COUNT, CUMULATIVE, DISTANCE, ENDS, TIME
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
 
-TIME, COUNT, DISTANCE = GROWING = ("elapsed_time", "push_index", "slid_distance")
 PLACED = ("slider_x", "slider_y", "dwell_time")
 TOPIC = "topic:"
-ENDS = (0.05, 0.95)  # quantiles of the recorded values between which a covariate is set
 TURNS = 4  # headings of the slider that are tried
 REST = 0.5  # of the session so far: a longer rest would extrapolate further
 LONG_PUSH = 0.08  # m, about the length of a slider: few contacts last longer
@@ -33,7 +32,7 @@ def is_set(name: str) -> bool:
 
 def is_proposed(name: str) -> bool:
     """Whether a proposed push states a value of this covariate."""
-    return is_set(name) or name in GROWING
+    return is_set(name) or name in CUMULATIVE
 
 
 def settings(session: PushTable, rows: PushTable, drivers: Sequence[str], count: int) -> list[dict[str, Array]]:

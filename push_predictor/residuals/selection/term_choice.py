@@ -14,7 +14,7 @@ from push_predictor.models.effects.driver_basis import DriverBasis
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.residuals.candidates.candidate import Candidate, projected
 from push_predictor.residuals.candidates.coefficients import exact_fit
-from push_predictor.residuals.evidence.drivers import LOCAL, OF_SESSION
+from push_predictor.residuals.evidence.drivers import CUMULATIVE, LOCAL, OF_SESSION, standard_basis
 from push_predictor.residuals.evidence.inputs_basis import InputsBasis, Kind, controls_for
 from push_predictor.residuals.evidence.residualizer import Residualizer
 from push_predictor.residuals.evidence.standardised import Evidence
@@ -37,6 +37,7 @@ SMOOTH = ("linear", "logarithmic", "quadratic")  # bases in which rivals are com
 MOST_JUDGED = 60  # of the significant candidates, those with the largest statistics
 MOST_REFINED = 12  # of the labels, those that are tried in every basis
 MOST_RIVALS = 3  # mechanisms of a whole effect that are fitted exactly
+SOON = 0.03  # of the session: scale of an effect that grows early in it
 BY_CHANCE = 0.05  # probability that any covariate seems to be the onset of a constant effect
 MOST_NAMED = 6  # candidates along the covariate, best first, that are tried as its name
 FELT = 0.15  # an output is named if its standardised shift is at least this share of the strongest output's
@@ -112,6 +113,8 @@ class TermChoice:
         rivals = open_rivals(judged[0], _one_each(judged[1:], judged[0], "covariate"), self._case(judged[0], z))
         rivals = self._separated(rivals, z) if self.evidence.chosen else rivals
         driver = next((j for j in rivals if j.candidate.covariate in used), rivals[0]).candidate.covariate
+        known = {j.candidate.covariate for j in rivals}
+        rivals = [*rivals, *(j for j in self._early_growth(judged, z) if j.candidate.covariate not in known)]
         best, naming = self._named(judged, driver, z, growing)
         drivers = tuple(dict.fromkeys([driver, *(j.candidate.covariate for j in rivals)]))
         labels = {j.candidate.label for j in judged}
@@ -160,22 +163,33 @@ class TermChoice:
         return sorted((self._with_simplest_basis(j.candidate, z) for j in first), key=lambda j: -j.gain)
 
     def _with_onset(self, judged: list[Judged], z: Array) -> list[Judged]:
-        """With whole effects in front: a constant one, or one that surely begins with some value of a covariate.
+        """With whole effects in front that surely begin with some value of a covariate, instead of being constant.
 
         Where a base absorbs no constant effect, the constant and the changing part of an effect are found apart.
         """
-        first = judged[0].candidate
-        if self.inputs.absorbs or not (first.basis.is_constant or first.covariate in OF_SESSION):
+        always = self._always(judged, z)
+        if always is None:
             return judged
-        constant = self._constants(judged)
-        if not constant:
-            return judged
-        always = max(
-            (self._whole(_unconditional(j.candidate), z) for j in constant[:MOST_RIVALS]), key=lambda j: j.gain
-        )
         along = self._along_covariates(str(always.candidate.mechanism))
         surely = [j for j in self._onsets(along, z) if surely_larger(j, always, BY_CHANCE / len(along))]
         return [*surely, *judged]
+
+    def _early_growth(self, judged: list[Judged], z: Array) -> list[Judged]:
+        """Rivals of a constant effect that comes first: growths that soon end, and fit better, though not surely."""
+        always = self._always(judged, z) if judged[0].candidate.basis.is_constant else None
+        if always is None:
+            return []
+        along = self._along_covariates(str(always.candidate.mechanism))
+        growing = [self._growing_from_zero(c, z) for c in along if c.covariate in CUMULATIVE]
+        return [j for j in growing if j.gain > always.gain]
+
+    def _always(self, judged: Sequence[Judged], z: Array) -> Judged | None:
+        """The whole constant effect with which a constant or drifting one is compared; None where a base absorbs it."""
+        first = judged[0].candidate
+        if self.inputs.absorbs or not (first.basis.is_constant or first.covariate in OF_SESSION):
+            return None
+        whole = [self._whole(_unconditional(j.candidate), z) for j in self._constants(judged)[:MOST_RIVALS]]
+        return max(whole, key=lambda j: j.gain, default=None)
 
     def _constants(self, judged: Sequence[Judged]) -> list[Judged]:
         """The constant effects found, if one comes first; else that of the first one's mechanism."""
@@ -196,6 +210,13 @@ class TermChoice:
         stepped = [self._by_onset(c, z) for c in along]
         best = sorted(stepped, key=lambda j: -j.gain)[:MOST_NAMED]
         return sorted((self._whole(j.candidate, z) for j in best), key=lambda j: -j.gain)
+
+    def _growing_from_zero(self, candidate: Candidate, z: Array) -> Judged:
+        """The candidate's whole effect, fitted exactly, as one that grows ever more slowly from the session's start."""
+        table, values = self.evidence.table, self.evidence.table.covariates[candidate.covariate]
+        basis = standard_basis("logarithmic", candidate.covariate, values)
+        soon = replace(basis, scale=(SOON * float(np.ptp(values)),))
+        return self._whole(with_basis(_unconditional(candidate), soon, table), z)
 
     def _by_onset(self, candidate: Candidate, z: Array) -> Judged:
         """The candidate's whole effect by its onset along its covariate."""

@@ -52,7 +52,7 @@ def root_of(stretch: Array, reach: Array) -> Root:
 
 def stretched_arms(centred: PressureDistribution, a: float, b: float) -> PressureDistribution:
     """The distribution about its centre with the arms R r: their size does not change the shape of a surface."""
-    root = root_of(np.array([[a, b]]), np.zeros((1, DIRECTIONS)) + 1.0 / DIRECTIONS)
+    root = root_of(np.array([[a, b]]), np.full((1, DIRECTIONS), 1.0 / DIRECTIONS))
     x, y = centred.points.T
     arms = np.column_stack([root.xx * x + root.xy * y, root.xy * x + root.yy * y])
     return PressureDistribution(arms, centred.shares, centred.spread)

@@ -63,9 +63,9 @@ class LoadMap:
 
     @cached_property
     def _stretched(self) -> tuple[Array, Array]:
-        """Change of the nodes per unit of a and of b; takes as long as load_map.
+        """Change of the nodes per unit of a and of b; takes as long as `load_map`.
 
-        None for few points of support: the flats and edges of their surfaces move, and a blend would not be convex.
+        Zero for few points of support: the flats and edges of their surfaces move, and a blend would not be convex.
         """
         if _every(self.centred) == 1:
             return np.zeros_like(self.nodes), np.zeros_like(self.nodes)

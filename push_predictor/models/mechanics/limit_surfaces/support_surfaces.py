@@ -72,22 +72,22 @@ class RowSurfaces:
     @cached_property
     def cells(self) -> Array:
         """Those of all tables, one after the other."""
-        return joined([one.cells for one in self.maps])
+        return _joined([one.cells for one in self.maps])
 
     @cached_property
     def cell_slopes(self) -> Array:
-        """See `cells`."""
-        return joined([one.cell_slopes for one in self.maps])
+        """Those of all tables along the last axis, (2, 12, cells)."""
+        return _joined([one.cell_slopes for one in self.maps])
 
     @cached_property
     def sizes(self) -> Array:
         """See `cells`."""
-        return joined([one.sizes for one in self.maps])
+        return _joined([one.sizes for one in self.maps])
 
     @cached_property
     def size_slopes(self) -> Array:
-        """See `cells`."""
-        return joined([one.size_slopes for one in self.maps])
+        """Those of all tables along the last axis, (2, 4, cells)."""
+        return _joined([one.size_slopes for one in self.maps])
 
     @property
     def per_table(self) -> int:
@@ -174,7 +174,7 @@ def row_surfaces(maps: Sequence[LoadMap], low: IntArray, high: IntArray, share: 
     return RowSurfaces(maps, low, high, share, quantities)
 
 
-def joined(tables: Sequence[Array]) -> Array:
+def _joined(tables: Sequence[Array]) -> Array:
     """Tables, one after the other along the cells."""
     return tables[0] if len(tables) == 1 else np.concatenate(tables, axis=-1)
 

@@ -15,7 +15,6 @@ from push_predictor.models.mechanics.limit_surfaces.load_map import AZIMUTHS, EL
 from push_predictor.models.mechanics.limit_surfaces.loaded_surface import PULL_ROUNDS, SMALLEST_MARGIN
 from push_predictor.models.mechanics.limit_surfaces.support_surfaces import (
     PushSurfaces,
-    RowQuantities,
     RowSurfaces,
     SameSurface,
 )
@@ -27,8 +26,8 @@ EXACT = 1e-13  # rad: on an ellipsoid the velocity is linear in the force, so th
 
 Three: TypeAlias = tuple[float, float, float]
 Twist: TypeAlias = Callable[[float, float, float], Three]  # of a load (force x, y, moment over length)
-Shape: TypeAlias = Callable[[float, float], tuple[Twist, "Gauge"]]  # of a surface by a, b, see direction_dependence
 Gauge: TypeAlias = Callable[[float, float, float], float]
+Shape: TypeAlias = Callable[[float, float], tuple[Twist, Gauge]]  # of a surface by a, b, see direction_dependence
 Cells: TypeAlias = list[tuple[float, ...]]  # the polynomials of a table
 
 
@@ -62,18 +61,13 @@ class Stretch(NamedTuple):
 
 def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
     """The surface of the first push."""
-    of_rows, tolerance = surfaces.of_rows, ROOT_TOLERANCE
-    if isinstance(surfaces, RowSurfaces):
-        shape = _tabulated(surfaces)
-        twist, gauge = shape(0.0, 0.0)
-        return _scalar(of_rows, twist, gauge, shape, tolerance)
-    if not isinstance(surfaces, SameSurface):
-        raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
-    if surfaces.surface.power == 2.0:
-        twist, gauge, tolerance = _ellipsoid, _norm, EXACT
-    else:
-        twist, gauge = _of_arrays(surfaces.surface), _gauge_of_arrays(surfaces.surface)
-    return _scalar(of_rows, twist, gauge, lambda a, b: (twist, gauge), tolerance)
+    shape, tolerance = _shape_of(surfaces)
+    twist, gauge = shape(0.0, 0.0)
+    of_rows = surfaces.of_rows
+    x, y = of_rows.centre[0].tolist()
+    xx, xy, yy = of_rows.square[0].tolist()
+    length = float(of_rows.length[0])
+    return ScalarSurface((x, y), length, (xx, xy, yy), of_rows.reach[0], twist, gauge, shape, tolerance)
 
 
 def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
@@ -123,11 +117,16 @@ def _with_pull(gauge: Gauge, pusher: Three, pull: Three) -> tuple[float, Three]:
     return share / given, (given * lx, given * ly, given * lm)
 
 
-def _scalar(of_rows: RowQuantities, twist: Twist, gauge: Gauge, shape: Shape, tolerance: float) -> ScalarSurface:
-    x, y = of_rows.centre[0].tolist()
-    xx, xy, yy = of_rows.square[0].tolist()
-    length = float(of_rows.length[0])
-    return ScalarSurface((x, y), length, (xx, xy, yy), of_rows.reach[0], twist, gauge, shape, tolerance)
+def _shape_of(surfaces: PushSurfaces) -> tuple[Shape, float]:
+    """The shape of the first push's surface, and the tolerance of a contact that sticks."""
+    if isinstance(surfaces, RowSurfaces):
+        return _tabulated(surfaces), ROOT_TOLERANCE
+    if not isinstance(surfaces, SameSurface):
+        raise TypeError(f"{type(surfaces).__name__} has no version in plain numbers")
+    if surfaces.surface.power == 2.0:
+        return lambda a, b: (_ellipsoid, _norm), EXACT
+    same = _of_arrays(surfaces.surface), _gauge_of_arrays(surfaces.surface)
+    return lambda a, b: same, ROOT_TOLERANCE
 
 
 def _tabulated(surfaces: RowSurfaces) -> Shape:

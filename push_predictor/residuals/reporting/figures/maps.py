@@ -14,7 +14,7 @@ from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting import chart
 from push_predictor.reporting.chart import Chart
 from push_predictor.reporting.html import number
-from push_predictor.residuals.reporting.advice import DRIFTING
+from push_predictor.residuals.evidence.drivers import CUMULATIVE
 from push_predictor.residuals.reporting.figures.partial import Strength
 from push_predictor.residuals.reporting.phrases import bare, covariate_phrase, place_of_step
 from push_predictor.residuals.reporting.quantities import count
@@ -135,7 +135,7 @@ def _names(basis: DriverBasis, above: BoolArray, table: PushTable) -> tuple[str,
     values = table.covariates[basis.drivers[0]]
     if basis.name == "step":
         place = place_of_step(basis.drivers[0], basis.place)
-        first, second = ("until", "since") if basis.drivers[0] in DRIFTING else ("below", "above")
+        first, second = ("until", "since") if basis.drivers[0] in CUMULATIVE else ("below", "above")
         return f"{first} {place}", f"{second} {place}"
     low, high = values[~above], values[above]
     if len(basis.drivers) == 1 and (low.max() <= high.min() or high.max() <= low.min()):
