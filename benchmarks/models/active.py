@@ -260,7 +260,7 @@ def _pool_courses(case: Case, left: IntArray) -> Courses:
         rows = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
         inputs[k, : len(rows)], kept[k, : len(rows)] = rows, True
     duration = float(np.median(case.pool.duration))
-    return Courses(inputs, kept, duration, inputs[:, 0, 0] * duration * kept.sum(axis=1))
+    return Courses(inputs, kept, duration)
 
 
 def _pool_windows(case: Case) -> Push:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
     from push_predictor.models.pushes import Pushes
 
-COLUMNS = ("velocity", "contact", "angle", "duration", "travel", "variance_left")
+COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -134,5 +134,5 @@ def _matter(path: Path, model: PushModel) -> Pushes:
 
 def _rows(found: Suggested) -> list[list[float]]:
     """The values of COLUMNS of each push."""
-    columns = (*found.inputs.T, found.duration, found.travel, found.variance_left)
+    columns = (*found.inputs.T, found.duration, found.variance_left)
     return [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]

@@ -34,18 +34,14 @@ MOST_PUSHES = 1000
 class Suggested:
     """k pushes in the order in which to make them.
 
-    inputs (k, 3: velocity m/s, contact, angle rad) at first touch; travel (k,) m; variance_left (k,): expected share of
-    the mean function's variance, over the pushes that matter and in units of noise, that is left after each.
+    inputs (k, 3: velocity m/s, contact, angle rad) at first touch; duration (k,) of each whole push, s; variance_left
+    (k,): expected share of the mean function's variance, over the pushes that matter and in units of noise, that is
+    left after each.
     """
 
     inputs: Array
-    travel: Array
+    duration: Array
     variance_left: Array
-
-    @property
-    def duration(self) -> Array:
-        """Duration of each push (k,), s."""
-        return np.asarray(self.travel / self.inputs[:, 0])
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -60,22 +56,24 @@ def suggest_pushes(
     matter: Pushes | None = None,
     covariates: Mapping[str, float] | None = None,
     seed: int = 0,
+    check_cancelled: Callable[[], None] | None = None,
 ) -> Suggested:
     """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
 
     The cost is in log predictive density: the process noise, which no push reduces, is no part of it. It is the mean
     over the pushes that matter: `matter`, or by default all that the robot can make, evenly. covariates: of all pushes,
-    as an extended model needs them. seed: of the candidates. Raises RequestError that names the field.
+    as an extended model needs them. seed: of the candidates. check_cancelled is called before each push and may raise.
+    Raises RequestError that names the field.
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
     inputs = candidate_pushes(model, limits, CANDIDATES, seed)
     relevant = _matter(model, limits, seed) if matter is None else Push(matter.inputs, matter.duration, {})
-    tried = courses(model, inputs, np.full(len(inputs), limits.travel))
+    tried = courses(model, inputs, limits.travel)
     found = information_of(model, tried, relevant, covariates or {})
     before = found.variance
-    order, variances = greedy(found, count, _seconds(model, inputs, limits))
-    return Suggested(inputs[order], tried.travel[order], variances / before)
+    order, variances = greedy(found, count, _seconds(model, inputs, limits), check_cancelled)
+    return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
 
 
 def information_of(
@@ -92,16 +90,21 @@ def information_of(
 
 
 def greedy(
-    information: Information, count: int, seconds: Callable[[int | None], Array] | None = None
+    information: Information,
+    count: int,
+    seconds: Callable[[int | None], Array] | None = None,
+    check_cancelled: Callable[[], None] | None = None,
 ) -> tuple[IntArray, Array]:
     """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
 
     seconds: time (c,) that each candidate takes after the last chosen one (None at first); the largest reduction per
-    second is chosen. Without it, the largest reduction.
+    second is chosen. Without it, the largest reduction. check_cancelled is called before each choice and may raise.
     """
     order, variances = np.empty(count, dtype=np.int64), np.empty(count)
     last: int | None = None
     for k in range(count):
+        if check_cancelled is not None:
+            check_cancelled()
         gains = information.gains()
         last = int(np.argmax(gains if seconds is None else gains / seconds(last)))
         information.observe(last)

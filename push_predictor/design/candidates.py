@@ -21,13 +21,12 @@ class Courses:
     """Windows of c straight pushes, at most w each.
 
     inputs (c, w, 3) at the start of each window; kept (c, w): whether the push has that window; duration: of a window,
-    s; travel (c,): of a push, m.
+    s.
     """
 
     inputs: Array
     kept: BoolArray
     duration: float
-    travel: Array
 
     @property
     def windows(self) -> Push:
@@ -56,8 +55,8 @@ def candidate_pushes(model: PushModel, limits: Limits, count: int, seed: int = 0
     return np.asarray(found[:count])
 
 
-def courses(model: PushModel, inputs: Array, travel: Array) -> Courses:
-    """The windows of straight pushes that begin with inputs (c, 3) and have a travel (c,) in m.
+def courses(model: PushModel, inputs: Array, travel: float) -> Courses:
+    """The windows of straight pushes of a length in m that begin with inputs (c, 3).
 
     The slider moves as the model's mechanics predict. A push ends where the tip leaves the slider.
     """
@@ -73,7 +72,7 @@ def courses(model: PushModel, inputs: Array, travel: Array) -> Courses:
         # Pushes that have ended go on as they began, so that the mechanics get inputs that they accept.
         contact.touch.inputs[~kept[-1]] = inputs[~kept[-1]]
         at.append(contact.touch.inputs)
-    return Courses(np.stack(at, axis=1), np.stack(kept, axis=1), duration, travel)
+    return Courses(np.stack(at, axis=1), np.stack(kept, axis=1), duration)
 
 
 def _moved(model: PushModel, poses: Array, inputs: Array, heading: Array, duration: float) -> Array:

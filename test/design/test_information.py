@@ -86,3 +86,16 @@ def test_the_time_of_a_push_may_depend_on_the_one_before(parts: tuple[Array, Arr
 
     order, _ = greedy(Information(*parts), 3, seconds)
     assert asked == [None, *order[:2].tolist()]
+
+
+def test_a_long_batch_can_be_cancelled(parts: tuple[Array, Array, Array]) -> None:
+    asked: list[int] = []
+
+    def check_cancelled() -> None:
+        asked.append(len(asked))
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        greedy(Information(*parts), 5, check_cancelled=check_cancelled)
+    assert len(asked) == 3

@@ -63,7 +63,7 @@ class TestCandidates:
         table = push_outcomes(spec)
         model = train_model(empty_table(), simulated_rig(spec), "prior", name="m")
         first = np.array([table.inputs[table.push_id == push][0] for push in ("0", "1", "2")])
-        found = courses(model, first, np.full(3, 0.03))
+        found = courses(model, first, 0.03)
         assert found.kept.sum(axis=1).tolist() == [7, 7, 7]
         for k, push in enumerate(("0", "1", "2")):
             rows = table.inputs[table.push_id == push]
@@ -73,13 +73,13 @@ class TestCandidates:
 
     def test_of_other_speeds_have_other_numbers_of_windows(self, untrained: PushModel) -> None:
         inputs = np.array([[0.02, 0.1, 0.0], [0.05, 0.1, 0.0], [0.2, 0.1, 0.0]])
-        found = courses(untrained, inputs, np.full(3, 0.03))
+        found = courses(untrained, inputs, 0.03)
         assert found.kept.sum(axis=1).tolist() == [7, 3, 1]
         np.testing.assert_array_equal(found.windows.inputs.reshape(3, 7, 3)[2], np.tile(inputs[2], (7, 1)))
         np.testing.assert_allclose(found.distance[1, 0], 0.01 * np.arange(7))
 
     def test_end_where_the_tip_leaves_the_slider(self, untrained: PushModel) -> None:
-        found = courses(untrained, np.array([[0.05, 0.01, 1.35]]), np.array([0.1]))
+        found = courses(untrained, np.array([[0.05, 0.01, 1.35]]), 0.1)
         assert 1 <= found.kept.sum() < 10
         assert not np.any(np.diff(found.kept[0].astype(int)) > 0)
 
@@ -91,7 +91,6 @@ class TestSuggestedPushes:
         assert len(found) == 8 and limits.allows(found.inputs[:, 1]).all()
         assert np.all((found.inputs[:, 0] >= 0.02) & (found.inputs[:, 0] <= 0.06))
         assert np.all((found.inputs[:, 2] >= -0.5) & (found.inputs[:, 2] <= 0.9))
-        np.testing.assert_allclose(found.travel, 0.02)
         np.testing.assert_allclose(found.duration * found.inputs[:, 0], 0.02)
 
     def test_leave_less_and_less_variance(self, untrained: PushModel) -> None:
@@ -113,7 +112,7 @@ class TestSuggestedPushes:
         """The share that is left is that of a model with the same hyperparameters and the suggested windows."""
         rows = learnt.training
         inputs = candidate_pushes(learnt, Limits(travel=0.002), 40)
-        tried = courses(learnt, inputs, np.full(40, 0.002))
+        tried = courses(learnt, inputs, 0.002)
         assert tried.kept.shape[1] == 1
         matter = Push(candidate_pushes(learnt, Limits(), 64, 5), np.full(64, 0.2), {})
         found = information_of(learnt, tried, matter)
@@ -127,7 +126,7 @@ class TestSuggestedPushes:
 
     def test_windows_of_a_push_tell_less_than_as_many_pushes(self, untrained: PushModel) -> None:
         inputs = np.array([[0.02, 0.1, 0.3]])
-        windows = courses(untrained, inputs, np.array([0.016]))
+        windows = courses(untrained, inputs, 0.016)
         matter = Push(candidate_pushes(untrained, Limits(), 64), np.full(64, 0.2), {})
         together = information_of(untrained, windows, matter)
         w = windows.kept.shape[1]
@@ -139,7 +138,7 @@ class TestSuggestedPushes:
 
     def test_the_windows_of_a_learnt_model_correlate_as_its_residuals_do(self) -> None:
         known = train_model(drifting_pushes(60), square_rig(), "gp", name="shared")
-        tried = courses(known, np.array([[0.02, 0.1, 0.3]]), np.array([0.012]))
+        tried = courses(known, np.array([[0.02, 0.1, 0.3]]), 0.012)
         found = information_of(known, tried, Push(tried.inputs[0], np.full(3, 0.2), {}))
         noise = found.noise[0].reshape(3, 3, 3, 3)
         expected = persistence_of(known).correlation(np.array([0.008]))[0]
@@ -148,12 +147,11 @@ class TestSuggestedPushes:
 
     def test_a_window_that_a_push_lacks_tells_nothing(self, learnt: PushModel) -> None:
         inputs = np.array([[0.02, 0.1, 0.3]])
-        windows = courses(learnt, inputs, np.array([0.012]))
+        windows = courses(learnt, inputs, 0.012)
         longer = Courses(
             np.concatenate([windows.inputs, windows.inputs[:, :1]], axis=1),
             np.concatenate([windows.kept, [[False]]], axis=1),
             windows.duration,
-            windows.travel,
         )
         matter = Push(candidate_pushes(learnt, Limits(), 64), np.full(64, 0.2), {})
         gains = [information_of(learnt, one, matter).gains() for one in (windows, longer)]
