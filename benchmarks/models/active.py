@@ -5,7 +5,7 @@
     python -m benchmarks.models.active table FILE
 
 --data: the folder of the measured data: whole pushes of mit_square are chosen from four of five folds, and the fifth is
-predicted. --rigs: simulated ones, each with a pool of 400 pushes and 100 others to predict. `run` appends one line per
+predicted. --rigs: simulated ones, each with a pool of 300 pushes and 100 others to predict. `run` appends one line per
 trained model to FILE; `table` prints the tables of docs/results/suggest.md.
 
 Every way starts with its own first batch and grows to the sizes below; the model is trained again after each batch. The
@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.measured.square import imported_square
-from benchmarks.models.active_table import print_tables
-from push_predictor.design.batch import information_of
+from benchmarks.models.active_table import REFERENCE, print_tables
+from push_predictor.design.batch import FIRST, information_of
 from push_predictor.design.candidates import Courses
 from push_predictor.design.information import Information
 from push_predictor.evaluation.push_scores import push_scores
@@ -42,22 +42,19 @@ from push_predictor.simulation.pushes import random_pushes
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.types import Array, IntArray
 
-SIZES = {"mit_square": (5, 10, 15, 20, 30, 40, 60), "simulated": (5, 10, 20, 35, 50, 75, 100, 200)}
-LARGEST_CHOSEN = {"mit_square": 40, "simulated": 100}  # by other ways than at random
+SIZES = {"mit_square": (5, 10, 15, 20, 30, 40, 60), "simulated": (5, 10, 20, 50, 200)}
+LARGEST_CHOSEN = {"mit_square": 40, "simulated": 50}  # by other ways than the reference
 MODELS: dict[str, tuple[str, MeanChoice]] = {
     "gp": ("gp", "zero"),
     "prior": ("prior", "zero"),
     "gp, mechanics": ("gp", "mechanics"),
 }
-WAYS = {
-    "gp": ("random", "Sobol", "variance", "BAIT", "V-optimal", "suggest"),
-    "prior": ("random", "Sobol", "V-optimal", "suggest"),
-    "gp, mechanics": ("random", "Sobol", "V-optimal", "suggest"),
-}
-WINDOWS = 12  # of a push that a model is trained on
+WAYS = ("random", "Sobol", "suggest", "no start", "variance", "BAIT")
+WITH_MECHANICS = ("random", "Sobol", "suggest")
+WINDOWS = {"mit_square": 12, "simulated": 3}  # of a push that a model is trained on
 LOOKED_AT = {"mit_square": 6, "simulated": 3}  # windows of a push of the pool, and of those that matter, in the design
-MATTER = 256
-POOL, TESTED, SPEEDS = 400, 100, (0.02, 0.05)
+MATTER = 128
+POOL, TESTED, SPEEDS = 300, 100, (0.02, 0.05)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     run.add_argument("--data", type=Path)
     run.add_argument("--rigs", nargs="*", default=[])
     run.add_argument("--models", nargs="+", choices=tuple(MODELS), default=tuple(MODELS))
-    run.add_argument("--ways", nargs="+", default=WAYS["gp"])
+    run.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS)
     run.add_argument("--sizes", nargs="+", type=int, help="numbers of pushes, instead of the usual ones")
     run.add_argument("--draws", type=int, default=2, help="draws of random pushes for each case")
     commands.add_parser("table").add_argument("file", type=Path)
@@ -90,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     for case in _cases(options.data, options.rigs):
         for model in options.models:
-            for way in (way for way in WAYS[model] if way in options.ways):
+            for way in (way for way in options.ways if model == "gp" or way in WITH_MECHANICS):
                 for draw in range(options.draws if way == "random" else 1):
                     _grow(case, model, way, draw, options.sizes or SIZES[case.kind], options.out)
 
@@ -101,7 +98,7 @@ def _cases(data: Path | None, rigs: Sequence[str]) -> Iterator[Case]:
             square = imported_square(data, Path(work))
         fold, table = push_folds(square.table), square.table
         for k in range(FOLDS):
-            pool = thinned(table.take(fold != k), WINDOWS)
+            pool = thinned(table.take(fold != k), WINDOWS["mit_square"])
             yield Case("mit_square", f"fold {k}", pool, table.take(fold == k), square.rig)
     for rig in rigs:
         shape, surface, seed = rig.split(":")
@@ -113,7 +110,8 @@ def _simulated(shape: str, surface: str, seed: int) -> Case:
     spec = SimulationSpec(shape, surface, plan, seed=seed, surface_seed=seed, slider_seed=seed)
     table = push_outcomes(spec)
     tested = table.push_id.astype(np.int64) >= POOL
-    return Case("simulated", f"{shape}:{surface}:{seed}", table.take(~tested), table.take(tested), simulated_rig(spec))
+    pool = thinned(table.take(~tested), WINDOWS["simulated"])
+    return Case("simulated", f"{shape}:{surface}:{seed}", pool, table.take(tested), simulated_rig(spec))
 
 
 def thinned(table: PushTable, most: int) -> PushTable:
@@ -127,7 +125,7 @@ def _grow(case: Case, model: str, way: str, draw: int, sizes: Sequence[int], out
     rng = np.random.default_rng([draw, *case.name.encode()])
     names, taken = np.array(case.pool.pushes), np.zeros(0, dtype=np.int64)
     trained: PushModel | None = None
-    most = len(names) if way == "random" else LARGEST_CHOSEN[case.kind]
+    most = len(names) if (model, way) == REFERENCE else LARGEST_CHOSEN[case.kind]
     for n in (n for n in sizes if n <= most):
         taken = np.append(taken, _chosen(case, model, way, trained, taken, n - len(taken), rng))
         rows = case.pool.take(np.isin(case.pool.push_id, names[taken]))
@@ -177,10 +175,6 @@ def _independent(found: Information) -> Information:
     return MeanVariance(found.features, _unit(found), found.matter)
 
 
-def _v_optimal(found: Information) -> Information:
-    return MeanVariance(found.features, found.noise, found.matter)
-
-
 def _most_variable(found: Information) -> Information:
     return MaximumVariance(found.features, _unit(found), found.matter)
 
@@ -192,8 +186,8 @@ def _unit(found: Information) -> Array:
 
 DESIGNS: dict[str, Callable[[Information], Information]] = {
     "suggest": lambda found: found,
+    "no start": lambda found: found,
     "BAIT": _independent,
-    "V-optimal": _v_optimal,
     "variance": _most_variable,
 }
 
@@ -207,9 +201,13 @@ def _chosen(
     count: int,
     rng: np.random.Generator,
 ) -> IntArray:
-    """Indices (count,) of further pushes of the pool. Without a model the first are random, or by a prior model."""
+    """Indices (count,) of further pushes of the pool.
+
+    The first pushes of a model without mechanics are random, or of `suggest` FIRST ones of the Sobol' sequence. With
+    mechanics, a prior model chooses them.
+    """
     left = np.setdiff1d(np.arange(len(case.pool.pushes)), taken)
-    if way == "Sobol":
+    if way == "Sobol" or (way == "suggest" and model == "gp" and len(taken) < FIRST):
         return _nearest_to_sobol(case, left, len(taken), count)
     if trained is None and model != "gp":
         trained = train_model(empty_table(), case.rig, "prior", name="prior")

@@ -1,12 +1,13 @@
 """The batch of pushes that a model learns most from.
 
 Greedy selection: each push is the one that most reduces what is left of the expected loss when the pushes before it are
-known.
+known. A learnt model without mechanics begins with pushes that are spread evenly: from fewer pushes, its
+hyperparameters are not known well enough to choose by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.parameter_update import CORRELATION
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import PriorPredictor
+from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_requests
@@ -28,6 +29,7 @@ from push_predictor.types import Array, IntArray
 
 CANDIDATES, MATTER = 256, 128  # pushes
 MOST_PUSHES = 1000
+FIRST = 10  # pushes that are spread evenly; docs/results/suggest.md compares this start with others
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +63,10 @@ def suggest_pushes(
     """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
 
     The cost is in log predictive density: the process noise, which no push reduces, is no part of it. It is the mean
-    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. covariates: of all pushes,
-    as an extended model needs them. seed: of the candidates. check_cancelled is called before each push and may raise.
-    Raises RequestError that names the field.
+    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. Then the pushes up to the
+    tenth of a learnt model without mechanics, those that it was trained on included, are spread evenly. covariates: of
+    all pushes, as an extended model needs them. seed: of the candidates. check_cancelled is called before each push and
+    may raise. Raises RequestError that names the field.
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
@@ -72,7 +75,8 @@ def suggest_pushes(
     tried = courses(model, inputs, limits.travel)
     found = information_of(model, tried, relevant, covariates or {})
     before = found.variance
-    order, variances = greedy(found, count, _seconds(model, inputs, limits), check_cancelled)
+    evenly = _spread_evenly(model, count) if matter is None else []
+    order, variances = greedy(found, count, evenly, _seconds(model, inputs, limits), check_cancelled)
     return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
 
 
@@ -92,24 +96,38 @@ def information_of(
 def greedy(
     information: Information,
     count: int,
+    first: Sequence[int] = (),
     seconds: Callable[[int | None], Array] | None = None,
     check_cancelled: Callable[[], None] | None = None,
 ) -> tuple[IntArray, Array]:
     """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
 
-    seconds: time (c,) that each candidate takes after the last chosen one (None at first); the largest reduction per
-    second is chosen. Without it, the largest reduction. check_cancelled is called before each choice and may raise.
+    first: candidates to begin with. seconds: time (c,) that each candidate takes after the last chosen one (None at
+    first); the largest reduction per second is chosen. Without it, the largest reduction. check_cancelled is called
+    before each choice and may raise.
     """
     order, variances = np.empty(count, dtype=np.int64), np.empty(count)
     last: int | None = None
     for k in range(count):
         if check_cancelled is not None:
             check_cancelled()
-        gains = information.gains()
-        last = int(np.argmax(gains if seconds is None else gains / seconds(last)))
+        last = first[k] if k < len(first) else _best(information.gains(), None if seconds is None else seconds(last))
         information.observe(last)
         order[k], variances[k] = last, information.variance
     return order, variances
+
+
+def _spread_evenly(model: PushModel, count: int) -> list[int]:
+    """Indices of candidates, at most `count`, which follow a Sobol' sequence: its points of the pushes up to FIRST."""
+    base = model.predictor.base
+    if not isinstance(base, GaussianProcessPredictor) or base.mean is not None:
+        return []
+    known = len(model.training.pushes)
+    return list(range(known, min(known + count, FIRST)))
+
+
+def _best(gains: Array, seconds: Array | None) -> int:
+    return int(np.argmax(gains if seconds is None else gains / seconds))
 
 
 def _matter(model: PushModel, limits: Limits, seed: int) -> Push:

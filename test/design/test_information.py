@@ -74,7 +74,7 @@ def test_the_greedy_batch_may_count_gain_per_second(parts: tuple[Array, Array, A
     best = int(np.argmax(gains))
     slow[best] = 1.01 * gains[best] / np.sort(gains)[-2]
     assert greedy(Information(*parts), 1)[0][0] == best
-    assert greedy(Information(*parts), 1, lambda last: slow)[0][0] == np.argsort(gains)[-2]
+    assert greedy(Information(*parts), 1, seconds=lambda last: slow)[0][0] == np.argsort(gains)[-2]
 
 
 def test_the_time_of_a_push_may_depend_on_the_one_before(parts: tuple[Array, Array, Array]) -> None:
@@ -84,8 +84,15 @@ def test_the_time_of_a_push_may_depend_on_the_one_before(parts: tuple[Array, Arr
         asked.append(last)
         return np.ones(C)
 
-    order, _ = greedy(Information(*parts), 3, seconds)
+    order, _ = greedy(Information(*parts), 3, seconds=seconds)
     assert asked == [None, *order[:2].tolist()]
+
+
+def test_the_batch_begins_with_given_candidates_and_counts_their_outcomes(parts: tuple[Array, Array, Array]) -> None:
+    order, left = greedy(Information(*parts), 3, [4, 1])
+    assert order[:2].tolist() == [4, 1]
+    assert order[2] == min(range(C), key=lambda other: loss(parts, [4, 1, other]))
+    assert left[1] == pytest.approx(np.mean(variances(parts, [4, 1])))
 
 
 def test_a_long_batch_can_be_cancelled(parts: tuple[Array, Array, Array]) -> None:
