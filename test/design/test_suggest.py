@@ -122,6 +122,7 @@ class TestSuggestedPushes:
         known = train_model(one_side(noisy_pushes(200)), square_rig(), "gp", name="one side")
         found = suggest_pushes(known, 5, Limits(angle=(-1.0, 1.0)))
         assert np.mean(found.inputs[:, 2] < 0.0) >= 0.8
+        assert 0.0 < found.variance_left[-1] < found.variance_left[0] < 1.0
 
     def test_are_where_it_matters(self, learnt: PushModel) -> None:
         rng = np.random.default_rng(0)
