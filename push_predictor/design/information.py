@@ -34,11 +34,6 @@ class Information:
         return float(np.mean(self._variance))
 
     @property
-    def loss(self) -> float:
-        """Mean loss of log predictive density, nats per output."""
-        return float(0.5 * np.mean(np.log1p(self._variance)))
-
-    @property
     def covariance(self) -> Array:
         """Covariance (c, k, k) of the mean functions of each candidate's outcomes."""
         q = self.features.shape[2]
