@@ -26,8 +26,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from examples.marker_canvas import draw_array
 from examples.processes import LOGS, node
 from push_predictor.geometry.outline import Outline
+from push_predictor.models.predictors.tails import joint_radius
 from push_predictor.nodes.qos import LATCHED
-from push_predictor.nodes.validator.window_markers import LIMIT
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.reporting.canvas import draw
 from push_predictor_interfaces.msg import PushResidual
@@ -44,6 +44,8 @@ COLUMNS, WIDTH = 3, 9.0  # inches
 CAPTION, FOOT = 0.25, 0.42  # inches
 BACKGROUND = "#303030"  # RViz's default
 
+FAR = joint_radius(None, 0.95)  # standard deviations
+
 Kind = Callable[[PushResidual, float], bool]  # (window, place along its edge: 0 to 1)
 KINDS: tuple[tuple[str, Kind], ...] = (
     ("centre of a side", lambda w, at: abs(at - 0.5) < 0.1 and abs(w.angle) < 0.2),
@@ -51,7 +53,7 @@ KINDS: tuple[tuple[str, Kind], ...] = (
     ("near a corner", lambda w, at: abs(at - 0.5) > 0.42),
     ("oblique: the pusher slides", lambda w, at: abs(w.angle) > 1.0),
     ("50 mm/s", lambda w, at: w.velocity > 0.04),
-    ("outside the 95 % ellipse", lambda w, at: size_of(w) > LIMIT),
+    ("outside the 95 % ellipse", lambda w, at: size_of(w) > FAR),
 )
 
 

@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sizes", nargs="+", type=int, default=SIZES)
     parser.add_argument("--models", nargs="+", default=MODELS, metavar="KIND:MEAN")
     options = parser.parse_args(arguments)
-    for name, cases in (*_measured(options.data), *_simulated(options.bags)):
+    for name, cases in (*measured_cases(options.data), *simulated_cases(options.bags)):
         print(f"\n{name}\n\n{HEAD}\n{8 * '|---'}|")
         for n in options.sizes:
             if all(n <= len(case.training) for case in cases):
@@ -120,14 +120,16 @@ def _differences(first: PushScores, second: PushScores) -> str:
     return f"{nmse.text('+.3f')} | {nlpd.value:+.2f} | {exact.text('+.2f')}"
 
 
-def _measured(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
+def measured_cases(data: Path | None) -> Iterator[tuple[str, list[Case]]]:
+    """The measured square in five folds of pushes, by name; nothing without the data."""
     if data is not None:
         with tempfile.TemporaryDirectory() as work:
             square = imported_square(data, Path(work))
         yield "mit_square, by push", _folds(square.table, square.rig)
 
 
-def _simulated(bags: Path | None) -> Iterator[tuple[str, list[Case]]]:
+def simulated_cases(bags: Path | None) -> Iterator[tuple[str, list[Case]]]:
+    """The recordings of `bags/`, by name of what is tested on; nothing without them."""
     if bags is None:
         return
     training, rig = _loaded(bags / "square_abs_train")

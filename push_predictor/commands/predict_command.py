@@ -11,6 +11,8 @@ INSIDE = "The push lies within the training data."
 INSIDE_PRIORS = "The push lies within the speeds and angles for which the priors are meant."
 OUTSIDE_PRIORS = "The push lies outside the speeds and angles for which the priors are meant."
 OUTSIDE = "The push lies outside the training data: the prediction is an extrapolation."
+LEVEL = 0.95
+INTERVAL_KINDS = ("student", "conformal")  # those of models/predictors/tails.py, which imports scipy
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -18,8 +20,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "predict",
-        "Predict the outcome of one push. Prints mean and standard deviation of dx, dy and dtheta; --json gives the "
-        "covariance in m and rad.",
+        "Predict the outcome of one push. Prints mean, standard deviation and 95 % interval of dx, dy and dtheta; "
+        "--json gives the covariance in m and rad.",
         "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
@@ -36,6 +38,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="duration in s (default %(default)s)")
     add_covariate(parser)
+    parser.add_argument(
+        "--interval",
+        choices=INTERVAL_KINDS,
+        default="student",
+        help="student: from the predicted distribution; conformal: from the errors on held-out training pushes, "
+        "whatever their distribution (default %(default)s)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -51,12 +60,14 @@ def run(options: argparse.Namespace) -> None:
     check_request(model, push)
     prediction = model.predict_rows(*push.arrays)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
+    low, high = (end[0] for end in prediction.interval(LEVEL, options.interval))
     result = {
         "model": model.name,
         "mean": mean.tolist(),
         "covariance": covariance.ravel().tolist(),
         "process_covariance": prediction.process_covariance[0].ravel().tolist(),
         "in_domain": bool(prediction.in_domain[0]),
+        "interval": {"level": LEVEL, "kind": options.interval, "low": low.tolist(), "high": high.tolist()},
     }
     if write_json(options, result):
         return
@@ -64,7 +75,8 @@ def run(options: argparse.Namespace) -> None:
     for k, (name, unit, scale) in enumerate((("dx", "mm", 1e3), ("dy", "mm", 1e3), ("dtheta", "deg", np.degrees(1.0)))):
         print(
             f"{name:7s}{mean[k] * scale:9.3f} {unit:3s}  sd {sd[k] * scale:.3f} {unit}  "
-            f"(process noise {noise[k] * scale:.3f} {unit})"
+            f"(process noise {noise[k] * scale:.3f} {unit})  "
+            f"95 % interval {low[k] * scale:.3f} to {high[k] * scale:.3f} {unit}"
         )
     inside, outside = (INSIDE_PRIORS, OUTSIDE_PRIORS) if model.kind == "prior" else (INSIDE, OUTSIDE)
     print(inside if result["in_domain"] else outside)

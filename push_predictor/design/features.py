@@ -74,7 +74,7 @@ def _of_functions(base: GaussianProcessPredictor, push: Push, noise_sd: Array) -
     """Features (n, 3, q) of what the regressions learn; each has weights of its own."""
     at = base.scaling.features(base.rig.outline, push.inputs)
     size = np.ones(len(at)) if base.mean is None else base.mean.size(push)
-    unit = size[:, None] * base.scaling.outcome_sd / noise_sd
+    unit = size[:, None] * base.reported_sd / noise_sd
     roots = [
         _root(unit[:, k, None] * regression.function_covariance(at) * unit[:, k])
         for k, regression in enumerate(base.regressions)

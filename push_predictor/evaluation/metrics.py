@@ -6,7 +6,6 @@ NLPD is the negative log predictive density in SI units (m, m, rad); totals are 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
 
 from push_predictor.types import Array
 
@@ -38,7 +37,6 @@ def standardised(mean: Array, covariance: Array, outcomes: Array) -> Array:
     return np.asarray(np.linalg.solve(lower, (outcomes - mean)[..., None])[..., 0])
 
 
-def coverage(mean: Array, variance: Array, outcomes: Array, level: float) -> Array:
-    """Share (k,) of outcomes inside the central Gaussian interval of that level."""
-    half = ndtri(0.5 + level / 2.0) * np.sqrt(variance)
-    return np.asarray(np.mean(np.abs(outcomes - mean) <= half, axis=0))
+def coverage(mean: Array, variance: Array, outcomes: Array, half_width: Array) -> Array:
+    """Share (k,) of outcomes inside central intervals of half_width (k,), in predicted standard deviations."""
+    return np.asarray(np.mean(np.abs(outcomes - mean) <= half_width * np.sqrt(variance), axis=0))

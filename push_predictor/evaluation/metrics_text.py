@@ -8,7 +8,7 @@ from typing import Any
 LEGEND = (
     "NMSE: 0 is perfect, 1 is no better than the training mean. The total is their sum, so 3 for the training mean.",
     "NLPD: nats per window in SI units, lower is better.",
-    "exact NLPD: of the exact predictive density of a VHGP; NLPD is of the Gaussian with the same moments.",
+    "exact NLPD: of the model's own predictive density; NLPD is of the Gaussian with the same moments.",
     "in 90 %: share of outcomes inside the predicted 90 % interval.",
 )
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd
 from push_predictor.evaluation.splits import push_bootstrap
@@ -63,8 +62,7 @@ def push_scores(comparison: Comparison) -> PushScores:
     pushes, push = np.unique(c.push_id, return_inverse=True)
     nlpd = gaussian_nlpd(c.mean, c.variance, c.observed)
     exact = nlpd if c.exact_log_density is None else -c.exact_log_density
-    away = np.abs(c.observed - c.mean) / np.sqrt(c.variance)
-    covered = away[..., None] <= ndtri(0.5 + 0.5 * np.asarray(COVERAGE_LEVELS))
+    covered = c.covered(COVERAGE_LEVELS)
     columns = ((c.observed - c.mean) ** 2, (c.observed - c.training_mean) ** 2, nlpd, exact, covered.astype(np.float64))
     return PushScores(pushes, np.bincount(push).astype(np.float64), *(by_push(push, column) for column in columns))
 

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
 
-from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd, joint_nlpd, nmse
+from push_predictor.evaluation.metrics import (
+    COVERAGE_LEVELS,
+    coverage,
+    gaussian_nlpd,
+    joint_nlpd,
+    nmse,
+    standardised,
+)
 from push_predictor.evaluation.splits import push_bootstrap
+from push_predictor.models.predictors.tails import IntervalKind, Tails, half_widths, joint_radius
 from push_predictor.models.push_model import PushModel
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.recordings.windows.push_window import TIMED_ID
-from push_predictor.types import Array
+from push_predictor.types import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +29,8 @@ class Comparison:
     """Predictions and observations of n windows.
 
     mean, observed (n, 3); covariance (n, 3, 3); exact_log_density (n, 3), None where the predictive is Gaussian;
-    push_id (n,); training_mean (3,), the reference of the NMSE.
+    push_id (n,); training_mean (3,), the reference of the NMSE; tails: of the predictive distribution, None for a
+    Gaussian.
     """
 
     model: str
@@ -31,11 +41,27 @@ class Comparison:
     observed: Array
     exact_log_density: Array | None
     training_mean: Array
+    tails: Tails | None = None
 
     @property
     def variance(self) -> Array:
         """Predicted variances (n, 3)."""
         return np.asarray(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def residuals(self) -> Array:
+        """Residuals (n, 3) in predicted standard deviations."""
+        return np.asarray((self.observed - self.mean) / np.sqrt(self.variance))
+
+    def covered(self, levels: Sequence[float] | Array, kind: IntervalKind = "student") -> BoolArray:
+        """Whether each outcome lies in its central interval, (n, 3, levels)."""
+        half = np.stack([half_widths(self.tails, float(level), kind) for level in levels], axis=-1)
+        return np.asarray(np.abs(self.residuals)[..., None] <= half)
+
+    def joint_covered(self, levels: Sequence[float]) -> BoolArray:
+        """Whether each outcome lies in the joint region of the three outputs, (n, levels)."""
+        away = np.linalg.norm(standardised(self.mean, self.covariance, self.observed), axis=1)
+        return np.asarray(away[:, None] <= [joint_radius(self.tails, level) for level in levels])
 
 
 def compare(model: PushModel, table: PushTable) -> Comparison:
@@ -61,6 +87,7 @@ def comparison_of_moments(model: PushModel, table: PushTable, mean: Array, covar
         table.outcomes,
         None,
         model.training_mean,
+        model.predictor.tails,
     )
 
 
@@ -83,13 +110,15 @@ def metrics_json(comparison: Comparison) -> dict[str, object]:
         "exact_nlpd": exact,
         "joint_nlpd": _number(np.mean(joint_nlpd(c.mean, c.covariance, c.observed))) if count else None,
         "coverage": {str(level): _coverage(c, level) if count else None for level in COVERAGE_LEVELS},
+        "joint_coverage": _joint_coverage(c),
         "interval": _intervals(c, nlpd),
     }
 
 
 def pit(comparison: Comparison) -> Array:
     """Probability integral transform (n, 3): the predicted probability of an outcome below the observed one."""
-    return np.asarray(ndtr((comparison.observed - comparison.mean) / np.sqrt(comparison.variance)))
+    tails, residuals = comparison.tails, comparison.residuals
+    return np.asarray(ndtr(residuals)) if tails is None else tails.probability(residuals)
 
 
 def trained_on(model: PushModel, table: PushTable) -> list[str]:
@@ -134,8 +163,16 @@ def _interval(draws: Array) -> dict[str, float | None]:
 
 
 def _coverage(c: Comparison, level: float) -> dict[str, float | None]:
-    shares = coverage(c.mean, c.variance, c.observed, level)
+    shares = coverage(c.mean, c.variance, c.observed, half_widths(c.tails, level))
     return {name: _number(share) for name, share in zip(OUTPUTS, shares, strict=True)}
+
+
+def _joint_coverage(c: Comparison) -> dict[str, float | None]:
+    inside = c.joint_covered(COVERAGE_LEVELS)
+    return {
+        str(level): _number(np.mean(column)) if len(column) else None
+        for level, column in zip(COVERAGE_LEVELS, inside.T, strict=True)
+    }
 
 
 def _named(values: Array) -> dict[str, float | None]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from push_predictor.models.predictors.tails import IntervalKind, Tails, half_widths
 from push_predictor.types import Array, BoolArray
 
 ROWS_SHOWN = 10
@@ -17,13 +18,14 @@ class Prediction:
 
     mean (n, 3); covariance (n, 3, 3) of an observed outcome; process_covariance (n, 3, 3), the noise alone;
     in_domain (n,), whether the push, with the covariates that the model needs, lies inside the domain of the training
-    data.
+    data; tails: the distribution in units of `std`, None for a Gaussian.
     """
 
     mean: Array
     covariance: Array
     process_covariance: Array
     in_domain: BoolArray
+    tails: Tails | None = None
 
     def __len__(self) -> int:
         return len(self.mean)
@@ -32,6 +34,16 @@ class Prediction:
     def std(self) -> Array:
         """Standard deviations (n, 3) of an observed outcome: m, m, rad."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)))
+
+    def interval(self, level: float = 0.95, kind: IntervalKind = "student") -> tuple[Array, Array]:
+        """Low and high ends (n, 3) of the central intervals that contain a new outcome with this probability.
+
+        kind: student, by the predicted distribution; conformal, by the quantiles of the residuals of held-out training
+        pushes. Raises RequestError for a level outside (0, 1) or too near 1 for the number of training pushes, and for
+        conformal intervals of a model that has none.
+        """
+        half = half_widths(self.tails, level, kind) * self.std
+        return self.mean - half, self.mean + half
 
     def __repr__(self) -> str:
         head = f"Prediction of {len(self)} pushes, mean ± standard deviation"

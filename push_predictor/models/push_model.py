@@ -91,7 +91,8 @@ class PushModel:
         covariates that the model needs is missing; others are ignored.
         """
         push = Push(inputs, duration, covariates or {})
-        return Prediction(*self.predictor.moments(push), self.in_domain(inputs) & self.covariates_seen(push))
+        inside = self.in_domain(inputs) & self.covariates_seen(push)
+        return Prediction(*self.predictor.moments(push), inside, self.predictor.tails)
 
     @property
     def needs(self) -> tuple[str, ...]:

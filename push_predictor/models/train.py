@@ -52,7 +52,8 @@ class TrainingOptions:
     inducing: number of inducing inputs of a VHGP. None trains a dense VHGP on up to MOST_DENSE_ROWS rows, and beyond
     that a sparse one with DEFAULT_INDUCING. mean: of a learnt model: fitted mechanics, about which the residual is
     learnt, zero, or auto for the better of both by held-out pushes (what the command and the front door take). about:
-    mechanics to learn about, as they are; mean is then not used.
+    mechanics to learn about, as they are; mean is then not used. tails: of a learnt model: whether to fit the
+    distribution of new pushes (predictors/tails.py); without it, windows of a push are taken for independent.
     """
 
     n_train: int | None = None
@@ -63,6 +64,7 @@ class TrainingOptions:
     mean: MeanChoice = "zero"
     about: MechanicsMean | None = None
     supports: Mapping[int, Array] = field(default_factory=dict)
+    tails: bool = True
 
     def __post_init__(self) -> None:
         for name, value in (("n_train", self.n_train), ("inducing", self.inducing)):
@@ -124,7 +126,7 @@ def _predictor(
         watch("train prior", 0.1)
         return sharpened(prior_predictor(_mechanics(rig, options), rig, options.seed), rows, options.seed), []
     if kind != "analytical":
-        learnt = LearntOptions(kind, options.kernels, inducing, options.mean)
+        learnt = LearntOptions(kind, options.kernels, inducing, options.mean, options.tails)
         if options.about is not None:
             return train_about(options.about, rows, rig, learnt), []
         return train_learnt(rows, _spread(rows, MOST_MEAN_ROWS, options.seed), rig, learnt, watch), []
@@ -155,7 +157,8 @@ def retrain_model(model: PushModel, table: PushTable) -> PushModel:
     """
     name, sources, seed = model.name, model.provenance.sources, model.provenance.seed
     if isinstance(predictor := model.predictor, GaussianProcessPredictor):
-        options = TrainingOptions(seed=seed, kernels=predictor.kernels, about=predictor.mean)
+        tails = predictor.tails is not None
+        options = TrainingOptions(seed=seed, kernels=predictor.kernels, about=predictor.mean, tails=tails)
         return train_model(table, model.rig, model.kind, name=name, sources=sources, options=options)
     provenance = Provenance(sources, len(table.pushes), seed, __version__)
     again: Predictor

@@ -24,6 +24,7 @@ from push_predictor.models.mechanics.pressure import supported_at
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors import GaussianProcessPredictor, MechanicsMean, Scaling
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
+from push_predictor.models.predictors.tails_fit import fit_tails
 from push_predictor.models.train_mechanics import fit_rows
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
@@ -42,12 +43,16 @@ EXACT = 1e-6  # of the outcomes' standard deviation: a residual is not scaled by
 
 @dataclass(frozen=True)
 class LearntOptions:
-    """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about."""
+    """kind: vhgp or gp. inducing: number of inducing inputs, None for a dense model. mean: what it is learnt about.
+
+    tails: whether to fit the distribution of new pushes.
+    """
 
     kind: str
     kernels: KernelChoice = DEFAULT_CHOICE
     inducing: int | None = None
     mean: MeanChoice = "zero"
+    tails: bool = True
 
 
 def train_learnt(
@@ -66,20 +71,18 @@ def train_learnt(
     if options.mean == "auto":
         better = _better(about, of_mean, rig, options, watch)
         if len(of_mean) == len(rows):
-            return _correlated(better, rows, options, watch)
-        about = None if better.mean is None else about
+            return _completed(better, rows, options, watch)
+        about = None if better.predictor.mean is None else about
     begin = 0.4 if options.mean == "auto" else 0.1
     trained = _trained(rows, rig, options, about, _part_of(watch, begin, 0.9))
-    return _correlated(trained.predictor, rows, options, watch)
+    return _completed(trained, rows, options, watch)
 
 
-def _better(
-    about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch
-) -> GaussianProcessPredictor:
+def _better(about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch) -> _Trained:
     """The predictor with or without the mean, trained on the rows that it was fitted to: by their held-out pushes."""
     plain = _trained(rows, rig, options, None, _part_of(watch, 0.1, 0.25), scored=True)
     informed = _trained(rows, rig, options, about, _part_of(watch, 0.25, 0.4), scored=True)
-    return max(plain, informed, key=lambda trained: trained.score).predictor
+    return max(plain, informed, key=lambda trained: trained.score)
 
 
 def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntOptions) -> GaussianProcessPredictor:
@@ -87,14 +90,21 @@ def train_about(mean: MechanicsMean, rows: PushTable, rig: Rig, options: LearntO
     _check_rows(rows, rig)
     push = Push(rows.inputs, rows.duration, rows.covariates)
     about = FittedMean(mean, mean.residuals(push, rows.outcomes))
-    return _correlated(_trained(rows, rig, options, about, no_watch).predictor, rows, options, no_watch)
+    return _completed(_trained(rows, rig, options, about, no_watch), rows, options, no_watch)
 
 
-def _correlated(
-    predictor: GaussianProcessPredictor, rows: PushTable, options: LearntOptions, watch: Watch
-) -> GaussianProcessPredictor:
+def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch: Watch) -> GaussianProcessPredictor:
+    """The predictor with what only held-out pushes show: the correlation of the outputs, and the tails."""
     watch(f"train {options.kind}: correlation of the outputs", 0.9)
-    return replace(predictor, correlation=fit_correlation(predictor, rows.push_id))
+    predictor = replace(trained.predictor, correlation=fit_correlation(trained.predictor, rows.push_id))
+    if not options.tails:
+        return predictor
+    watch(f"train {options.kind}: tails", 0.95)
+    push = Push(rows.inputs, rows.duration, rows.covariates)
+    residual = predictor.without_mean().held_out_moments(push, _blocks(rows))
+    counts = [regression.parameters.count for regression in predictor.regressions]
+    tails = fit_tails(trained.observed - residual.mean, residual.covariance, rows.push_id, counts)
+    return replace(predictor, tails=tails)
 
 
 def _part_of(watch: Watch, begin: float, end: float) -> Watch:
@@ -133,9 +143,14 @@ def _mean_travel(rows: PushTable) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Trained:
-    """A predictor and, where asked for, the log density of held-out training pushes (SI) less the hyperparameters."""
+    """A predictor, what held-out training pushes showed it to learn, and how well it predicts these pushes.
+
+    observed (n, 3): outcomes, or residuals about the mean as it is without the push, SI. score, where asked for: log
+    density of held-out training pushes (SI) less the hyperparameters.
+    """
 
     predictor: GaussianProcessPredictor
+    observed: Array
     score: float
 
 
@@ -159,7 +174,7 @@ def _trained(
         if scored:
             score += held_out_score(regression, block, seen) - len(rows) * float(np.log(scaling.outcome_sd[k]))
         regressions.append(regression)
-    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), score)
+    return _Trained(GaussianProcessPredictor(rig, scaling, tuple(regressions), mean=mean), observed, score)
 
 
 def _blocks(rows: PushTable) -> IntArray:

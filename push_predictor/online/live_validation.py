@@ -36,7 +36,7 @@ class LiveValidation:
     def __init__(self, models: Mapping[str, PushModel]) -> None:
         self.names, self.models = tuple(models), tuple(models.values())
         self.windows = WindowRows()
-        self.scores = tuple(RunningScore(model.training_mean) for model in self.models)
+        self.scores = tuple(RunningScore(model.training_mean, model.predictor.tails) for model in self.models)
         self._answers = tuple(_Answers() for _ in self.models)
         self._refused = tuple(RowFile() for _ in self.models)
 

@@ -9,16 +9,21 @@ from hashlib import blake2b
 import numpy as np
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, coverage, gaussian_nlpd
+from push_predictor.models.predictors.tails import Tails, half_widths
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.types import Array
 
 
 class RunningScore:
-    """Running sums over the windows of one model. training_mean (3,): the reference of the NMSE."""
+    """Running sums over the windows of one model.
 
-    def __init__(self, training_mean: Array) -> None:
+    training_mean (3,): the reference of the NMSE. tails: of the model's predictive distribution.
+    """
+
+    def __init__(self, training_mean: Array, tails: Tails | None = None) -> None:
         self.windows = 0
         self._training_mean = training_mean
+        self._half_widths = [half_widths(tails, level) for level in COVERAGE_LEVELS]
         self._pushes = array("q")  # digests of their names, in order: a set would take ten times as much
         self._error, self._spread, self._nlpd = np.zeros(3), np.zeros(3), np.zeros(3)
         self._covered = np.zeros((len(COVERAGE_LEVELS), 3))
@@ -36,7 +41,7 @@ class RunningScore:
         self._error += (observed - mean) ** 2
         self._spread += (observed - self._training_mean) ** 2
         self._nlpd += gaussian_nlpd(predicted, variance, outcome)[0]
-        self._covered += [coverage(predicted, variance, outcome, level) for level in COVERAGE_LEVELS]
+        self._covered += [coverage(predicted, variance, outcome, half) for half in self._half_widths]
 
     def _count_push(self, push_id: str) -> None:
         digest = int.from_bytes(blake2b(push_id.encode(), digest_size=8).digest(), "little", signed=True)

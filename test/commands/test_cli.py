@@ -230,11 +230,24 @@ def test_predict_equals_the_model(place: Place, run):
     assert np.all(np.abs(np.array(found["mean"]) - expected.mean[0]) < 1e-3 * sd)
     assert np.reshape(found["covariance"], (3, 3)) == pytest.approx(expected.covariance[0], rel=1e-2, abs=1e-12)
     assert len(found["process_covariance"]) == 9
+    low, high = expected.interval(0.95)
+    assert found["interval"]["level"] == 0.95 and found["interval"]["kind"] == "student"
+    assert found["interval"]["low"] == pytest.approx(low[0].tolist(), rel=1e-2)
+    assert found["interval"]["high"] == pytest.approx(high[0].tolist(), rel=1e-2)
+
+
+@pytest.mark.parametrize(("name", "words"), [("gp", ("0.95", "6 training pushes")), ("analytical", ("student",))])
+def test_predict_refuses_conformal_intervals_that_the_training_pushes_do_not_give(
+    name: str, words: Sequence[str], place: Place, run
+):
+    outcome = run("predict", place.path(f"{name}.pushmodel"), *PUSH, "--interval", "conformal")
+    assert_one_line(outcome, "predict", words)
 
 
 def test_predict_prints_a_line_for_each_output(place: Place, run):
     lines = run("predict", place.path("gp.pushmodel"), *PUSH, "--covariate", "dwell_time=3").out.splitlines()
     assert [line.split()[0] for line in lines[:3]] == OUTPUTS
+    assert all(re.search(r"95 % interval -?[\d.]+ to -?[\d.]+ (mm|deg)$", line) for line in lines[:3])
     assert "training data" in lines[3]
 
 
@@ -270,7 +283,7 @@ def test_evaluate_and_validate_equal_the_library(kind: str, place: Place, run):
     for metrics in (evaluated.json, online):
         assert_metrics_format(metrics)
         assert (metrics["n_pushes"], metrics["n_train"]) == (4, len(loaded.training))
-    assert (validated.json["exact_nlpd"] is None) is (kind != "vhgp")
+    assert (validated.json["exact_nlpd"] is None) is (kind == "analytical")
 
 
 def test_table_gives_the_scores_of_its_recording(place: Place, run):

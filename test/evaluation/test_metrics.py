@@ -69,7 +69,8 @@ def test_standardised_residuals_of_a_correct_model_have_unit_covariance() -> Non
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
 def test_coverage_of_a_correct_model_equals_the_level(level: float) -> None:
     outcomes = np.random.default_rng(2).standard_normal((20_000, 2))
-    shares = coverage(np.zeros_like(outcomes), np.ones_like(outcomes), outcomes, level)
+    half = np.full(2, norm.ppf(0.5 + level / 2.0))
+    shares = coverage(np.zeros_like(outcomes), np.ones_like(outcomes), outcomes, half)
     assert shares == pytest.approx(np.full(2, level), abs=0.012)
 
 

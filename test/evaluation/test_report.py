@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import kstest
+from scipy.stats import f, kstest, multivariate_t
 
 from push_predictor.errors import PushPredictorError, TableError
-from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve
+from push_predictor.evaluation.metrics import standardised
+from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts
 from push_predictor.evaluation.report.figures.ellipses import ellipse, inside
 from push_predictor.evaluation.report.figures.nearby import examples, spread_rows
 from push_predictor.evaluation.report.figures.push_maps import colour_scale
@@ -41,6 +42,7 @@ from push_predictor.evaluation.report.tables import paired_difference
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json, pit
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.shapes import SHAPES, shape_outline
+from push_predictor.models.predictors.tails import STEPS, Tails
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.rig import Rig
@@ -304,11 +306,21 @@ def test_colour_scale_is_symmetric_for_signed_values_and_starts_at_zero_otherwis
 
 def test_ellipse_contains_its_share_of_outcomes() -> None:
     c = gaussian_comparison(1.0)
-    hits = [inside(c.mean[k], c.covariance[k], c.observed[[k]])[0] for k in range(len(c.mean))]
+    hits = [inside(c.mean[k], c.covariance[k], c.observed[[k]], None)[0] for k in range(len(c.mean))]
     assert np.mean(hits) == pytest.approx(0.95, abs=0.02)
-    border = ellipse(c.covariance[0, :2, :2])
+    border = ellipse(c.covariance[0, :2, :2], None)
     squared = np.sum(border * np.linalg.solve(c.covariance[0, :2, :2], border.T).T, axis=1)
     np.testing.assert_allclose(squared, -2.0 * np.log(0.05), rtol=1e-9)
+
+
+def test_ellipse_is_that_of_the_tails() -> None:
+    c, tails = gaussian_comparison(1.0), Tails(np.ones(3), np.full(3, 4.0), 0.8, 3.0, 20, np.zeros((STEPS, 3)))
+    border = ellipse(c.covariance[0, :2, :2], tails, 0.9)
+    squared = np.sum(border * np.linalg.solve(c.covariance[0, :2, :2], border.T).T, axis=1)
+    np.testing.assert_allclose(squared, 2.0 * 0.8**2 * f.ppf(0.9, 2, 3.0), rtol=1e-9)
+    root = np.linalg.cholesky(c.covariance[0])
+    draws = 0.8 * multivariate_t(shape=np.eye(3), df=3.0, seed=0).rvs(20_000) @ root.T
+    assert np.mean(inside(np.zeros(3), c.covariance[0], draws, tails, 0.9)) == pytest.approx(0.9, abs=0.01)
 
 
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 9))
@@ -365,6 +377,27 @@ def test_coverage_of_a_calibrated_prediction_is_on_the_diagonal_of_an_overconfid
     assert kstest(pit(gaussian_comparison(0.5))[:, 0], "uniform").pvalue < 1e-6
 
 
+def test_band_of_the_pit_counts_the_windows_of_a_push_together() -> None:
+    """Alone, windows scatter as binomial counts do; in pushes of 5 equal windows, root 5 times as much."""
+    rng = np.random.default_rng(4)
+    alone = expected_counts(rng.random(2000), np.arange(2000).astype(np.str_))
+    assert np.mean(alone) == pytest.approx(200.0)
+    assert np.diff(alone)[0] == pytest.approx(2.0 * 1.96 * np.sqrt(2000 * 0.1 * 0.9), rel=0.01)
+    together = expected_counts(np.repeat(rng.random(400), 5), np.repeat(np.arange(400), 5).astype(np.str_))
+    assert np.diff(together)[0] == pytest.approx(np.sqrt(5.0) * np.diff(alone)[0], rel=0.01)
+    one_push = expected_counts(np.append(rng.random(39), 1.0), np.zeros(40, dtype=np.str_))
+    assert one_push[0] >= 0.0
+
+
+def test_joint_region_is_that_of_the_tails() -> None:
+    c = gaussian_comparison(1.0)
+    tails = Tails(np.ones(3), np.full(3, 4.0), 0.8, 3.0, 20, np.zeros((STEPS, 3)))
+    away = np.linalg.norm(standardised(c.mean, c.covariance, c.observed), axis=1)
+    np.testing.assert_array_equal(replace(c, tails=tails).joint_covered([0.9])[:, 0], away <= tails.joint_radius(0.9))
+    assert c.joint_covered([0.9]).mean() == pytest.approx(0.9, abs=0.02)
+    assert replace(c, tails=tails).joint_covered([0.9]).mean() > 0.91
+
+
 def test_trend_detects_a_drift_and_none_without_one() -> None:
     rng = np.random.default_rng(8)
     place, push_id = np.repeat(np.arange(60.0), 5), np.repeat(np.arange(60).astype(np.str_), 5)
@@ -387,11 +420,11 @@ def test_page_contains_every_number_of_the_metrics(page: Path, comparisons: list
     for comparison in comparisons[::2]:
         metrics = metrics_json(comparison)
         assert metrics["model"] in text
-        coverage = metrics.pop("coverage")
+        coverage, joint = metrics.pop("coverage"), metrics.pop("joint_coverage")
         interval = metrics.pop("interval")
         for value in _numbers(metrics):
             assert float(f"{value:.4g}") in shown
-        for value in [*_numbers(coverage), *_numbers([interval["nmse"], interval["nlpd"]])]:
+        for value in [*_numbers(coverage), *_numbers(joint), *_numbers([interval["nmse"], interval["nlpd"]])]:
             assert float(f"{value:.3g}") in shown
 
 

@@ -28,8 +28,9 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.splits import split_by_push
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor.models.mechanics.analytical import AnalyticalPush
+from push_predictor.models.predictors import GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
+from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.train import train_model
 from push_predictor.online.files.window_log import window_log
 from push_predictor.recordings.importers import import_source
@@ -249,6 +250,9 @@ def test_import_train_evaluate_score_what_the_regressors_score_by_themselves(
     model, report = str(tmp_path / "square.pushmodel"), tmp_path / "metrics.json"
     options = ["--kind", kind, "--mean", "zero", "--n-train", "100", "--seed", str(fold), "--out", model]
     assert main(["train", str(tmp_path / "training.csv"), *options]) == 0
+    learnt = load_model(Path(model))
+    assert isinstance(learnt.predictor, GaussianProcessPredictor) and learnt.predictor.tails is not None
+    save_model(replace(learnt, predictor=replace(learnt.predictor, tails=None)), Path(model))  # as the regressors
     assert main(["evaluate", model, str(tmp_path / "test.csv"), "--json", str(report)]) == 0
     metrics = json.loads(report.read_text())
     direct = fitted_directly(measured_data, kind)

@@ -27,7 +27,7 @@ from push_predictor.models.predictors.correlation_fit import FEWEST_PUSHES, LONG
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.tabulated.partial_correlation import bounded, bounded_one, unbounded
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
 
@@ -47,7 +47,7 @@ def pushes(n: int, seed: int, strength: float) -> PushTable:
 
 
 def trained(kind: str = "gp", strength: float = 0.8, n: int = 400) -> PushModel:
-    return train_model(pushes(n, 0, strength), square_rig(), kind, name="a")
+    return train_model(pushes(n, 0, strength), square_rig(), kind, name="a", options=TrainingOptions(tails=False))
 
 
 trained_once = cache(trained)

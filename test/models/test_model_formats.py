@@ -33,6 +33,7 @@ PREDICTORS = {
     5: GaussianProcessPredictor,
     6: MechanicsPredictor,
     7: ExtendedPredictor,
+    8: GaussianProcessPredictor,
 }
 
 
@@ -71,7 +72,7 @@ def test_model_is_saved_in_the_format_it_was_loaded_from(version: int, tmp_path:
 
 
 def test_parts_of_each_format_are_loaded() -> None:
-    second, third, fourth, fifth, sixth, seventh = (load_model(file_of(v)).predictor for v in range(2, 8))
+    second, third, fourth, fifth, sixth, seventh, eighth = (load_model(file_of(v)).predictor for v in range(2, 9))
     assert isinstance(second, GaussianProcessPredictor)
     assert {regression.parameters.choice.family for regression in second.regressions} == {"matern52"}
     assert isinstance(third.base, AnalyticalPredictor)
@@ -82,3 +83,4 @@ def test_parts_of_each_format_are_loaded() -> None:
     assert isinstance(sixth, MechanicsPredictor) and "contact_friction" in sixth.fitted.values
     assert not any(effect.exact for effect in (*third.effects, *fourth.effects))
     assert isinstance(seventh.base, MechanicsPredictor) and all(effect.exact for effect in seventh.effects)
+    assert fifth.tails is None and eighth.tails is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
+from scipy.stats import chi2, f
 from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
@@ -17,7 +20,8 @@ from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.prediction import Prediction
-from push_predictor.nodes.validator.window_markers import LIMIT, error_in_sd, window_markers
+from push_predictor.models.predictors.tails import STEPS, Tails
+from push_predictor.nodes.validator.window_markers import error_in_sd, window_markers
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 
@@ -120,9 +124,23 @@ def test_the_label_shows_the_distance_and_is_red_beyond_the_limit(error):
     assert error_in_sd(window(MEAN + away), predicted()) == pytest.approx(distance, rel=1e-6, abs=1e-9)
     label = markers(window(MEAN + away))["label"]
     assert f"error {distance:.1f} sd" in label.text or abs(10 * distance % 1.0 - 0.5) < 1e-6
-    if abs(distance - LIMIT) > 1e-6:
-        assert (label.color.g < 0.5) == (distance > LIMIT)
+    limit = 2.795483482915108  # the root of the 95 % quantile of chi-squared with three degrees of freedom
+    if abs(distance - limit) > 1e-6:
+        assert (label.color.g < 0.5) == (distance > limit)
     assert label.text.startswith("push-1.5, window 3\n20 mm/s, ")
+
+
+def test_tails_widen_the_ellipse_and_the_limit_of_the_label():
+    tails = Tails(np.ones(3), np.full(3, 4.0), 0.8, 3.0, 20, np.zeros((STEPS, 3)))
+    away = np.linalg.cholesky(COVARIANCE) @ np.array([0.0, 0.0, 3.0])
+    narrow, wide = (
+        {m.ns: m for m in window_markers(rig(), window(MEAN + away), replace(predicted(), tails=each), "world").markers}
+        for each in (None, tails)
+    )
+    across = [np.ptp(points(shown["predicted_ellipse"]), axis=0) for shown in (narrow, wide)]
+    expected = 0.8 * np.sqrt(2.0 * f.ppf(0.95, 2, 3.0)) / np.sqrt(chi2.ppf(0.95, 2))
+    assert across[1] / across[0] == pytest.approx(np.full(2, expected))
+    assert narrow["label"].color.g < 0.5 < wide["label"].color.g and 0.8 * np.sqrt(3.0 * f.ppf(0.95, 3, 3.0)) > 3.0
 
 
 def test_rotating_the_world_rotates_everything_but_the_label():

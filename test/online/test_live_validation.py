@@ -19,6 +19,7 @@ from push_predictor.evaluation.offline import rig_difference
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, compare, metrics_json
 from push_predictor.geometry.shapes import shape_outline
+from push_predictor.models.predictors.tails import STEPS, Tails
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import train_model
 from push_predictor.online.files.window_log import write_window_log
@@ -85,18 +86,21 @@ def test_a_predicted_window_takes_less_than_700_bytes(models: dict[str, PushMode
 # --- the running score -----------------------------------------------------------------------------------------------
 
 
-@given(seed=st.integers(0, 1000), count=st.integers(1, 30))
+TAILS = Tails(np.ones(3), np.array([2.2, 4.0, 9.0]), 1.0, 5.0, 20, np.zeros((STEPS, 3)))
+
+
+@given(seed=st.integers(0, 1000), count=st.integers(1, 30), tails=st.sampled_from([None, TAILS]))
 @settings(max_examples=30, deadline=None)
-def test_running_sums_give_the_totals_of_the_final_metrics(seed: int, count: int):
+def test_running_sums_give_the_totals_of_the_final_metrics(seed: int, count: int, tails: Tails | None):
     rng = np.random.default_rng(seed)
     mean, observed, training_mean = rng.normal(size=(count, 3)), rng.normal(size=(count, 3)), rng.normal(size=3)
     root = rng.normal(size=(count, 3, 3))
     covariance = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(3)
     push_id = np.array([f"p{k // 3}" for k in range(count)])
-    score = RunningScore(training_mean)
+    score = RunningScore(training_mean, tails)
     for row in zip(push_id.tolist(), mean, covariance, observed, strict=True):
         score.add(*row)
-    final = metrics_json(Comparison("m", 1, push_id, mean, covariance, observed, None, training_mean))
+    final = metrics_json(Comparison("m", 1, push_id, mean, covariance, observed, None, training_mean, tails))
     running = score.values()
     assert (running["windows"], running["pushes"]) == (final["n_test"], final["n_pushes"])
     assert running["nmse"] == pytest.approx(final["nmse"]["total"], rel=1e-12)

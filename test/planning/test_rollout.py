@@ -351,7 +351,7 @@ def test_accepts_a_singular_start_covariance() -> None:
 class Attentive:
     """A predictor that needs covariates, and remembers what it was given."""
 
-    learnt, integrates, effects, covariates = False, True, (), ()
+    learnt, integrates, effects, covariates, tails = False, True, (), (), None
     needs: tuple[str, ...]
     seen: list[Push] = field(default_factory=list)
 

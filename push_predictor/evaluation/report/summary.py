@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from push_predictor.evaluation.report.tables import interval_of, paired_difference, row_weights
 from push_predictor.evaluation.validation import Comparison, trained_on
@@ -33,7 +32,7 @@ def error_sentence(metrics: Mapping[str, Any]) -> str:
 
 def calibration_sentence(comparison: Comparison) -> str:
     """Whether the predicted 95 % intervals contain 95 % of the outcomes, by output."""
-    inside = np.abs(comparison.observed - comparison.mean) <= ndtri(0.5 + LEVEL / 2.0) * np.sqrt(comparison.variance)
+    inside = comparison.covered([LEVEL])[..., 0]
     shares = ", ".join(
         f"{100.0 * share:.0f} % of {name}" for name, share in zip(SYMBOLS, inside.mean(axis=0), strict=True)
     )

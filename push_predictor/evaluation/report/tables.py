@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from push_predictor.evaluation.metrics import COVERAGE_LEVELS, gaussian_nlpd, joint_nlpd
 from push_predictor.evaluation.splits import push_bootstrap
@@ -81,7 +80,10 @@ def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         each = np.zeros((0, 3)) if c.exact_log_density is None else -c.exact_log_density
         draws = _mean_draws(np.column_stack([each, each.sum(axis=1)]), row_weights(c))
         rows.append([c.model, *_cells([m["exact_nlpd"][name] for name in COLUMNS], draws)])
-    caption = "NLPD of the exact predictive density of the VHGP. For the other models it is that of the Gaussian above."
+    caption = (
+        "NLPD of the model's own predictive density: a Student t, or the exact density of a VHGP. For models without "
+        "either it is that of the Gaussian above."
+    )
     return html.table(caption, ("model", *COLUMNS), rows)
 
 
@@ -89,14 +91,16 @@ def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
     head = ("model, output", *(f"{100.0 * level:.0f} % interval" for level in COVERAGE_LEVELS))
     rows = []
     for c, m in pairs:
-        away = np.abs(c.observed - c.mean) / np.sqrt(c.variance)
+        covered = c.covered(COVERAGE_LEVELS).astype(np.float64)
         levels = [m["coverage"][str(level)] or dict.fromkeys(OUTPUTS) for level in COVERAGE_LEVELS]
         for k, name in enumerate(OUTPUTS):
-            hits = np.column_stack([away[:, k] <= ndtri(0.5 + level / 2.0) for level in COVERAGE_LEVELS])
-            draws = _mean_draws(hits.astype(np.float64), row_weights(c))
+            draws = _mean_draws(covered[:, k], row_weights(c))
             rows.append([f"{c.model}, {name}", *_cells([found[name] for found in levels], draws, digits=3)])
+        draws = _mean_draws(c.joint_covered(COVERAGE_LEVELS).astype(np.float64), row_weights(c))
+        rows.append([f"{c.model}, joint", *_cells(list(m["joint_coverage"].values()), draws, digits=3)])
     caption = (
-        "Coverage: share of outcomes inside the predicted central interval. Below the nominal share the intervals are "
+        "Coverage: share of outcomes inside the predicted central interval; joint: inside the region of the three "
+        "outputs. Below the nominal share the intervals are "
         "too narrow, above it too wide."
     )
     return html.table(caption, head, rows)

@@ -14,6 +14,7 @@ from push_predictor.models.predictors.mechanics_predictor import MechanicsPredic
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
 from push_predictor.models.predictors.scaling import Scaling
+from push_predictor.models.predictors.tails import Tails
 
 __all__ = [
     "AnalyticalPredictor",
@@ -28,4 +29,5 @@ __all__ = [
     "PriorPredictor",
     "Scaling",
     "Shift",
+    "Tails",
 ]

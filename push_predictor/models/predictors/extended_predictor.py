@@ -15,6 +15,7 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.models.predictors.tails import Tails
 from push_predictor.recordings.table import INPUTS
 from push_predictor.types import Array, BoolArray, IntArray
 
@@ -49,6 +50,11 @@ class ExtendedPredictor:
     def learnt(self) -> bool:
         """See Predictor."""
         return self.base.learnt
+
+    @property
+    def tails(self) -> Tails | None:
+        """See Predictor: those of the base."""
+        return self.base.tails
 
     @property
     def absorbs(self) -> bool:

@@ -21,6 +21,7 @@ from push_predictor.models.predictors.correlation import Correlation, covariance
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.predictor import Moments, Shift
 from push_predictor.models.predictors.scaling import Scaling
+from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, IntArray
@@ -32,7 +33,8 @@ class GaussianProcessPredictor(WithoutEffects):
 
     correlation: of the outputs given the push; None where they are independent. mean: mechanics about which the
     regressions have learnt the residuals; None where they have learnt the outcomes themselves. The scaling is that of
-    what they have learnt.
+    what they have learnt. tails: the distribution of new pushes, to which the covariances are widened; None where the
+    training pushes were too few, and in files before format 8.
     """
 
     rig: Rig
@@ -40,6 +42,7 @@ class GaussianProcessPredictor(WithoutEffects):
     regressions: tuple[Regression, ...]
     correlation: Correlation | None = None
     mean: MechanicsMean | None = None
+    tails: Tails | None = None
 
     @property
     def learnt(self) -> bool:
@@ -48,8 +51,8 @@ class GaussianProcessPredictor(WithoutEffects):
 
     @property
     def gaussian(self) -> bool:
-        """See BasePredictor: with known noise."""
-        return all(regression.gaussian for regression in self.regressions)
+        """See BasePredictor: with known noise and no tails."""
+        return self.tails is None and all(regression.gaussian for regression in self.regressions)
 
     @property
     def absorbs(self) -> bool:
@@ -89,6 +92,12 @@ class GaussianProcessPredictor(WithoutEffects):
         learnt = [r.parameters.choice for r in self.regressions if not isinstance(r, ConstantNoise)]
         return learnt[0] if learnt else DEFAULT_CHOICE
 
+    @cached_property
+    def reported_sd(self) -> Array:
+        """Reported standard deviations of what was learnt over those of the regressions, (3,), SI units."""
+        sd = self.scaling.outcome_sd
+        return sd if self.tails is None else np.asarray(sd * self.tails.factor)
+
     @property
     def targets(self) -> Array:
         """What the regressions were trained on (n, 3), SI: outcomes, or residuals about the mean."""
@@ -112,10 +121,21 @@ class GaussianProcessPredictor(WithoutEffects):
 
     def exact_log_density(self, push: Push, outcomes: Array) -> Array | None:
         """See Predictor."""
+        if self.tails is not None:
+            moments = self.moments(push)
+            return _student(self.tails, outcomes - moments.mean, _variances(moments.covariance))
         return None if self.gaussian else self._log_density(self.latent(push.inputs), push, outcomes)
 
     def shifted_log_density(self, push: Push, outcomes: Array, shift: Shift, scale: Array) -> Array | None:
-        """See BasePredictor: the latent function is shifted and less certain, its noise is scaled."""
+        """See BasePredictor.
+
+        With tails, the t distribution is shifted and widened. Without, the latent function is shifted and less certain,
+        and its noise is scaled.
+        """
+        if self.tails is not None:
+            moments = self.moments(push)
+            variance = _variances(moments.covariance) * scale**2 + _variances(shift.covariance)
+            return _student(self.tails, outcomes - moments.mean - shift.mean, variance)
         if self.gaussian:
             return None
         sd = self._units(push)
@@ -165,10 +185,9 @@ class GaussianProcessPredictor(WithoutEffects):
 
     def _moments_of(self, latent: Sequence[LatentPrediction], correlation: Array | None) -> Moments:
         """Moments in SI units from latent predictions in standardised ones and correlation matrices (n, 3, 3)."""
-        sd = self.scaling.outcome_sd
-        mean = np.column_stack([p.mean for p in latent]) * sd + self.scaling.outcome_mean
-        of_function = np.column_stack([p.variance for p in latent]) * sd**2
-        of_process = np.column_stack([p.process_variance for p in latent]) * sd**2
+        mean = np.column_stack([p.mean for p in latent]) * self.scaling.outcome_sd + self.scaling.outcome_mean
+        of_function = np.column_stack([p.variance for p in latent]) * self.reported_sd**2
+        of_process = np.column_stack([p.process_variance for p in latent]) * self.reported_sd**2
         return Moments(mean, *covariances(of_function, of_process, correlation))
 
     def _log_density(self, latent: Sequence[LatentPrediction], push: Push, outcomes: Array) -> Array:
@@ -176,3 +195,13 @@ class GaussianProcessPredictor(WithoutEffects):
         scaled = self.standardised(push, outcomes)
         columns = [exact_log_density(p, scaled[:, k]) for k, p in enumerate(latent)]
         return np.column_stack(columns) - np.log(self._units(push))
+
+
+def _variances(covariance: Array) -> Array:
+    return np.asarray(np.diagonal(covariance, axis1=1, axis2=2))
+
+
+def _student(tails: Tails, residuals: Array, variance: Array) -> Array:
+    """Log density (n, 3) of residuals (n, 3) with reported variances (n, 3)."""
+    sd = np.sqrt(variance)
+    return np.asarray(tails.log_density(residuals / sd) - np.log(sd))

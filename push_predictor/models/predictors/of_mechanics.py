@@ -11,6 +11,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.predictor import Moments, Shift
+from push_predictor.models.predictors.tails import Tails
 from push_predictor.models.predictors.without_effects import WithoutEffects
 from push_predictor.types import Array, IntArray
 
@@ -34,6 +35,11 @@ class OfMechanics(WithoutEffects, ABC):
     def gaussian(self) -> bool:
         """See BasePredictor."""
         return True
+
+    @property
+    def tails(self) -> Tails | None:
+        """See Predictor: None."""
+        return None
 
     @property
     def integrates(self) -> bool:

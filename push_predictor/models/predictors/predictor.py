@@ -9,6 +9,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors.tails import Tails
 from push_predictor.types import Array, BoolArray, IntArray
 
 Cross: TypeAlias = Mapping[tuple[int, int], Array]
@@ -71,6 +72,10 @@ class Predictor(Protocol):
     @property
     def covariates(self) -> tuple[str, ...]:
         """Names of the covariates that mechanics and effects depend on, each once; some follow from the inputs."""
+
+    @property
+    def tails(self) -> Tails | None:
+        """Distribution of the outcomes in units of the standard deviations; None for a Gaussian or a VHGP's own."""
 
     def in_own_domain(self, inputs: Array) -> BoolArray | None:
         """Whether the base is meant for each push (n, 3), (n,); None if its training pushes bound its domain."""

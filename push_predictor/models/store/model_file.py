@@ -30,7 +30,8 @@ FORMAT = "push_predictor model"
 # What each version added. 2: kernels other than the squared exponential, and a nugget. 3: effects. 4: effects that
 # share a covariance. 5: correlated outputs, and inducing inputs. 6: fitted mechanics, alone or as mean,
 # and draws of their parameters, with which a model may have no training rows. 7: effects that change these parameters.
-FORMAT_VERSION = 7
+# 8: tails.
+FORMAT_VERSION = 8
 PROBES = 5
 HEADER = "header"
 PREDICTOR = "body"  # the header's key of the predictor's record
@@ -115,6 +116,8 @@ def _header(model: PushModel, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 def _version(predictor: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
     """The lowest version whose readers understand the record of a predictor."""
     base = predictor.get("base", predictor)
+    if "tails" in base:
+        return 8
     if any("exact" in effect for effect in predictor.get("effects", ())):
         return 7
     if {"mechanics", "mean"} & base.keys():

@@ -33,6 +33,7 @@ from push_predictor.models.store.effects_record import cross_of, cross_record, e
 from push_predictor.models.store.mechanics_record import mechanics_of, mechanics_record
 from push_predictor.models.store.regression_record import put_regression, regression_of, regression_record
 from push_predictor.models.store.table_record import finite
+from push_predictor.models.store.tails_record import tails_of, tails_record
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -99,6 +100,7 @@ def _learnt_record(predictor: GaussianProcessPredictor, arrays: dict[str, np.nda
         "regressions": [regression_record(regression) for regression in predictor.regressions],
         **({"correlation": correlation_record(predictor.correlation, arrays)} if predictor.correlation else {}),
         **({"mean": _mean_record(predictor.mean)} if predictor.mean else {}),
+        **({"tails": tails_record(predictor.tails, arrays)} if predictor.tails else {}),
     }
 
 
@@ -205,7 +207,8 @@ def _learnt(record: dict[str, Any], source: Source) -> GaussianProcessPredictor:
     if len(regressions) != targets.shape[1]:
         raise ValueError(f"{len(regressions)} regressions, three are needed")
     correlation = correlation_of(record["correlation"], features, source.arrays) if "correlation" in record else None
-    return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation, mean)
+    tails = tails_of(record["tails"], source.arrays) if "tails" in record else None
+    return GaussianProcessPredictor(source.rig, scaling, tuple(regressions), correlation, mean, tails)
 
 
 def _mean(record: dict[str, Any], source: Source) -> MechanicsMean:

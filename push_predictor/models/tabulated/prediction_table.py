@@ -115,7 +115,7 @@ def tabulate(
     values = np.repeat(
         values, chart.boxes // len(values), axis=0
     )  # where the place does not vary, all edges share one box
-    least = predictor.scaling.outcome_sd**2 * [_least_variance(regression) for regression in regressions]
+    least = predictor.reported_sd**2 * [_least_variance(regression) for regression in regressions]
     columns = _as_slice([side.column for side in sides])
     return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
 
@@ -134,9 +134,9 @@ def _values(grid: _Grid, predictor: GaussianProcessPredictor, regressions: Seque
     """At the knots: means, variances of f, log process variances, SI units, and the correlation's three numbers."""
     outputs = [grid.outputs(regression) for regression in regressions]
     values = np.stack(list(chain(*zip(*outputs, strict=True))), axis=-1)
-    sd, zero = predictor.scaling.outcome_sd, np.zeros(3)
-    values *= np.concatenate([sd, sd**2, np.ones(3)])
-    values += np.concatenate([predictor.scaling.outcome_mean, zero, 2.0 * np.log(sd)])
+    reported, zero = predictor.reported_sd, np.zeros(3)
+    values *= np.concatenate([predictor.scaling.outcome_sd, reported**2, np.ones(3)])
+    values += np.concatenate([predictor.scaling.outcome_mean, zero, 2.0 * np.log(reported)])
     return (
         values
         if predictor.correlation is None

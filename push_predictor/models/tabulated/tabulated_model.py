@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -90,6 +91,9 @@ class TabulatedModel:
 
         Of an extended model the base is tabulated. Its effects are computed and added, unless they have a table.
         """
+        return replace(self._predicted(inputs, duration, covariates), tails=self.model.predictor.tails)
+
+    def _predicted(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Prediction:
         if self.effects is None:
             return self._computed(inputs, duration, covariates)
         push = self.model.predictor.completed(Push(inputs, duration, covariates or {}))
@@ -278,10 +282,11 @@ def _probes(model: PushModel) -> Array:
 
 def _merged(chosen: BoolArray, one: Prediction, other: Prediction) -> Prediction:
     """Row by row from `one` where chosen (n,), else from `other`."""
-    parts = []
+    parts: list[Any] = []
     for name in ("mean", "covariance", "process_covariance", "in_domain"):
         first, second = getattr(one, name), getattr(other, name)
         part = np.empty((len(chosen), *first.shape[1:]), first.dtype)
         part[chosen], part[~chosen] = first, second
         parts.append(part)
-    return Prediction(*parts)
+    mean, covariance, process_covariance, in_domain = parts
+    return Prediction(mean, covariance, process_covariance, in_domain)

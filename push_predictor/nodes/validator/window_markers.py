@@ -9,11 +9,12 @@ from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers,
 from push_predictor.geometry.frames import to_world
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.prediction import Prediction
+from push_predictor.models.predictors.tails import joint_radius
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
 
-LIMIT = 2.795483482915108  # the root of the 95 % quantile of chi-squared with three degrees of freedom
+LEVEL = 0.95
 
 
 def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_id: str) -> MarkerArray:
@@ -23,15 +24,16 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
     """
     heading = np.array([window.push_heading])
     predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
-    covariance = covariance_in_world(prediction.covariance, heading)[0]
+    wider = joint_radius(prediction.tails, LEVEL, 2) / joint_radius(None, LEVEL, 2)  # the markers draw a Gaussian's
+    covariance = wider**2 * covariance_in_world(prediction.covariance, heading)[0]
     start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
     reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
-    distance = error_in_sd(window, prediction)
+    distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
     parts = (
         push_markers(tip_of(rig, window), rig.pusher_radius, window.push_heading, *where),
         prediction_markers(rig.outline.vertices, start, predicted, covariance[:2, :2], end, *where),
         magnified_markers(predicted, covariance, end, reach, window.push_heading, *where),
-        label_marker(_label(window, distance), start[:2], reach, distance > LIMIT, *where),
+        label_marker(_label(window, distance, limit), start[:2], reach, distance > limit, *where),
     )
     return MarkerArray(markers=[marker for part in parts for marker in part.markers])
 
@@ -49,9 +51,9 @@ def error_in_sd(window: PushWindow, prediction: Prediction) -> float:
     return float(np.sqrt(away @ np.linalg.solve(prediction.covariance[0], away)))
 
 
-def _label(window: PushWindow, distance: float) -> str:
+def _label(window: PushWindow, distance: float, limit: float) -> str:
     return (
         f"{window.push_id}, window {window.index}\n"
-        f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {LIMIT:.1f})\n"
+        f"{1e3 * window.velocity:.0f} mm/s, error {distance:.1f} sd (95 %: {limit:.1f})\n"
         f"ellipse and dial {MAGNIFICATION:.0f} times enlarged"
     )

@@ -86,5 +86,5 @@ def _paint_ends(ax: Axes, push: Trajectories) -> None:
     grid(ax)
     ends = 1e3 * (push.paths[:, -1, :2] - push.paths[:, -1, :2].mean(axis=0))
     ax.plot(*ends.T, ".", color="0.15", markersize=3.0, label="final pose")
-    ax.plot(*ellipse(np.cov(ends.T)).T, color=RED, linewidth=1.3, label="95 % ellipse of final poses")
+    ax.plot(*ellipse(np.cov(ends.T), None).T, color=RED, linewidth=1.3, label="95 % ellipse of final poses")
     ax.set_xlabel("final pose, along, from the mean (mm)")

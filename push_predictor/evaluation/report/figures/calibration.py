@@ -1,4 +1,4 @@
-"""Calibration: share of outcomes in the predicted intervals, and histograms of the PIT."""
+"""Calibration: share of outcomes in the predicted intervals, and histograms of the PIT, both by push."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import binom
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison, pit
@@ -22,6 +20,7 @@ LEVELS = np.linspace(0.02, 0.98, 49)
 WINDOWS_PER_BAR = 10
 FEWEST_BARS, MOST_BARS = 4, 10
 DRAWS = 400
+NORMAL_95 = 1.96
 
 
 def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None:
@@ -32,7 +31,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
         values = pit(comparison)
         tallest = max(histogram(values[:, k])[0].max() for k in range(3))
         for k, ax in enumerate(row[1:]):
-            _paint_pit(ax, values[:, k], k, tallest)
+            _paint_pit(ax, values[:, k], comparison.push_id, k, tallest)
         row[0].set_ylabel(f"{comparison.model}\nobserved share")
         row[1].set_ylabel("windows")
     for k, ax in enumerate(axes[0, 1:]):
@@ -46,8 +45,7 @@ def paint_calibration(figure: Figure, comparisons: Sequence[Comparison]) -> None
 
 def coverage_curve(comparison: Comparison, levels: Array = LEVELS) -> tuple[Array, Array, Array]:
     """Observed share and the ends of its 95 % interval from resampling whole pushes, (levels, 3) each."""
-    away = np.abs(comparison.observed - comparison.mean) / np.sqrt(comparison.variance)
-    hit = (away[:, None, :] <= ndtri(0.5 + levels / 2.0)[None, :, None]).astype(np.float64)
+    hit = np.swapaxes(comparison.covered(levels), 1, 2).astype(np.float64)
     weights = push_bootstrap(comparison.push_id, draws=DRAWS)
     draws = np.einsum("dn,nlk->dlk", weights, hit, optimize=True) / weights.sum(axis=1)[:, None, None]
     low, high = np.quantile(draws, [0.025, 0.975], axis=0)
@@ -59,6 +57,21 @@ def histogram(values: Array) -> tuple[Array, Array]:
     count = int(np.clip(len(values) // WINDOWS_PER_BAR, FEWEST_BARS, MOST_BARS))
     counts, edges = np.histogram(values, bins=count, range=(0.0, 1.0))
     return counts.astype(np.float64), edges
+
+
+def expected_counts(values: Array, push_id: np.ndarray) -> tuple[float, float]:
+    """Ends of the 95 % interval of a bar's count if the predicted probabilities hold; see `histogram`.
+
+    Windows of a push are counted together, since they resemble each other: the variance of a count is the sum, over
+    pushes, of the squared difference between a push's windows in the bar and its share, averaged over the bars.
+    """
+    bars = len(histogram(values)[0])
+    push = np.unique(push_id, return_inverse=True)[1]
+    bar = np.minimum((values * bars).astype(np.int64), bars - 1)
+    found = np.bincount(push * bars + bar, minlength=bars * (int(push.max()) + 1)).reshape(-1, bars)
+    away = found - found.mean(axis=1, keepdims=True)
+    middle, half = len(values) / bars, NORMAL_95 * float(np.sqrt(np.sum(away**2) / bars))
+    return max(middle - half, 0.0), middle + half
 
 
 def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
@@ -73,9 +86,9 @@ def _paint_coverage(ax: Axes, comparison: Comparison) -> None:
     ax.set_aspect("equal")
 
 
-def _paint_pit(ax: Axes, values: Array, output: int, tallest: float) -> None:
+def _paint_pit(ax: Axes, values: Array, push_id: np.ndarray, output: int, tallest: float) -> None:
     counts, edges = histogram(values)
-    low, high = binom.ppf([0.025, 0.975], len(values), 1.0 / len(counts))
+    low, high = expected_counts(values, push_id)
     look: dict[str, Any] = {"color": COLOURS[output], "alpha": 0.75, "edgecolor": "white", "linewidth": 0.6}
     ax.bar(edges[:-1], counts, np.diff(edges), align="edge", **look)
     ax.axhspan(low, high, color="0.2", alpha=0.18, linewidth=0.0)

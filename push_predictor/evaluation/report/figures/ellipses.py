@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import chi2
 
 from push_predictor.evaluation.report.figures.nearby import Example
 from push_predictor.evaluation.report.figures.slider import magnification, paint_slider
 from push_predictor.evaluation.validation import Comparison
+from push_predictor.models.predictors.tails import Tails, half_widths, joint_radius
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.reporting.canvas import (
@@ -48,26 +47,28 @@ def paint_examples(
             figure.legend(*middle.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
-def paint_ellipse(ax: Axes, mean: Array, covariance: Array, label: str | None = None, colour: str = PREDICTED) -> None:
+def paint_ellipse(
+    ax: Axes, mean: Array, covariance: Array, tails: Tails | None, label: str | None = None, colour: str = PREDICTED
+) -> None:
     """The 95 % ellipse of (dx, dy) in mm: mean (3,), covariance (3, 3) in m and rad."""
-    outline = mean[:2] + ellipse(covariance[:2, :2])
+    outline = mean[:2] + ellipse(covariance[:2, :2], tails)
     ax.fill(*(outline.T * UNITS[0]), facecolor=colour, alpha=0.15, linewidth=0.0)
     ax.plot(*(outline.T * UNITS[0]), color=colour, linewidth=1.2, label=label)
     ax.plot(*(mean[:2] * UNITS[0]), "+", color=colour, markersize=7, markeredgewidth=1.4)
 
 
-def ellipse(covariance: Array, level: float = LEVEL, count: int = 121) -> Array:
-    """Boundary (count, 2) of the ellipse at zero that contains `level` of a Gaussian with covariance (2, 2)."""
+def ellipse(covariance: Array, tails: Tails | None, level: float = LEVEL, count: int = 121) -> Array:
+    """Boundary (count, 2) of the ellipse at zero that contains `level` of a prediction with covariance (2, 2)."""
     turn = np.linspace(0.0, 2.0 * np.pi, count)
-    circle = np.sqrt(chi2.ppf(level, 2)) * np.stack([np.cos(turn), np.sin(turn)])
+    circle = joint_radius(tails, level, 2) * np.stack([np.cos(turn), np.sin(turn)])
     return np.asarray((np.linalg.cholesky(covariance) @ circle).T)
 
 
-def inside(mean: Array, covariance: Array, outcomes: Array, level: float = LEVEL) -> BoolArray:
+def inside(mean: Array, covariance: Array, outcomes: Array, tails: Tails | None, level: float = LEVEL) -> BoolArray:
     """Which (dx, dy) of the outcomes (n, 3) lie in the ellipse."""
     away = (outcomes - mean)[:, :2]
     squared = np.sum(away * np.linalg.solve(covariance[:2, :2], away.T).T, axis=1)
-    return np.asarray(squared <= chi2.ppf(level, 2))
+    return np.asarray(squared <= joint_radius(tails, level, 2) ** 2)
 
 
 def _paint_example(part: SubFigure, rig: Rig, table: PushTable, comparison: Comparison, example: Example) -> Axes:
@@ -91,10 +92,10 @@ def _paint_example(part: SubFigure, rig: Rig, table: PushTable, comparison: Comp
 def _paint_plane(ax: Axes, comparison: Comparison, example: Example) -> None:
     mean, covariance = comparison.mean[example.row], comparison.covariance[example.row]
     grid(ax)
-    paint_ellipse(ax, mean, covariance, label="predicted, 95 %")
+    paint_ellipse(ax, mean, covariance, comparison.tails, label="predicted, 95 %")
     ax.plot(*(example.nearby[:, :2].T * UNITS[0]), "o", label="windows with similar inputs", **DOTS)
     ax.plot(*(comparison.observed[example.row, :2] * UNITS[0]), "D", label="this window", **DIAMOND)
-    count = int(inside(mean, covariance, example.nearby).sum())
+    count = int(inside(mean, covariance, example.nearby, comparison.tails).sum())
     pushes = f"{example.pushes} push{'' if example.pushes == 1 else 'es'}"
     ax.set_title(f"similar: {count} of {len(example.nearby)} inside ({pushes})", fontsize=8.0)
     ax.set_xlabel(output_label(0))
@@ -105,7 +106,7 @@ def _paint_plane(ax: Axes, comparison: Comparison, example: Example) -> None:
 
 def _paint_rotation(ax: Axes, comparison: Comparison, example: Example) -> None:
     mean, sd = comparison.mean[example.row, 2], np.sqrt(comparison.covariance[example.row, 2, 2])
-    half = ndtri(0.5 + LEVEL / 2.0) * sd
+    half = half_widths(comparison.tails, LEVEL)[2] * sd
     grid(ax)
     ax.axhspan(*(np.array([mean - half, mean + half]) * UNITS[2]), color=PREDICTED, alpha=0.15, linewidth=0.0)
     for height in (mean - half, mean + half):

@@ -183,8 +183,8 @@ CALIBRATION_CAPTION = (
     "predicted central interval, against its nominal share. Above the diagonal the predicted uncertainty is too "
     "large, below it too small. Shaded: 95 % interval from resampling whole pushes. Right: probability integral "
     "transform (PIT), the predicted probability of a smaller outcome. A hump: the predicted uncertainty is too large. "
-    "A trough: it is too small. A slope: the mean is biased. The band contains 95 % of the bars if windows are "
-    "independent. Windows of one push are not, so more bars lie outside. All for the predicted Gaussian."
+    "A trough: it is too small. A slope: the mean is biased. The band contains 95 % of the bars of a "
+    "calibrated model; it counts the windows of a push together, since they resemble each other."
 )
 RESIDUAL_CAPTION = (
     "A trend whose interval excludes zero is a drift. Top: observed against predicted outcome, with the predicted 95 % "

@@ -67,9 +67,9 @@ def _paint_outcomes(ax: Axes, comparison: Comparison, shown: Sequence[Example]) 
     for colour, example in zip(EXAMPLE_COLOURS, shown, strict=False):
         mean, covariance = comparison.mean[example.row], comparison.covariance[example.row]
         outcomes = np.vstack([example.nearby, comparison.observed[example.row]])
-        paint_ellipse(ax, mean, covariance, colour=colour)
+        paint_ellipse(ax, mean, covariance, comparison.tails, colour=colour)
         ax.plot(*(outcomes[:, :2].T * UNITS[0]), "o", color=colour, markersize=3.2, mew=0.4, mec="white")
-        hits, total = hits + int(inside(mean, covariance, outcomes).sum()), total + len(outcomes)
+        hits, total = hits + int(inside(mean, covariance, outcomes, comparison.tails).sum()), total + len(outcomes)
     ax.set_title(f"95 % ellipses: {hits} of {total} outcomes inside")
     ax.set_xlabel(output_label(0))
     ax.set_ylabel(output_label(1))

@@ -10,6 +10,7 @@ import numpy as np
 
 from push_predictor.evaluation.splits import push_bootstrap
 from push_predictor.evaluation.validation import Comparison
+from push_predictor.models.predictors.tails import half_widths
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting.canvas import COLOURS, UNITS, grid, output_label
 from push_predictor.types import Array
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CENTRAL = 1.96  # sd: half the width of the central 95 % of a Gaussian
+LEVEL = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +48,6 @@ def time_axis(comparison: Comparison, windows: Sequence[PushWindow] | None) -> T
     return TimeAxis(np.array([float(number[push]) for push in comparison.push_id.tolist()]), "push count")
 
 
-def standardised_residuals(comparison: Comparison) -> Array:
-    """(observed - predicted) / predicted sd, (n, 3), each output by itself."""
-    return np.asarray((comparison.observed - comparison.mean) / np.sqrt(comparison.variance))
-
-
 def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
     """Fit a line to residuals (n,); None for fewer than three pushes or if all have the same time."""
     if len(set(push_id.tolist())) < 3 or not np.ptp(place) > 0.0:
@@ -65,18 +61,19 @@ def trend(place: Array, residual: Array, push_id: np.ndarray) -> Trend | None:
 def paint_residuals(figure: Figure, comparison: Comparison, axis: TimeAxis) -> None:
     """Per output, top: observed against predicted; bottom: the standardised residual over time."""
     axes = figure.subplots(2, 3, height_ratios=(1.25, 1.0))
-    residual = standardised_residuals(comparison)
+    residual, half = comparison.residuals, half_widths(comparison.tails, LEVEL)
     reach = max(3.0, float(np.percentile(np.abs(residual), 99.5)) * 1.1)
     for k in range(3):
-        _paint_scatter(axes[0, k], comparison, k)
+        _paint_scatter(axes[0, k], comparison, k, half[k])
+        axes[1, k].axhspan(-half[k], half[k], color="0.2", alpha=0.08, linewidth=0.0)
         _paint_over_time(axes[1, k], axis, residual[:, k], comparison.push_id, k, reach)
     axes[1, 0].set_ylabel("residual / predicted sd")
     axes[1, 1].set_xlabel(axis.label)
 
 
-def _paint_scatter(ax: Axes, comparison: Comparison, k: int) -> None:
+def _paint_scatter(ax: Axes, comparison: Comparison, k: int, half_width: float) -> None:
     predicted, observed = comparison.mean[:, k] * UNITS[k], comparison.observed[:, k] * UNITS[k]
-    half = CENTRAL * np.sqrt(comparison.variance[:, k]) * UNITS[k]
+    half = half_width * np.sqrt(comparison.variance[:, k]) * UNITS[k]
     both = np.concatenate([predicted, observed])
     margin = 0.05 * max(float(np.ptp(both)), 1e-9)
     ends = np.array([both.min() - margin, both.max() + margin])
@@ -91,7 +88,6 @@ def _paint_scatter(ax: Axes, comparison: Comparison, k: int) -> None:
 
 def _paint_over_time(ax: Axes, axis: TimeAxis, residual: Array, push_id: np.ndarray, k: int, reach: float) -> None:
     grid(ax)
-    ax.axhspan(-CENTRAL, CENTRAL, color="0.2", alpha=0.08, linewidth=0.0)
     ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     ax.plot(axis.place, np.clip(residual, -reach, reach), "o", color="0.55", markersize=2.0, mew=0.0, alpha=0.7)
     place, mean = _per_push(axis.place, residual, push_id)

@@ -54,7 +54,8 @@ def _paint_track(ax: Axes, windows: Sequence[PushWindow], comparison: Comparison
         mean, covariance = _in_track_frame(
             start, window.push_heading + turn, comparison.mean[row], comparison.covariance[row]
         )
-        paint_ellipse(ax, mean, covariance, None if number else "predicted from the start of each window, 95 %")
+        label = None if number else "predicted from the start of each window, 95 %"
+        paint_ellipse(ax, mean, covariance, comparison.tails, label)
     seen = rotate(track - origin, turn) * UNITS[0]
     ax.plot(*seen.T, "-", color=OBSERVED, linewidth=0.8)
     ax.plot(*seen[1:].T, "D", color=OBSERVED, markersize=3.5, label="observed")
@@ -66,7 +67,8 @@ def _paint_track(ax: Axes, windows: Sequence[PushWindow], comparison: Comparison
 
 
 def _title(windows: Sequence[PushWindow], comparison: Comparison, rows: Sequence[int]) -> str:
-    hits = sum(bool(inside(comparison.mean[r], comparison.covariance[r], comparison.observed[[r]])[0]) for r in rows)
+    c = comparison
+    hits = sum(bool(inside(c.mean[r], c.covariance[r], c.observed[[r]], c.tails)[0]) for r in rows)
     turned = np.degrees(sum(window.displacement[2] for window in windows))
     text = f"{windows[0].velocity * 1e3:.0f} mm/s, rotation {turned:+.0f}°: {hits} of {len(rows)} inside"
     return text.replace("-", "−")

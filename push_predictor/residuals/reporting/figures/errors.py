@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binom
 
-from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, histogram
+from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts, histogram
 from push_predictor.evaluation.validation import Comparison, pit
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.reporting.canvas import UNITS
@@ -51,7 +50,9 @@ def coverage_charts(comparison: Comparison) -> list[Chart]:
     values = pit(comparison)
     bars = [histogram(values[:, k]) for k in range(len(OUTPUTS))]
     tallest = max(float(counts.max()) for counts, _ in bars)
-    return [_coverage(comparison), *(_pit_chart(len(values), *bars[k], k, tallest) for k in range(len(OUTPUTS)))]
+    expected = [expected_counts(values[:, k], comparison.push_id) for k in range(len(OUTPUTS))]
+    charts = [_pit_chart(*bars[k], expected[k], k, tallest) for k in range(len(OUTPUTS))]
+    return [_coverage(comparison), *charts]
 
 
 def _judged(comparison: Comparison, place: dict[str, float]) -> Judged:
@@ -97,8 +98,8 @@ def _coverage(comparison: Comparison) -> Chart:
     )  # fmt: skip
 
 
-def _pit_chart(n: int, counts: Array, edges: Array, output: int, tallest: float) -> Chart:
-    low, high = binom.ppf([0.025, 0.975], n, 1.0 / len(counts))
+def _pit_chart(counts: Array, edges: Array, expected: tuple[float, float], output: int, tallest: float) -> Chart:
+    low, high = expected
     across = np.array([0.0, 1.0])
     band = Band("push", across, np.full(2, low), np.full(2, high))
     top = 1.08 * max(tallest, float(high))

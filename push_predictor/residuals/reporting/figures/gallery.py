@@ -46,7 +46,7 @@ def calibration_figures(trace: Trace) -> list[str]:
         "share of outcomes inside the central predicted interval, against its nominal share; band: 95 %, bootstrap of "
         "pushes. Others: probability integral transform (PIT), uniform for a calibrated model. A hump: the predicted "
         "uncertainty is too large. A trough: it is too small. A slope: the mean is biased. Grey: 95 % range of the "
-        "bars for independent windows; windows of one push are not independent."
+        "bars of a calibrated model, where windows of a push resemble each other."
     )
     return [html.charts([chart for one in shown for chart in coverage_charts(one)], caption, 4)]
 

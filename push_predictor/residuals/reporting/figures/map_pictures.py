@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from push_predictor.evaluation.report.figures.push_maps import contact_label
-from push_predictor.evaluation.report.figures.residuals import standardised_residuals
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.reporting import html
 from push_predictor.residuals.outcome import Trace
@@ -46,7 +45,7 @@ def _held_out_columns(trace: Trace) -> list[Column]:
     if not len(table) or any(len(comparison.observed) != len(table) for comparison in shown):
         return []
     halves = _halves(trace, "held out")
-    return [c for each in shown for c in columns_of(each.model, table, standardised_residuals(each), halves)]
+    return [c for each in shown for c in columns_of(each.model, table, each.residuals, halves)]
 
 
 def _halves(trace: Trace, part: str) -> Halves:

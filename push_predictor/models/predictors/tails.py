@@ -1,0 +1,125 @@
+"""Heavy tails and the size of the error of a new push, learnt from the residuals of held-out training pushes.
+
+Windows of one push share an error, which differs from push to push: the residuals of new pushes have heavier tails than
+those of the model's own rows. So each output is predicted by a Student t distribution about the model's mean,
+
+    (y - mean) / sd = scale T,    T ~ t(degrees),
+
+with sd as the regressions predict it. Scale and degrees of freedom are fitted by `tails_fit` to residuals of pushes,
+each predicted without its windows. The covariance that a model reports is that of this distribution. All methods take
+and give residuals in units of the reported standard deviation, which is what callers know.
+
+The conformal interval makes no assumption on the distribution: it takes the quantile of the absolute residuals by push.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.special import chdtri, fdtri, gammaln, ndtri, stdtr, stdtrit
+
+from push_predictor.errors import RequestError
+from push_predictor.types import Array
+
+IntervalKind = Literal["student", "conformal"]
+INTERVAL_KINDS: tuple[IntervalKind, ...] = ("student", "conformal")
+STEPS = 200  # number of quantiles that are kept for each output
+
+
+@dataclass(frozen=True, eq=False)
+class Tails:
+    """The predictive distribution of a new push, in units of the model's standard deviations.
+
+    scale (3,), degrees (3,) > 2: of the t distribution of each output, in units of the regression's sd. joint_scale,
+    joint_degrees > 2: of the t distribution of the three outputs, in units of the reported covariance's root. pushes:
+    number of training pushes. quantiles (STEPS, 3): of the absolute residuals of these pushes, in units of the reported
+    sd; row i is the smallest value that at least the share (i + 1) / STEPS does not exceed, where every push counts the
+    same.
+    """
+
+    scale: Array
+    degrees: Array
+    joint_scale: float
+    joint_degrees: float
+    pushes: int
+    quantiles: Array
+
+    @cached_property
+    def factor(self) -> Array:
+        """Reported standard deviations over those of the regressions, (3,)."""
+        return np.asarray(self.scale * np.sqrt(self.degrees / (self.degrees - 2.0)))
+
+    @cached_property
+    def unit_scale(self) -> Array:
+        """Scale (3,) of a t distribution with a standard deviation of 1."""
+        return np.asarray(np.sqrt((self.degrees - 2.0) / self.degrees))
+
+    def log_density(self, residuals: Array) -> Array:
+        """Log density (n, 3) of residuals (n, 3)."""
+        return student_log_density(residuals, self.unit_scale, self.degrees)
+
+    def probability(self, residuals: Array) -> Array:
+        """Predicted probability (n, 3) of a residual below these (n, 3)."""
+        return np.asarray(stdtr(self.degrees, residuals / self.unit_scale))
+
+    def half_width(self, level: float, kind: IntervalKind = "student") -> Array:
+        """Half-width (3,) of the central interval of that level, in (0, 1). Raises RequestError."""
+        if not 0.0 < level < 1.0:
+            raise RequestError("level", level, "a number above 0 and below 1")
+        if kind == "student":
+            return np.asarray(self.unit_scale * stdtrit(self.degrees, 0.5 + 0.5 * level))
+        if kind == "conformal":
+            return self._conformal(level)
+        raise RequestError("interval", kind, " or ".join(INTERVAL_KINDS))
+
+    def joint_radius(self, level: float, outputs: int = 3) -> float:
+        """Mahalanobis distance, under the reported covariance, within which the outcome lies with that probability.
+
+        outputs: how many are looked at together. For a t distribution, the squared distance over their number is
+        F-distributed (Kotz and Nadarajah 2004, section 1.4).
+        """
+        return self.joint_scale * float(np.sqrt(outputs * fdtri(outputs, self.joint_degrees, level)))
+
+    def _conformal(self, level: float) -> Array:
+        """The quantile at which the training pushes and a new one, of infinite residual, reach the level.
+
+        With k training pushes and a new push that is exchangeable with them, a random window of the new push has a
+        residual below it with at least that probability (Lee, Barber and Willett 2023, "Distribution-free inference
+        with hierarchical data", arXiv 2306.06342; also Dunn, Wasserman and Ramdas 2022).
+        """
+        share = level * (self.pushes + 1) / self.pushes
+        if share > 1.0:
+            most = self.pushes / (self.pushes + 1.0)
+            raise RequestError(
+                "level", level, f"at most {most:.3g} for conformal intervals from {self.pushes} training pushes"
+            )
+        return np.asarray(self.quantiles[int(np.ceil(share * STEPS - 1e-9)) - 1])
+
+
+def half_widths(tails: Tails | None, level: float, kind: IntervalKind = "student") -> Array:
+    """Half-width (3,) of central intervals in predicted standard deviations; those of a Gaussian without tails.
+
+    Raises RequestError for a level outside (0, 1), and for conformal intervals that the model does not have.
+    """
+    if tails is not None:
+        return tails.half_width(level, kind)
+    if kind != "student":
+        raise RequestError("interval", kind, "student, for a model without residuals of held-out training pushes")
+    if not 0.0 < level < 1.0:
+        raise RequestError("level", level, "a number above 0 and below 1")
+    return np.full(3, float(ndtri(0.5 + 0.5 * level)))
+
+
+def joint_radius(tails: Tails | None, level: float, outputs: int = 3) -> float:
+    """See Tails; that of a Gaussian without tails."""
+    return float(np.sqrt(chdtri(outputs, 1.0 - level))) if tails is None else tails.joint_radius(level, outputs)
+
+
+def student_log_density(residuals: Array, scale: Array | float, degrees: Array | float) -> Array:
+    """Log density of residuals (...) under t distributions about zero with scale and degrees of freedom."""
+    constant = gammaln(0.5 * (degrees + 1.0)) - gammaln(0.5 * degrees) - 0.5 * np.log(np.pi * degrees)
+    square = (residuals / scale) ** 2
+    return np.asarray(constant - np.log(scale) - 0.5 * (degrees + 1.0) * np.log1p(square / degrees))
