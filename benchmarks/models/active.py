@@ -49,8 +49,8 @@ MODELS: dict[str, tuple[str, MeanChoice]] = {
     "prior": ("prior", "zero"),
     "gp, mechanics": ("gp", "mechanics"),
 }
-WAYS = ("random", "Sobol", "suggest", "no start", "variance", "BAIT")
-WITH_MECHANICS = ("random", "Sobol", "suggest")
+WAYS = ("random", "Sobol", "suggest", "other start", "variance", "BAIT")
+WITH_MECHANICS = ("random", "Sobol", "suggest", "other start")
 WINDOWS = {"mit_square": 12, "simulated": 3}  # of a push that a model is trained on
 LOOKED_AT = {"mit_square": 6, "simulated": 3}  # windows of a push of the pool, and of those that matter, in the design
 MATTER = 128
@@ -186,7 +186,7 @@ def _unit(found: Information) -> Array:
 
 DESIGNS: dict[str, Callable[[Information], Information]] = {
     "suggest": lambda found: found,
-    "no start": lambda found: found,
+    "other start": lambda found: found,
     "BAIT": _independent,
     "variance": _most_variable,
 }
@@ -203,11 +203,12 @@ def _chosen(
 ) -> IntArray:
     """Indices (count,) of further pushes of the pool.
 
-    The first pushes of a model without mechanics are random, or of `suggest` FIRST ones of the Sobol' sequence. With
-    mechanics, a prior model chooses them.
+    The first pushes are random without mechanics, and chosen by a prior model with them. But `suggest` without and
+    `other start` with mechanics begin with FIRST pushes of the Sobol' sequence.
     """
     left = np.setdiff1d(np.arange(len(case.pool.pushes)), taken)
-    if way == "Sobol" or (way == "suggest" and model == "gp" and len(taken) < FIRST):
+    evenly = way == ("suggest" if model == "gp" else "other start") and len(taken) < FIRST
+    if way == "Sobol" or evenly:
         return _nearest_to_sobol(case, left, len(taken), count)
     if trained is None and model != "gp":
         trained = train_model(empty_table(), case.rig, "prior", name="prior")
