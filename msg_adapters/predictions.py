@@ -35,13 +35,18 @@ class PushQuery:
 
 
 def query_to_request(
-    model: str, push: Array, duration: float, covariates: Mapping[str, float] | None = None
+    model: str,
+    push: Array,
+    duration: float,
+    covariates: Mapping[str, float] | None = None,
+    residual: Array | None = None,
 ) -> PredictPush.Request:
-    """The request for one push (3,)."""
+    """The request for one push (3,). residual (3,): of the window just before, m, m, rad; None: not known."""
     request = PredictPush.Request(model=model, duration=float(duration))
     request.velocity, request.contact, request.angle = (float(value) for value in push)
     request.covariate_names = list(covariates or {})
     request.covariate_values = [float(value) for value in (covariates or {}).values()]
+    request.push_residual = [] if residual is None else _doubles(residual)
     return request
 
 
@@ -58,6 +63,17 @@ def push_from_request(request: Any) -> PushRequest:
     """The push that a PredictPush request describes. Raises RequestError unless each covariate has one value."""
     covariates = covariates_of_push(request)
     return PushRequest(request.velocity, request.contact, request.angle, request.duration, covariates)
+
+
+def residual_from_request(request: Any) -> Array | None:
+    """The residual (3,) of the window just before, m, m, rad; None if it is not known. Raises RequestError."""
+    if not len(request.push_residual):
+        return None
+    residual = np.array(request.push_residual, dtype=np.float64)
+    if residual.shape != (3,) or not np.isfinite(residual).all():
+        accepted = "three finite numbers: dx, dy in m and dtheta in rad, observed minus predicted; or none"
+        raise RequestError("push_residual", residual.tolist(), accepted)
+    return residual
 
 
 def query_from_batch_request(request: Any) -> PushQuery:

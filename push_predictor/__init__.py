@@ -19,6 +19,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from push_predictor.api import Validation, choose_push, find_windows, trace, train, validate
+    from push_predictor.design.batch import suggest_pushes
+    from push_predictor.design.limits import Limits
     from push_predictor.models.push_model import PushModel
     from push_predictor.models.pushes import Pushes
     from push_predictor.models.store.model_file import load_model
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "Goal": "planning.goal",
+    "Limits": "design.limits",
     "PushModel": "models.push_model",
     "Pushes": "models.pushes",
     "Validation": "api",
@@ -34,6 +37,7 @@ _PLACES = {
     "find_windows": "api",
     "load_model": "models.store.model_file",
     "read_recording": "recordings.read",
+    "suggest_pushes": "design.batch",
     "trace": "api",
     "train": "api",
     "validate": "api",
@@ -41,6 +45,7 @@ _PLACES = {
 
 __all__ = [
     "Goal",
+    "Limits",
     "PushModel",
     "Pushes",
     "Validation",
@@ -49,6 +54,7 @@ __all__ = [
     "find_windows",
     "load_model",
     "read_recording",
+    "suggest_pushes",
     "trace",
     "train",
     "validate",

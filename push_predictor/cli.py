@@ -15,7 +15,19 @@ from push_predictor import __version__
 from push_predictor.commands.output import check_json
 from push_predictor.errors import PushPredictorError
 
-COMMANDS = ("import", "simulate", "train", "predict", "evaluate", "validate", "trace", "report", "info", "doctor")
+COMMANDS = (
+    "import",
+    "simulate",
+    "train",
+    "predict",
+    "suggest",
+    "evaluate",
+    "validate",
+    "trace",
+    "report",
+    "info",
+    "doctor",
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

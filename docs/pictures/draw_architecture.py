@@ -35,7 +35,8 @@ ROWS = (
     ),
     (
         ("evaluation", "metrics, alarm, reports", LIBRARY, 2),
-        ("planning", "rollouts, choice of pushes", LIBRARY, 2),
+        ("design", "pushes to record next", LIBRARY, 1.5),
+        ("planning", "rollouts, choice of pushes", LIBRARY, 1.8),
         ("reporting", "pages and pictures", LIBRARY, 1.4),
     ),
     (("models", "VHGP, GP, analytical; effects; tables; model files", LIBRARY, 1),),

@@ -1,4 +1,4 @@
-"""What all commands share: the options --json and --rig, checks of paths, warnings and progress messages."""
+"""What all commands share: options such as --json and --rig, checks of paths, warnings and progress messages."""
 
 from __future__ import annotations
 
@@ -41,6 +41,28 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", type=Path, metavar="FILE.yaml", help="rig file, needed if the data contain no push_rig record"
     )
+
+
+def add_covariate(parser: argparse.ArgumentParser) -> None:
+    """Add the option --covariate; `covariates_of` reads it."""
+    meaning = "a covariate that an extended model needs; may be repeated"
+    parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help=meaning)
+
+
+def covariates_of(options: argparse.Namespace) -> dict[str, float]:
+    """The covariates by name. Raises RequestError for a text that is not NAME=VALUE."""
+    return dict(_covariate(text) for text in options.covariate)
+
+
+def _covariate(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = None
+    if not name or number is None:
+        raise RequestError("--covariate", text, "NAME=VALUE, where VALUE is a number")
+    return name, number
 
 
 def write_json(options: argparse.Namespace, result: Mapping[str, object]) -> bool:

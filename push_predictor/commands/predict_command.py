@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, write_json
-from push_predictor.errors import RequestError
+from push_predictor.commands.output import add_command, add_covariate, covariates_of, write_json
 
 INSIDE = "The push lies within the training data."
 INSIDE_PRIORS = "The push lies within the speeds and angles for which the priors are meant."
@@ -38,8 +37,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--angle", required=True, type=float, metavar="A", help="push angle in rad, from the inward normal"
     )
     parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="duration in s (default %(default)s)")
-    meaning = "a covariate that an extended model needs; may be repeated"
-    parser.add_argument("--covariate", action="append", default=[], metavar="NAME=VALUE", help=meaning)
+    add_covariate(parser)
     parser.add_argument(
         "--interval",
         choices=INTERVAL_KINDS,
@@ -58,8 +56,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.models.store.model_file import load_model
 
     model = load_model(options.model)
-    covariates = dict(_covariate(text) for text in options.covariate)
-    push = PushRequest(options.velocity, options.contact, options.angle, options.duration, covariates)
+    push = PushRequest(options.velocity, options.contact, options.angle, options.duration, covariates_of(options))
     check_request(model, push)
     prediction = model.predict_rows(*push.arrays)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
@@ -83,14 +80,3 @@ def run(options: argparse.Namespace) -> None:
         )
     inside, outside = (INSIDE_PRIORS, OUTSIDE_PRIORS) if model.kind == "prior" else (INSIDE, OUTSIDE)
     print(inside if result["in_domain"] else outside)
-
-
-def _covariate(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        number = float(value)
-    except ValueError:
-        number = None
-    if not name or number is None:
-        raise RequestError("--covariate", text, "NAME=VALUE, where VALUE is a number")
-    return name, number

@@ -21,10 +21,12 @@ PACKAGES = (
     "sensor_msgs", "std_msgs", "std_srvs", "visualization_msgs",
 )  # fmt: skip
 INTERFACES = {
+    "srv.PredictPush.Request": ("velocity", "contact", "angle", "duration", "push_residual"),
     "srv.PredictPush.Response": ("mean", "covariance", "process_covariance", "in_domain"),
     "srv.PredictPushBatch.Response": ("mean", "covariance", "process_covariance", "in_domain"),
     "srv.PredictSliderPose.Response": ("slider_after", "in_domain"),
     "srv.RolloutPushes.Response": ("poses", "samples"),
+    "srv.SuggestPushes.Response": ("velocity", "contact", "angle", "duration", "variance_left"),
     "srv.ListModels.Response": ("names", "descriptions", "default_model"),
     "srv.LoadModel.Response": ("success", "name"),
     "msg.PushResidual": ("predicted", "covariance", "observed", "standardised"),

@@ -1,4 +1,4 @@
-"""The node predict_server: six services and the action trace_residual (docs/reference/predict_server.md)."""
+"""The node predict_server: seven services and the action trace_residual (docs/reference/predict_server.md)."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ from push_predictor.nodes.server.request_frames import RequestFrames
 from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
 from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
 from push_predictor.nodes.server.status import NO_MODEL, server_status
+from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
 from push_predictor.nodes.server.threaded_service import ThreadedService
 from push_predictor.nodes.server.trace_action import TraceAction
 from push_predictor.online.periodic_thread import PeriodicThread
@@ -43,6 +44,7 @@ from push_predictor_interfaces.srv import (
     PredictPushBatch,
     PredictSliderPose,
     RolloutPushes,
+    SuggestPushes,
 )
 
 SERVICE_QOS = QoSProfile(depth=1000)  # the default, 10, loses requests of a client with more in flight
@@ -133,6 +135,7 @@ class PredictServer(LifecycleNode):
                 (PredictPushBatch, "predict_push_batch", self._on_batch),
                 (PredictSliderPose, "predict_slider_pose", self._on_pose),
                 (RolloutPushes, "rollout_pushes", self._on_rollout),
+                (SuggestPushes, "suggest_pushes", self._on_suggest),
                 (ListModels, "list_models", self._on_list),
                 (LoadModel, "load_model", self._on_load),
             )
@@ -198,6 +201,9 @@ class PredictServer(LifecycleNode):
 
     def _on_rollout(self, request: RolloutPushes.Request, response: RolloutPushes.Response) -> RolloutPushes.Response:
         return self._prediction(partial(handle_rollout_pushes, self._check_cancelled, self._frames), request, response)
+
+    def _on_suggest(self, request: SuggestPushes.Request, response: SuggestPushes.Response) -> SuggestPushes.Response:
+        return self._prediction(partial(handle_suggest_pushes, self._check_cancelled), request, response)
 
     def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
         handle_list_models(self._registry, response)

@@ -37,6 +37,7 @@ from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
 from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push_batch
+from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
 
@@ -114,6 +115,44 @@ def test_long_batch_equals_its_parts(server):
     long = np.tile(MANY, (500, 1))
     means = np.array(server.batch(long).mean).reshape(-1, 3)
     np.testing.assert_allclose(means, np.tile(means[: len(MANY)], (500, 1)), rtol=1e-9, atol=1e-12)
+
+
+def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch):
+    """By the correlation at the length of one window. Both covariances shrink with it."""
+    persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
+    monkeypatch.setattr(prediction_services, "persistence_of", lambda model: persistence)
+    registry = ModelRegistry()
+    registry.load(folder / "gp.model")
+    residual = np.array([2e-5, -1e-5, 3e-4])
+    plain, moved = (answered(registry, one) for one in (None, residual))
+    correlation = persistence.correlation(np.array([GOOD[0] * 0.2]))[0]
+    root = root_of(plain.covariance)[0]
+    shift = root @ (correlation * np.linalg.solve(root, residual))
+    np.testing.assert_allclose(moved.mean[0] - plain.mean[0], shift, rtol=1e-6, atol=1e-15)
+    for name in ("covariance", "process_covariance"):
+        shrunk = root_of(getattr(plain, name))[0] * np.sqrt(1.0 - correlation**2)
+        np.testing.assert_allclose(getattr(moved, name)[0], shrunk @ shrunk.T, rtol=1e-6, atol=1e-18)
+
+
+def answered(registry, residual):
+    """The prediction of the usual push, given the residual of the window before."""
+    response = PredictPush.Response()
+    prediction_services.handle_predict_push(registry, query_to_request("gp", GOOD, 0.2, None, residual), response)
+    return prediction_from_response(response)
+
+
+def test_residual_may_be_huge(server):
+    plain, moved = server.push(), server.push(residual=np.full(3, 1e300))
+    assert moved.success
+    sd = np.sqrt(np.array(plain.covariance).reshape(3, 3).diagonal())
+    assert np.all(np.abs(np.array(moved.mean) - np.array(plain.mean)) < 10.0 * sd)
+
+
+@pytest.mark.parametrize("residual", [[0.0], [0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0]])
+def test_rejects_bad_residual(server, residual):
+    response = server.push(residual=np.array(residual))
+    assert not response.success and not np.any(response.mean)
+    assert response.message.startswith(f"push_residual: {residual} is not accepted, give three finite numbers")
 
 
 BAD = [

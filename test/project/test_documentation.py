@@ -47,7 +47,15 @@ NOT_THERE_YET = {  # what the reader is asked to write
     "models/mechanisms/twisting_cable.py",
     "push_predictor/recordings/importers/NAME.py",
 }
-SERVICES = ("predict_push", "predict_push_batch", "predict_slider_pose", "rollout_pushes", "list_models", "load_model")
+SERVICES = (
+    "predict_push",
+    "predict_push_batch",
+    "predict_slider_pose",
+    "rollout_pushes",
+    "suggest_pushes",
+    "list_models",
+    "load_model",
+)
 
 
 def config(node: str) -> dict[str, Any]:

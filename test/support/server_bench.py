@@ -49,8 +49,8 @@ class Server:
     def call(self, name, request):
         return harness.call(self._clients[name], request)
 
-    def push(self, push=GOOD, duration=0.2, model="", covariates=None):
-        return self.call("predict_push", query_to_request(model, np.asarray(push), duration, covariates))
+    def push(self, push=GOOD, duration=0.2, model="", covariates=None, residual=None):
+        return self.call("predict_push", query_to_request(model, np.asarray(push), duration, covariates, residual))
 
     def batch(self, inputs, duration=0.2, model="", covariates=None):
         query = PushQuery(model, np.asarray(inputs, dtype=float).reshape(-1, 3), duration, covariates or {})

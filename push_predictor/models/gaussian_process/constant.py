@@ -56,6 +56,10 @@ class ConstantNoise:
         """Predict f and the noise at inputs (m, D)."""
         return _same_everywhere(self.parameters, self.variance, len(inputs))
 
+    def function_covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (m, m) of f between inputs (m, D): one number."""
+        return np.full((len(inputs), len(inputs)), self.variance)
+
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows; without a function, the rows of a block make no difference."""
         return self.predict(self.inputs)

@@ -85,6 +85,11 @@ class GaussianProcess:
         log_noise = np.full(len(cross), 2.0 * self.parameters.log_noise_sd)
         return LatentPrediction(cross @ self._weights, variance, log_noise, np.zeros(len(cross)))
 
+    def function_covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (m, m) of f between inputs (m, D)."""
+        kernel = self.parameters.kernel
+        return kernel.matrix(inputs) - self._posterior.explained_covariance(kernel.cross(inputs, self.inputs))
+
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
 

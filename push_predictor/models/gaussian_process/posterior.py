@@ -37,3 +37,8 @@ class KernelPosterior:
             return np.array([half @ half])
         half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
         return np.asarray(np.einsum("ij,ij->j", half, half))
+
+    def explained_covariance(self, cross: Array) -> Array:
+        """By how much the observations reduce the prior covariance between m inputs, (m, m); cross (m, n) as above."""
+        half = blas.dtrsm(1.0, self._factor, cross.T, lower=1)
+        return np.asarray(half.T @ half)

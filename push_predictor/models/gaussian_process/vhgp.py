@@ -52,6 +52,11 @@ class VHGP:
             np.maximum(log_noise_variance, self.parameters.nugget + np.finfo(float).eps * noise.variance),
         )
 
+    def function_covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (m, m) of f between inputs (m, D), without the jitter, of which data tell nothing."""
+        kernel = self.parameters.signal
+        return kernel.matrix(inputs) - self._signal.explained_covariance(kernel.cross(inputs, self.inputs))
+
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.
 

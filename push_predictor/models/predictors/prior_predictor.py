@@ -44,16 +44,16 @@ class PriorPredictor(OfFittedMechanics):
 
     def moments(self, push: Push) -> Moments:
         """See Predictor. The covariance is that of the draws plus the process noise."""
-        rows = np.concatenate([self._around, self.draws])
-        covariates = self._used(push.covariates)
-        found = displacements(self._mechanics, self._names, rows, push.inputs, push.duration, covariates)
-        around, drawn = found[:, : len(self._around)], found[:, len(self._around) :]
-        travel = push.inputs[:, 0] * push.duration
-        noise = self.noise.covariance(around, travel, np.full(len(travel), self.physics.support.length))
+        found = self._displacements(np.concatenate([self._around, self.draws]), push)
+        noise, drawn = self._noise(found[:, : len(self._around)], push), found[:, len(self._around) :]
         mean = drawn.mean(axis=1)
         away = drawn - mean[:, None]
         of_parameters = np.einsum("nka,nkb->nab", away, away) / len(self.draws)
         return Moments(mean, of_parameters + noise, noise)
+
+    def process_covariance(self, push: Push) -> Array:
+        """Covariance (n, 3, 3) of the process noise."""
+        return self._noise(self._displacements(self._around, push), push)
 
     def with_scalar_mechanics(self) -> PriorPredictor:
         """See Predictor: itself."""
@@ -71,6 +71,16 @@ class PriorPredictor(OfFittedMechanics):
     def _around(self) -> Array:
         """Parameters (7, p) from which the process noise follows."""
         return ProcessNoise.changed(self._names, np.array(list(self.fitted.values.values())))
+
+    def _noise(self, around: Array, push: Push) -> Array:
+        """Process covariance (n, 3, 3) from displacements (n, 7, 3) under the parameters of `_around`."""
+        travel = push.inputs[:, 0] * push.duration
+        return self.noise.covariance(around, travel, np.full(len(travel), self.physics.support.length))
+
+    def _displacements(self, values: Array, push: Push) -> Array:
+        """Displacements (n, k, 3) of n pushes under k rows (k, p) of parameters."""
+        covariates = self._used(push.covariates)
+        return displacements(self._mechanics, self._names, values, push.inputs, push.duration, covariates)
 
     def _used(self, covariates: Mapping[str, Array]) -> dict[str, Array]:
         return {RECORDING: covariates[RECORDING]} if self.fitted.mechanics.supports else {}

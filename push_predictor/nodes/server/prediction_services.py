@@ -16,12 +16,17 @@ from msg_adapters.predictions import (
     fill_response,
     push_from_request,
     query_from_batch_request,
+    residual_from_request,
 )
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.request import check_request, check_requests
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.request import PushRequest, check_request, check_requests
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
+from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
+from push_predictor.planning.persistence import persistence_of
+from push_predictor.types import Array
 
 MAX_PUSHES = 1_000_000  # per batch: the server needs up to 0.6 kB for each while it answers
 MAX_EXACT = 50_000  # of these outside a table: up to a millisecond each
@@ -34,11 +39,13 @@ class PredictionError(PushPredictorError):
 
 def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) -> None:
     """Fill the response to PredictPush. Raises RequestError or PredictionError."""
-    push = push_from_request(request)
+    push, residual = push_from_request(request), residual_from_request(request)
     tabulated = registry.get(request.model)
     check_request(tabulated.model, push)
     prediction = tabulated.predict_one(push)
     _check_finite(tabulated, prediction, 0)
+    if residual is not None:
+        prediction = _given_residual(tabulated.model, push, prediction, residual)
     fill_response(response, prediction)
 
 
@@ -63,6 +70,15 @@ def handle_predict_push_batch(
         _check_finite(tabulated, prediction, start)
         extend_batch_response(response, prediction)
     response.success = True
+
+
+def _given_residual(model: PushModel, push: PushRequest, prediction: Prediction, residual: Array) -> Prediction:
+    """The prediction for the next window of a push, given the residual (3,) of the window just before.
+
+    That window is taken to have had the same prediction, speed and duration.
+    """
+    earlier = EarlierWindows(prediction, prediction.mean + residual, np.array([push.velocity * push.duration]))
+    return given_earlier(prediction, earlier, persistence_of(model))
 
 
 def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:

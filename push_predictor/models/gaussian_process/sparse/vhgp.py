@@ -52,6 +52,11 @@ class InducedPosterior:
         half = cross @ self.root
         return cross @ self.weights, np.asarray(np.einsum("ij,ij->i", half, half))
 
+    def covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (q, q) between inputs (q, D)."""
+        half = self.kernel.cross(inputs, self.inducing) @ self.root
+        return np.asarray(self.kernel.matrix(inputs) - half @ half.T)
+
 
 class SparseVHGP:
     """A sparse VHGP conditioned on inputs (n, D) and outputs (n,), both standardised by the caller.
@@ -96,6 +101,10 @@ class SparseVHGP:
         variance = np.maximum(of_signal + parameters.jitter - explained, parameters.jitter)
         log_noise_variance = np.maximum(of_noise - noise_explained, _EPSILON * of_noise)
         return LatentPrediction(mean, variance, parameters.noise_mean + log_noise, log_noise_variance)
+
+    def function_covariance(self, inputs: Array) -> Array:
+        """Posterior covariance (q, q) of f between inputs (q, D), without the jitter."""
+        return self.signal.covariance(inputs)
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.

@@ -1,0 +1,138 @@
+"""push_predictor suggest: propose the pushes that a model learns most from."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from push_predictor.commands.output import (
+    add_command,
+    add_covariate,
+    add_rig,
+    check_data,
+    check_output,
+    check_seed,
+    covariates_of,
+    progress,
+    write_json,
+    write_text,
+)
+from push_predictor.errors import RequestError
+
+if TYPE_CHECKING:
+    from push_predictor.design.batch import Suggested
+    from push_predictor.design.limits import Limits
+    from push_predictor.models.push_model import PushModel
+    from push_predictor.models.pushes import Pushes
+
+COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the sub-command `suggest`."""
+    parser = add_command(
+        commands,
+        "suggest",
+        "Propose the pushes that a model learns most from. They most reduce what its uncertain mean function costs in "
+        "log predictive density. Without a model, --rig gives a slider that nobody has pushed yet.",
+        "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
+    )
+    parser.add_argument("model", type=Path, nargs="?", metavar="MODEL", help="a model file")
+    parser.add_argument("--count", type=int, default=20, metavar="N", help="number of pushes (default %(default)s)")
+    two, of_training = ("LOW", "HIGH"), "default: those of the training pushes"
+    parser.add_argument("--speed", type=float, nargs=2, metavar=two, help=f"pusher speeds in m/s ({of_training})")
+    parser.add_argument(
+        "--angle", type=float, nargs=2, metavar=two, help="push angles in rad (default: ±1, or those of training)"
+    )
+    parser.add_argument(
+        "--travel", type=float, default=0.03, metavar="D", help="length of each push in m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--exclude",
+        type=float,
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("FROM", "TO"),
+        help="contacts that the robot cannot push, as fractions of the perimeter; may be repeated",
+    )
+    parser.add_argument(
+        "--transfer-speed",
+        type=float,
+        metavar="V",
+        help="speed in m/s of the tip around the slider between pushes: choose by the gain per second",
+    )
+    parser.add_argument(
+        "--matter",
+        type=Path,
+        metavar="DATA",
+        help="recording or table of the pushes that matter (default: all possible)",
+    )
+    add_covariate(parser)
+    parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of the candidates (default 0)")
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE.csv", help="output: the pushes, in order")
+    add_rig(parser)
+    parser.set_defaults(run=run, call_is_wrong=parser.error)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Check the call, choose the pushes, write them and print the first."""
+    from push_predictor.design.batch import suggest_pushes
+
+    if (options.model is None) == (options.rig is None):
+        options.call_is_wrong("give either MODEL or --rig FILE.yaml")
+    check_seed(options.seed)
+    check_output("--out", options.out)
+    limits, model = _limits(options), _model(options)
+    matter = None if options.matter is None else _matter(options.matter, model)
+    with progress("suggest"):
+        found = suggest_pushes(
+            model, options.count, limits, matter=matter, covariates=covariates_of(options), seed=options.seed
+        )
+    rows = _rows(found)
+    lines = [",".join(COLUMNS), *(",".join(f"{value:.6g}" for value in row) for row in rows)]
+    write_text(options.out, "\n".join(lines) + "\n")
+    pushes = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+    if not write_json(options, {"model": model.name, "pushes": pushes}):
+        print(f"{options.out}: {len(found)} pushes for {model.name}")
+        print(f"Expected to leave {100.0 * found.variance_left[-1]:.0f} % of the variance of the mean function.")
+
+
+def _limits(options: argparse.Namespace) -> Limits:
+    """The robot's limits; an error names the option."""
+    from push_predictor.design.limits import Limits
+
+    speed, angle = (None if pair is None else (pair[0], pair[1]) for pair in (options.speed, options.angle))
+    excluded = tuple((begin, end) for begin, end in options.exclude)
+    return Limits(speed, angle, options.travel, excluded, options.transfer_speed)
+
+
+def _model(options: argparse.Namespace) -> PushModel:
+    """The model of the file, or a prior model of the rig."""
+    from push_predictor.models.store.model_file import load_model
+    from push_predictor.models.train import train_model
+    from push_predictor.recordings.rig import load_rig
+    from push_predictor.recordings.table import empty_table
+
+    if options.model is not None:
+        return load_model(options.model)
+    return train_model(empty_table(), load_rig(options.rig), "prior", name=options.rig.stem)
+
+
+def _matter(path: Path, model: PushModel) -> Pushes:
+    from push_predictor.models.pushes import Pushes
+    from push_predictor.recordings.load import load_data
+
+    check_data([path])
+    table = load_data([path], model.rig)
+    if not len(table):
+        raise RequestError("--matter", str(path), "a recording or table with at least one window")
+    velocity, contact, angle = table.inputs.T
+    return Pushes(velocity, contact, angle, table.duration)
+
+
+def _rows(found: Suggested) -> list[list[float]]:
+    """The values of COLUMNS of each push."""
+    columns = (*found.inputs.T, found.duration, found.variance_left)
+    return [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]

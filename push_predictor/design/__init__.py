@@ -1,0 +1,5 @@
+"""Experimental design: which pushes to record next so that a model learns most.
+
+batch.py has the entry, `suggest_pushes`. The other modules are its steps: the pushes that a robot can make, the windows
+that they last, what a model is unsure of there, and what a push would add to its knowledge.
+"""

@@ -1,0 +1,182 @@
+"""The batch of pushes that a model learns most from.
+
+Greedy selection: each push is the one that most reduces what is left of the expected loss when the pushes before it are
+known. A learnt model without mechanics begins with pushes that are spread evenly: from fewer pushes, its
+hyperparameters are not known well enough to choose by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.blas_threads import one_blas_thread
+from push_predictor.design.candidates import Courses, candidate_pushes, courses
+from push_predictor.design.features import features_of
+from push_predictor.design.information import Information
+from push_predictor.design.limits import Limits
+from push_predictor.errors import RequestError
+from push_predictor.models.mechanics.parameter_update import CORRELATION
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.predictors import GaussianProcessPredictor, PriorPredictor
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Pushes
+from push_predictor.models.request import check_requests
+from push_predictor.planning.persistence import Persistence, persistence_of
+from push_predictor.types import Array, IntArray
+
+CANDIDATES, MATTER = 256, 128  # pushes
+MOST_PUSHES = 1000
+FIRST = 10  # pushes that are spread evenly; docs/results/suggest.md compares this start with others
+
+
+@dataclass(frozen=True, eq=False)
+class Suggested:
+    """k pushes in the order in which to make them.
+
+    inputs (k, 3: velocity m/s, contact, angle rad) at first touch; duration (k,) of each whole push, s; variance_left
+    (k,): expected share of the mean function's variance, over the pushes that matter and in units of noise, that is
+    left after each.
+    """
+
+    inputs: Array
+    duration: Array
+    variance_left: Array
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+@one_blas_thread()
+def suggest_pushes(
+    model: PushModel,
+    count: int,
+    limits: Limits = Limits(),
+    *,
+    matter: Pushes | None = None,
+    covariates: Mapping[str, float] | None = None,
+    seed: int = 0,
+    check_cancelled: Callable[[], None] | None = None,
+) -> Suggested:
+    """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
+
+    The cost is in log predictive density: the process noise, which no push reduces, is no part of it. It is the mean
+    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. Then the pushes up to the
+    tenth of a learnt model without mechanics, those that it was trained on included, are spread evenly. covariates: of
+    all pushes, as an extended model needs them. seed: of the candidates. check_cancelled is called before each push and
+    may raise. Raises RequestError that names the field.
+    """
+    if not 1 <= count <= MOST_PUSHES:
+        raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
+    inputs = candidate_pushes(model, limits, CANDIDATES, seed)
+    relevant = _matter(model, limits, seed) if matter is None else Push(matter.inputs, matter.duration, {})
+    tried = courses(model, inputs, limits.travel)
+    found = information_of(model, tried, relevant, covariates or {})
+    before = found.variance
+    evenly = _spread_evenly(model, count) if matter is None else []
+    order, variances = greedy(found, count, evenly, _seconds(model, inputs, limits), check_cancelled)
+    return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
+
+
+def information_of(
+    model: PushModel, tried: Courses, matter: Push, covariates: Mapping[str, float] | None = None
+) -> Information:
+    """What candidates would tell a model about the pushes that matter. Raises RequestError for a missing covariate."""
+    windows, count = tried.windows, len(tried.inputs)
+    inputs = np.concatenate([windows.inputs, matter.inputs])
+    both = Push(inputs, np.concatenate([windows.duration, matter.duration]), {})
+    values = features_of(model, _with_covariates(model, both, covariates or {})).values
+    q, cut = values.shape[2], len(windows.inputs)
+    candidates = values[:cut].reshape(count, -1, 3, q) * tried.kept[:, :, None, None]
+    return Information(candidates.reshape(count, -1, q), _noise(model, tried), values[cut:].reshape(-1, q))
+
+
+def greedy(
+    information: Information,
+    count: int,
+    first: Sequence[int] = (),
+    seconds: Callable[[int | None], Array] | None = None,
+    check_cancelled: Callable[[], None] | None = None,
+) -> tuple[IntArray, Array]:
+    """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
+
+    first: candidates to begin with. seconds: time (c,) that each candidate takes after the last chosen one (None at
+    first); the largest reduction per second is chosen. Without it, the largest reduction. check_cancelled is called
+    before each choice and may raise.
+    """
+    order, variances = np.empty(count, dtype=np.int64), np.empty(count)
+    last: int | None = None
+    for k in range(count):
+        if check_cancelled is not None:
+            check_cancelled()
+        last = first[k] if k < len(first) else _best(information.gains(), None if seconds is None else seconds(last))
+        information.observe(last)
+        order[k], variances[k] = last, information.variance
+    return order, variances
+
+
+def _spread_evenly(model: PushModel, count: int) -> list[int]:
+    """Indices of candidates, at most `count`, which follow a Sobol' sequence: its points of the pushes up to FIRST."""
+    base = model.predictor.base
+    if not isinstance(base, GaussianProcessPredictor) or base.mean is not None:
+        return []
+    known = len(model.training.pushes)
+    return list(range(known, min(known + count, FIRST)))
+
+
+def _best(gains: Array, seconds: Array | None) -> int:
+    return int(np.argmax(gains if seconds is None else gains / seconds))
+
+
+def _matter(model: PushModel, limits: Limits, seed: int) -> Push:
+    """Windows evenly over what the robot can do, others than the candidates."""
+    inputs = candidate_pushes(model, limits, MATTER, seed + 1)
+    return Push(inputs, np.full(len(inputs), model.usual_duration), {})
+
+
+def _with_covariates(model: PushModel, push: Push, given: Mapping[str, float]) -> Push:
+    """The same covariates for all pushes. Raises RequestError for a push that the model cannot predict."""
+    covariates = {name: np.full(len(push.inputs), given[name]) for name in model.needs if name in given}
+    check_requests(model, push.inputs, push.duration, covariates)
+    return Push(push.inputs, push.duration, covariates)
+
+
+def _noise(model: PushModel, tried: Courses) -> Array:
+    """Covariance (c, 3 w, 3 w) of the outcomes of each candidate given the mean function, in units of their noise.
+
+    The windows of a push share a part of their error, so that more windows of one push tell little.
+    """
+    count, w = tried.kept.shape
+    both = tried.kept[:, :, None] & tried.kept[:, None]
+    correlation = _persistence(model).correlation(tried.distance.ravel()).reshape(count, w, w, 3)
+    correlation = np.where(both[..., None], correlation, 0.0)
+    correlation[:, np.arange(w), np.arange(w)] = 1.0
+    noise = np.zeros((count, w, 3, w, 3))
+    for k in range(3):
+        noise[:, :, k, :, k] = correlation[..., k]
+    return noise.reshape(count, 3 * w, 3 * w)
+
+
+def _persistence(model: PushModel) -> Persistence:
+    """Of errors along a push; for a prior model that with which it takes in further pushes."""
+    if isinstance(model.predictor.base, PriorPredictor):
+        return Persistence(np.full(3, CORRELATION), np.zeros(3), np.ones(3))
+    return persistence_of(model)
+
+
+def _seconds(model: PushModel, inputs: Array, limits: Limits) -> Callable[[int | None], Array] | None:
+    """Time (c,) of each push after another: its own, and that of the tip around the outline before it."""
+    if limits.transfer_speed is None:
+        return None
+    own, contact, perimeter = limits.travel / inputs[:, 0], inputs[:, 1], model.rig.outline.perimeter
+    speed = limits.transfer_speed
+
+    def seconds(last: int | None) -> Array:
+        if last is None:
+            return np.asarray(own)
+        away = np.abs(contact - contact[last])
+        return np.asarray(own + np.minimum(away, 1.0 - away) * perimeter / speed)
+
+    return seconds

@@ -1,0 +1,100 @@
+"""`push_predictor suggest`: the table that it writes, its options, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import noisy_pushes, square_rig
+
+from push_predictor.cli import main
+from push_predictor.commands.suggest_command import COLUMNS
+from push_predictor.design.batch import suggest_pushes
+from push_predictor.design.limits import Limits
+from push_predictor.models.store.model_file import load_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.table_file import write_table
+from push_predictor.types import Array
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model file, a rig file, and a table of pushes that matter."""
+    folder = tmp_path_factory.mktemp("suggest")
+    table = noisy_pushes(60)
+    train_model(table, square_rig(), "gp", name="square").save(folder / "gp.pushmodel")
+    save_rig(square_rig(), folder / "rig.yaml")
+    write_table(folder / "steep.csv", table.take(table.inputs[:, 2] > 0.6))
+    return folder
+
+
+def written(path: Path) -> dict[str, Array]:
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert tuple(rows[0]) == COLUMNS
+    return {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
+
+
+def test_writes_the_suggested_pushes_in_order(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = folder / "new" / "pushes.csv"
+    assert main(["suggest", str(folder / "gp.pushmodel"), "--count", "4", "--out", str(out), "--seed", "3"]) == 0
+    expected = suggest_pushes(load_model(folder / "gp.pushmodel"), 4, seed=3)
+    found = written(out)
+    np.testing.assert_allclose(np.column_stack([found[n] for n in COLUMNS[:3]]), expected.inputs, rtol=1e-5)
+    np.testing.assert_allclose(found["duration"], 0.03 / found["velocity"], rtol=1e-5)
+    np.testing.assert_allclose(found["variance_left"], expected.variance_left, rtol=1e-5)
+    printed = capsys.readouterr().out
+    assert "4 pushes for square" in printed
+    assert f"leave {100.0 * expected.variance_left[-1]:.0f} % of the variance" in printed
+
+
+def test_keeps_to_the_limits_without_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    limits = ["--speed", "0.03", "0.05", "--angle", "-0.2", "0.4", "--travel", "0.02", "--exclude", "0.5", "1.0"]
+    call = ["suggest", "--rig", str(folder / "rig.yaml"), "--count", "3", "--transfer-speed", "0.1", *limits]
+    assert main([*call, "--out", str(folder / "first.csv"), "--json", "-"]) == 0
+    found, shown = written(folder / "first.csv"), json.loads(capsys.readouterr().out)
+    assert shown["model"] == "rig" and len(shown["pushes"]) == 3
+    for name in COLUMNS:
+        np.testing.assert_allclose([push[name] for push in shown["pushes"]], found[name], rtol=1e-5)
+    model = train_model(noisy_pushes(1).take(np.array([], dtype=int)), square_rig(), "prior", name="rig")
+    same = suggest_pushes(model, 3, Limits((0.03, 0.05), (-0.2, 0.4), 0.02, ((0.5, 1.0),), 0.1))
+    np.testing.assert_allclose(np.column_stack([found[n] for n in COLUMNS[:3]]), same.inputs, rtol=1e-5)
+    np.testing.assert_allclose(found["duration"] * found["velocity"], 0.02, rtol=1e-5)
+
+
+def test_the_pushes_that_matter_may_be_given(folder: Path) -> None:
+    out = folder / "steep_pushes.csv"
+    matter = ["--matter", str(folder / "steep.csv")]
+    assert main(["suggest", str(folder / "gp.pushmodel"), "--count", "3", *matter, "--out", str(out)]) == 0
+    assert np.all(written(out)["angle"] > 0.2)
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "words"),
+    [
+        (["MODEL", "--rig", "RIG"], 2, "either MODEL or --rig"),
+        ([], 2, "either MODEL or --rig"),
+        (["MODEL", "--count", "0"], 1, "count: 0"),
+        (["MODEL", "--speed", "0.05", "0.02"], 1, "speed: (0.05, 0.02)"),
+        (["MODEL", "--matter", "nowhere.csv"], 1, "nowhere.csv: no such file"),
+        (["MODEL", "--covariate", "warmth"], 1, "--covariate: 'warmth'"),
+        (["MODEL", "--seed", "-1"], 1, "--seed: -1"),
+        (["nowhere.pushmodel"], 1, "nowhere.pushmodel"),
+    ],
+)
+def test_what_is_wrong_is_named(
+    folder: Path, capsys: pytest.CaptureFixture[str], options: list[str], status: int, words: str
+) -> None:
+    names = {"MODEL": str(folder / "gp.pushmodel"), "RIG": str(folder / "rig.yaml")}
+    out = folder / "never.csv"
+    try:
+        ended = main(["suggest", *(names.get(word, word) for word in options), "--out", str(out)])
+    except SystemExit as end:
+        ended = int(end.code or 0)
+    assert ended == status and words in capsys.readouterr().err
+    assert not out.exists()

@@ -1,0 +1,60 @@
+"""The limits of a robot: what is refused, and which contacts may be pushed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import square_pushes
+
+from push_predictor.design.limits import Limits
+from push_predictor.errors import RequestError
+from push_predictor.models.push_model import USUAL_SPEED, PushModel
+from push_predictor.models.train import train_model
+from push_predictor.recordings.table import empty_table
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("speed", (0.0, 0.1)),
+        ("speed", (0.1, 0.05)),
+        ("speed", (0.1, np.inf)),
+        ("speed", (np.nan, 0.1)),
+        ("angle", (-1.6, 0.0)),
+        ("angle", (0.0, 1.6)),
+        ("angle", (0.5, 0.4)),
+        ("travel", 0.0),
+        ("travel", 1.1),
+        ("transfer_speed", 0.0),
+        ("transfer_speed", np.inf),
+        ("excluded", ((-0.1, 0.2),)),
+        ("excluded", ((0.1, 1.2),)),
+        ("excluded", ((0.0, 0.995),)),
+    ],
+)
+def test_a_value_out_of_range_is_refused_by_name(field: str, value: Any) -> None:
+    with pytest.raises(RequestError, match=field):
+        Limits(**{field: value})
+
+
+def test_excluded_contacts_are_not_allowed() -> None:
+    limits = Limits(excluded=((0.2, 0.3), (0.9, 0.1)))
+    contact = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.85, 0.9, 0.95])
+    allowed = [False, False, False, True, False, False, False, True, True, False, False]
+    assert limits.allows(contact).tolist() == allowed
+
+
+def test_by_default_speeds_are_those_of_training_and_angles_at_least_one_radian() -> None:
+    table, rig = square_pushes(30)
+    model = train_model(table, rig, "analytical", name="m")
+    assert Limits().ranges(model) == ((0.02, 0.02), (-1.0, 1.0))
+    model.training.inputs[0] = [0.01, 0.1, 1.3]
+    assert Limits().ranges(model) == ((0.01, 0.02), (-1.0, 1.3))
+    assert Limits(speed=(0.1, 0.2), angle=(-0.2, 0.1)).ranges(model) == ((0.1, 0.2), (-0.2, 0.1))
+
+
+def test_an_untrained_model_is_pushed_at_the_usual_speed() -> None:
+    model: PushModel = train_model(empty_table(), square_pushes(1)[1], "prior", name="m")
+    assert Limits().ranges(model) == ((USUAL_SPEED, USUAL_SPEED), (-1.0, 1.0))

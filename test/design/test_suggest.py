@@ -1,0 +1,233 @@
+"""Suggested pushes: within the limits, where the model knows least, and fewer where the windows of a push agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drifting_models import extended, slippery
+from drifting_models import pushes as drifting_pushes
+from synthetic import noisy_pushes, square_rig
+
+from push_predictor.design.batch import FIRST, _seconds, _spread_evenly, information_of, suggest_pushes
+from push_predictor.design.candidates import Courses, candidate_pushes, courses
+from push_predictor.design.limits import Limits
+from push_predictor.errors import RequestError
+from push_predictor.models.mechanics.parameter_update import CORRELATION
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.pushes import Pushes
+from push_predictor.models.train import TrainingOptions, train_model
+from push_predictor.models.train_learnt import MeanChoice
+from push_predictor.planning.persistence import persistence_of
+from push_predictor.recordings.table import PushTable, concatenate, empty_table
+from push_predictor.simulation.outcomes import push_outcomes
+from push_predictor.simulation.pushes import PushPlan
+from push_predictor.simulation.spec import SimulationSpec, simulated_rig
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def untrained() -> PushModel:
+    return train_model(empty_table(), square_rig(), "prior", name="before")
+
+
+@pytest.fixture(scope="module")
+def learnt() -> PushModel:
+    return train_model(noisy_pushes(90), square_rig(), "gp", name="gp")
+
+
+def few_pushes(count: int, mean: MeanChoice = "zero") -> PushModel:
+    """A GP of so many pushes."""
+    table = noisy_pushes(90)
+    rows = table.take(np.isin(table.push_id, table.pushes[:count]))
+    return train_model(rows, square_rig(), "gp", name="few", options=TrainingOptions(mean=mean))
+
+
+def one_side(table: PushTable) -> PushTable:
+    """The windows with a positive angle."""
+    return table.take(table.inputs[:, 2] > 0.0)
+
+
+class TestCandidates:
+    def test_fill_the_limits_evenly(self, learnt: PushModel) -> None:
+        limits = Limits(speed=(0.02, 0.06), angle=(-0.5, 0.9), excluded=((0.25, 0.5),))
+        found = candidate_pushes(learnt, limits, 300)
+        assert found.shape == (300, 3)
+        np.testing.assert_allclose(found.min(axis=0), [0.02, 0.0, -0.5], atol=0.02)
+        np.testing.assert_allclose(found.max(axis=0), [0.06, 1.0, 0.9], atol=0.02)
+        assert limits.allows(found[:, 1]).all()
+        assert np.histogram(found[:, 1], 4, (0.0, 1.0))[0] == pytest.approx([100, 0, 100, 100], abs=8)
+
+    def test_differ_by_seed_only(self, learnt: PushModel) -> None:
+        first, same, other = (candidate_pushes(learnt, Limits(), 50, seed) for seed in (0, 0, 1))
+        assert np.array_equal(first, same) and not np.array_equal(first, other)
+
+    def test_follow_the_slider_as_the_simulator_moves_it(self) -> None:
+        plan = PushPlan(np.array([0.1, 0.4, 0.7]), np.array([0.2, -0.5, 0.0]), np.full(3, 0.02), np.full(3, 0.03))
+        spec = SimulationSpec("rect1", "abs", plan)
+        table = push_outcomes(spec)
+        model = train_model(empty_table(), simulated_rig(spec), "prior", name="m")
+        first = np.array([table.inputs[table.push_id == push][0] for push in ("0", "1", "2")])
+        found = courses(model, first, 0.03)
+        assert found.kept.sum(axis=1).tolist() == [7, 7, 7]
+        for k, push in enumerate(("0", "1", "2")):
+            rows = table.inputs[table.push_id == push]
+            last = len(rows) - 1
+            np.testing.assert_allclose(found.inputs[k, last, 1:], rows[last, 1:], atol=0.08)
+            assert np.abs(found.inputs[k, last] - found.inputs[k, 0]).max() > 0.01 or k == 2
+
+    def test_of_other_speeds_have_other_numbers_of_windows(self, untrained: PushModel) -> None:
+        inputs = np.array([[0.02, 0.1, 0.0], [0.05, 0.1, 0.0], [0.2, 0.1, 0.0]])
+        found = courses(untrained, inputs, 0.03)
+        assert found.kept.sum(axis=1).tolist() == [7, 3, 1]
+        np.testing.assert_array_equal(found.windows.inputs.reshape(3, 7, 3)[2], np.tile(inputs[2], (7, 1)))
+        np.testing.assert_allclose(found.distance[1, 0], 0.01 * np.arange(7))
+
+    def test_end_where_the_tip_leaves_the_slider(self, untrained: PushModel) -> None:
+        found = courses(untrained, np.array([[0.05, 0.01, 1.35]]), 0.1)
+        assert 1 <= found.kept.sum() < 10
+        assert not np.any(np.diff(found.kept[0].astype(int)) > 0)
+
+
+class TestSuggestedPushes:
+    def test_are_within_the_limits(self, untrained: PushModel) -> None:
+        limits = Limits(speed=(0.02, 0.06), angle=(-0.5, 0.9), travel=0.02, excluded=((0.25, 0.5),))
+        found = suggest_pushes(untrained, 8, limits)
+        assert len(found) == 8 and limits.allows(found.inputs[:, 1]).all()
+        assert np.all((found.inputs[:, 0] >= 0.02) & (found.inputs[:, 0] <= 0.06))
+        assert np.all((found.inputs[:, 2] >= -0.5) & (found.inputs[:, 2] <= 0.9))
+        np.testing.assert_allclose(found.duration * found.inputs[:, 0], 0.02)
+
+    def test_leave_less_and_less_variance(self, untrained: PushModel) -> None:
+        left = suggest_pushes(untrained, 8).variance_left
+        assert left[-1] > 0.0 and left[0] < 1.0 and np.all(np.diff(left) < 0.0)
+
+    def test_of_a_learnt_model_are_spread_evenly_up_to_the_tenth(self, untrained: PushModel) -> None:
+        known, short = few_pushes(7), Limits(travel=0.004)
+        expected = candidate_pushes(known, short, 64)
+        found = suggest_pushes(known, 4, short).inputs
+        np.testing.assert_array_equal(found[:3], expected[7:FIRST])
+        assert not np.array_equal(found[3], expected[FIRST])
+        chosen = suggest_pushes(known, 1, short, matter=Pushes(0.03, 0.1, 0.3))
+        assert not np.array_equal(chosen.inputs[0], expected[7])
+        assert _spread_evenly(known, 2) == [7, 8]
+        assert _spread_evenly(few_pushes(FIRST), 5) == []
+        assert _spread_evenly(few_pushes(7, mean="mechanics"), 5) == []
+        assert _spread_evenly(untrained, 5) == []
+
+    def test_are_where_the_model_was_not_trained(self) -> None:
+        known = train_model(one_side(noisy_pushes(200)), square_rig(), "gp", name="one side")
+        found = suggest_pushes(known, 5, Limits(angle=(-1.0, 1.0)))
+        assert np.mean(found.inputs[:, 2] < 0.0) >= 0.8
+        assert 0.0 < found.variance_left[-1] < found.variance_left[0] < 1.0
+
+    def test_are_where_it_matters(self, learnt: PushModel) -> None:
+        rng = np.random.default_rng(0)
+        matter = Pushes(0.03, 0.05 + 0.1 * rng.random(50), 0.8 + 0.1 * rng.random(50))
+        found = suggest_pushes(learnt, 4, matter=matter)
+        assert np.all(found.inputs[:, 2] > 0.3)
+
+    def test_predict_how_much_variance_the_outcomes_remove(self, learnt: PushModel) -> None:
+        """The share that is left is that of a model with the same hyperparameters and the suggested windows."""
+        rows = learnt.training
+        inputs = candidate_pushes(learnt, Limits(travel=0.002), 40)
+        tried = courses(learnt, inputs, 0.002)
+        assert tried.kept.shape[1] == 1
+        matter = Push(candidate_pushes(learnt, Limits(), 64, 5), np.full(64, 0.2), {})
+        found = information_of(learnt, tried, matter)
+        before = found.variance
+        found.observe(7)
+        more = PushTable(tried.inputs[7], np.full(1, 0.2), np.zeros((1, 3)), np.array(["new"]))
+        after = _retold(learnt, concatenate([replace(rows, covariates={}), more]))
+        ratios = [_latent(model, matter) for model in (after, learnt)]
+        assert found.variance / before == pytest.approx(ratios[0] / ratios[1], abs=0.01)
+        assert found.variance / before < 0.99
+
+    def test_windows_of_a_push_tell_less_than_as_many_pushes(self, untrained: PushModel) -> None:
+        inputs = np.array([[0.02, 0.1, 0.3]])
+        windows = courses(untrained, inputs, 0.016)
+        matter = Push(candidate_pushes(untrained, Limits(), 64), np.full(64, 0.2), {})
+        together = information_of(untrained, windows, matter)
+        w = windows.kept.shape[1]
+        assert w == 4
+        noise = together.noise[0].reshape(w, 3, w, 3)
+        np.testing.assert_allclose(noise[0, 1, 2, 1], CORRELATION)
+        np.testing.assert_allclose(noise[0, 1, 0, 1], 1.0)
+        assert noise[0, 1, 2, 0] == 0.0
+
+    def test_the_windows_of_a_learnt_model_correlate_as_its_residuals_do(self) -> None:
+        known = train_model(drifting_pushes(60), square_rig(), "gp", name="shared")
+        tried = courses(known, np.array([[0.02, 0.1, 0.3]]), 0.012)
+        found = information_of(known, tried, Push(tried.inputs[0], np.full(3, 0.2), {}))
+        noise = found.noise[0].reshape(3, 3, 3, 3)
+        expected = persistence_of(known).correlation(np.array([0.008]))[0]
+        assert expected.max() > 0.05
+        np.testing.assert_allclose([noise[0, k, 2, k] for k in range(3)], expected)
+
+    def test_a_window_that_a_push_lacks_tells_nothing(self, learnt: PushModel) -> None:
+        inputs = np.array([[0.02, 0.1, 0.3]])
+        windows = courses(learnt, inputs, 0.012)
+        longer = Courses(
+            np.concatenate([windows.inputs, windows.inputs[:, :1]], axis=1),
+            np.concatenate([windows.kept, [[False]]], axis=1),
+            windows.duration,
+        )
+        matter = Push(candidate_pushes(learnt, Limits(), 64), np.full(64, 0.2), {})
+        gains = [information_of(learnt, one, matter).gains() for one in (windows, longer)]
+        np.testing.assert_allclose(*gains, rtol=0.02)
+
+    def test_with_a_transfer_speed_the_way_around_the_slider_counts(self, untrained: PushModel) -> None:
+        inputs = np.array([[0.02, 0.1, 0.0], [0.03, 0.3, 0.0], [0.02, 0.9, 0.0]])
+        seconds = _seconds(untrained, inputs, Limits(travel=0.03, transfer_speed=0.1))
+        assert seconds is not None
+        np.testing.assert_allclose(seconds(None), [1.5, 1.0, 1.5])
+        perimeter = untrained.rig.outline.perimeter
+        np.testing.assert_allclose(seconds(0), [1.5, 1.0 + 2.0 * perimeter, 1.5 + 2.0 * perimeter])
+        assert _seconds(untrained, inputs, Limits()) is None
+        near = suggest_pushes(untrained, 6, Limits(transfer_speed=0.005))
+        far = suggest_pushes(untrained, 6)
+        assert _way(near.inputs[:, 1]) < 0.5 * _way(far.inputs[:, 1])
+
+    def test_an_extended_model_needs_its_covariates(self) -> None:
+        table = drifting_pushes(40)
+        model = extended(train_model(table, square_rig(), "gp", name="base"), slippery(0.1, 0.05))
+        with pytest.raises(RequestError, match="covariate elapsed_time"):
+            suggest_pushes(model, 2)
+        assert len(suggest_pushes(model, 2, covariates={"elapsed_time": 900.0})) == 2
+
+    @pytest.mark.parametrize("count", [0, 1001])
+    def test_a_wrong_count_is_refused(self, untrained: PushModel, count: int) -> None:
+        with pytest.raises(RequestError, match="count"):
+            suggest_pushes(untrained, count)
+
+    def test_pushes_that_matter_must_be_predictable(self, learnt: PushModel) -> None:
+        with pytest.raises(RequestError, match="duration"):
+            suggest_pushes(learnt, 1, matter=Pushes(0.03, 0.1, 0.0, duration=3.0))
+
+
+def _way(contact: np.ndarray) -> float:
+    """Fractions of the perimeter that the tip passes from push to push."""
+    away = np.abs(np.diff(contact))
+    return float(np.sum(np.minimum(away, 1.0 - away)))
+
+
+def _retold(model: PushModel, rows: PushTable) -> PushModel:
+    """The model with the same hyperparameters and scaling, conditioned on other rows."""
+    from push_predictor.models.gaussian_process.gp import GaussianProcess
+
+    predictor = model.predictor
+    features = predictor.scaling.features(model.rig.outline, rows.inputs)  # type: ignore[attr-defined]
+    regressions = tuple(
+        GaussianProcess(features, np.zeros(len(rows)), one.parameters)
+        for one in predictor.regressions  # type: ignore[attr-defined]
+    )
+    return replace(model, predictor=replace(predictor, regressions=regressions))  # type: ignore[type-var]
+
+
+def _latent(model: PushModel, push: Push) -> float:
+    """Mean variance of the functions in units of noise."""
+    latent = model.predictor.latent(push.inputs)  # type: ignore[attr-defined]
+    return float(np.mean([one.variance / one.process_variance for one in latent]))

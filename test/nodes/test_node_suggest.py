@@ -1,0 +1,106 @@
+"""The service suggest_pushes of predict_server."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_harness as harness
+from synthetic import square_pushes, square_rig
+
+from push_predictor.design.batch import Suggested, suggest_pushes
+from push_predictor.design.limits import Limits
+from push_predictor.errors import RequestError
+from push_predictor.models.store.model_file import load_model, save_model
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.train import train_model
+from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
+from push_predictor.recordings.table import empty_table
+from push_predictor_interfaces.srv import SuggestPushes
+
+Ask = Callable[..., SuggestPushes.Response]
+ARRAYS = ("velocity", "contact", "angle", "duration", "variance_left")
+LIMITS = {"speed": [0.02, 0.04], "angle": [-0.3, 0.5], "travel": 0.02, "excluded": [0.2, 0.4, 0.9, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A GP of the square, a prior model of it, and an analytical model, which learns nothing."""
+    place = tmp_path_factory.mktemp("models")
+    for kind in ("gp", "analytical"):
+        save_model(train_model(*square_pushes(60), kind, name=kind), place / f"{kind}.model")
+    save_model(train_model(empty_table(), square_rig(), "prior", name="prior"), place / "prior.model")
+    return place
+
+
+@pytest.fixture(scope="module")
+def ask(folder: Path) -> Iterator[Ask]:
+    """A function from the fields of a request to the response."""
+    domain = harness.free_domain()
+    params = {"models": [str(folder)], "default_model": "gp"}
+    running = harness.node_process("predict_server", domain=domain, params=params)
+    with running, harness.ros_context(domain) as node:
+        client = node.create_client(SuggestPushes, "suggest_pushes")
+        yield lambda **fields: harness.call(client, SuggestPushes.Request(**{"count": 3, **fields}))
+
+
+def assert_equal(response: SuggestPushes.Response, expected: Suggested) -> None:
+    assert response.success, response.message
+    columns = (*expected.inputs.T, expected.duration, expected.variance_left)
+    for name, column in zip(ARRAYS, columns, strict=True):
+        np.testing.assert_allclose(getattr(response, name), column, rtol=1e-6)
+
+
+def test_response_equals_the_librarys_pushes(ask: Ask, folder: Path) -> None:
+    assert_equal(ask(), suggest_pushes(load_model(folder / "gp.model"), 3))
+
+
+def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> None:
+    limits = Limits((0.02, 0.04), (-0.3, 0.5), 0.02, ((0.2, 0.4), (0.9, 0.1)), 0.05)
+    expected = suggest_pushes(load_model(folder / "prior.model"), 4, limits, seed=2**63)
+    response = ask(model="prior", count=4, transfer_speed=0.05, seed=2**63, **LIMITS)
+    assert_equal(response, expected)
+    assert list(response.contact) != list(ask(model="prior", count=4, seed=2**63, **LIMITS).contact)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"count": 0}, "count: 0 is not accepted, give an integer from 1 to 1000"),
+        ({"count": 1001}, "count: 1001"),
+        ({"speed": [0.02]}, "speed length: 1 is not accepted, give 2 values, or none"),
+        ({"angle": [0.0, 0.1, 0.2, 0.3]}, "angle length: 4"),
+        ({"speed": [0.05, 0.02]}, "speed: (0.05, 0.02)"),
+        ({"angle": [0.0, np.nan]}, "angle: (0.0, nan)"),
+        ({"travel": 0.0}, "travel: 0.0"),
+        ({"excluded": [0.1, 0.2, 0.3]}, "excluded length: 3 is not accepted, give an even number of values"),
+        ({"excluded": [0.0, 1.0]}, "excluded: ((0.0, 1.0),)"),
+        ({"transfer_speed": -0.1}, "transfer_speed: -0.1"),
+        ({"transfer_speed": np.nan}, "transfer_speed: nan"),
+        ({"covariate_names": ["elapsed_time"]}, "covariate_values length: 0"),
+        ({"model": "analytical"}, "model: 'analytical' is not accepted, give one with something to learn"),
+        ({"model": "other"}, "model: 'other' is not accepted, give one of analytical, gp, prior"),
+    ],
+)
+def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any], message: str) -> None:
+    response = ask(**fields)
+    assert not response.success and response.message.startswith(message)
+    assert not len(response.velocity)
+
+
+def test_a_long_request_ends_with_the_node(folder: Path) -> None:
+    registry = ModelRegistry()
+    registry.load(folder / "prior.model")
+    asked: list[int] = []
+
+    def check_cancelled() -> None:
+        asked.append(len(asked))
+        if len(asked) == 3:
+            raise RequestError("node", "closing", "no more requests")
+
+    with pytest.raises(RequestError, match="closing"):
+        handle_suggest_pushes(check_cancelled, registry, SuggestPushes.Request(count=500), SuggestPushes.Response())
+    assert len(asked) == 3
