@@ -19,6 +19,7 @@ import numpy as np
 
 from push_predictor.errors import RequestError
 from push_predictor.planning.belief import Beliefs, after_displacement, certain
+from push_predictor.planning.choose import SMALLEST_PUSH
 from push_predictor.planning.cost_to_go import CostToGo, cost_to_go
 from push_predictor.planning.repertoire import Repertoire, StraightPushes
 from push_predictor.planning.scene import Scene
@@ -32,6 +33,7 @@ PER_LENGTH = 16  # pushes tried of each number of windows, over the whole beam
 SCREENED = 15  # times as many are compared by their means first
 SAME_PLACE, SAME_HEADING = 0.003, 0.05  # m, rad: of pushes with means this close the least noisy is tried
 WEIGHTS = (0.0, 0.5, 2.0)  # pushes for one standard deviation of an average push: some options are quick, some sure
+CAUTIONS = (1.0, 0.2)  # weights of risk and noise in the beam; the second if the first finds no sequence
 FINALISTS = 8  # sequences judged again
 PUSH_COST = 0.02  # probability that one push less is worth
 TIE = 1e-3  # probability for one push of remaining distance to the target's middle
@@ -76,18 +78,13 @@ def plan_around_obstacles(
     _check(scene, slider, risk, margin, most_pushes)
     margin = min(margin, 0.999 * float(scene.clearance(slider)))
     search = _Search(repertoire, scene, target, margin, observed)
-    beam, done = certain(slider, search.draws), []
-    for depth in range(1, most_pushes + 1):
-        tried = search.grown(beam)
-        tried = tried.take(tried.risk <= risk)
-        done += list(zip(search.scores(tried).tolist(), tried.rows.tolist(), strict=True))
-        if not len(tried) or max(done)[0] >= 1.0 - PUSH_COST * (depth + 1):
-            break
-        beam = tried.take(search.promising(tried))
-    finalists = [rows for score, rows in sorted(done, reverse=True)[:FINALISTS] if score > -PUSH_COST * len(rows)]
-    plans = [search.judged(slider, rows) for rows in finalists]
-    plans = [plan for plan in plans if plan.risk[-1] <= risk and plan.probability > 0.0]
-    return max(plans, key=lambda plan: plan.probability - PUSH_COST * len(plan.pushes), default=None)
+    for caution in CAUTIONS if search.draws > 1 else CAUTIONS[:1]:
+        finalists = search.finalists(slider, risk, most_pushes, caution)
+        plans = [search.judged(slider, rows) for rows in finalists]
+        plans = [plan for plan in plans if plan.risk[-1] <= risk and plan.probability > 0.0]
+        if plans:
+            return max(plans, key=lambda plan: plan.probability - PUSH_COST * len(plan.pushes))
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +105,20 @@ class _Search:
         """Costs to the target in pushes of the repertoire."""
         return _costs(self.repertoire, self.scene, self.target)
 
+    def finalists(self, slider: Array, risk: float, most_pushes: int, caution: float) -> list[list[int]]:
+        """The rows of the sequences with the largest scores, found with a beam of that caution."""
+        beam = certain(slider, self.draws)
+        done: list[tuple[float, list[int]]] = []
+        for depth in range(1, most_pushes + 1):
+            tried = self.grown(beam)
+            tried = tried.take(tried.risk <= risk)
+            done += zip(self.scores(tried).tolist(), tried.rows.tolist(), strict=True)
+            if not len(tried) or max(done)[0] >= 1.0 - PUSH_COST * (depth + 1):
+                break
+            beam = tried.take(self.promise(tried, caution).argsort(kind="stable")[:BEAM])
+        best = sorted(done, reverse=True)[:FINALISTS]
+        return [rows for score, rows in best if score > -PUSH_COST * len(rows)]
+
     def grown(self, beam: Beliefs) -> Beliefs:
         """The beliefs after one more push of the screened candidates."""
         parents, rows = self._screened(beam.mean)
@@ -123,11 +134,11 @@ class _Search:
         distance, turn = self.target.remaining(tried.mean)
         return np.asarray(score - TIE * (distance / self.costs.longest + turn / self.costs.widest))
 
-    def promising(self, tried: Beliefs) -> IntArray:
-        """The sequences to extend: those with the fewest expected further pushes, risk counted as pushes."""
-        ahead = self.costs.at(tried.samples[:, :16]).mean(axis=1) + tried.risk / PUSH_COST
-        variance = 0.0 if self.observed else tried.samples.var(axis=1)
-        return _chosen(ahead, _noise(self.repertoire, variance) * np.ones(len(ahead)), BEAM)
+    def promise(self, tried: Beliefs, caution: float) -> Array:
+        """Expected further pushes (n,), with risk and noise counted as pushes: the beam keeps the smallest."""
+        ahead = self.costs.at(tried.samples[:, :16]).mean(axis=1)
+        noise = 0.0 if self.observed else _noise(self.repertoire, tried.samples.var(axis=1))
+        return np.asarray(ahead + caution * (noise + tried.risk / PUSH_COST))
 
     def judged(self, slider: Array, rows: list[int]) -> PlannedPushes:
         """A sequence with new samples."""
@@ -173,8 +184,8 @@ class _Search:
 
 @lru_cache(maxsize=4)
 def _costs(repertoire: Repertoire, scene: Scene, target: Target) -> CostToGo:
-    longest = np.hypot(*repertoire.mean[:, :2].T).max()
-    return cost_to_go(scene, target, float(longest), float(np.abs(repertoire.mean[:, 2]).max()))
+    longest, widest = np.hypot(*repertoire.mean[:, :2].T).max(), np.abs(repertoire.mean[:, 2]).max()
+    return cost_to_go(scene, target, max(float(longest), SMALLEST_PUSH), max(float(widest), SMALLEST_PUSH))
 
 
 @lru_cache(maxsize=4)
@@ -183,7 +194,7 @@ def _by_length(repertoire: Repertoire) -> list[BoolArray]:
     return [repertoire.pushes.windows == count for count in np.unique(repertoire.pushes.windows)]
 
 
-def _noise(repertoire: Repertoire, variance: Array | float) -> Array:
+def _noise(repertoire: Repertoire, variance: Array) -> Array:
     """Standard deviations (n,) over those of an average push, of variances (n, 3)."""
     average = np.einsum("nii->i", repertoire.covariance) / len(repertoire)
     return np.asarray(np.sqrt((variance / np.maximum(average, FLOOR)).mean(axis=-1)))

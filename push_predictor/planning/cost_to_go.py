@@ -40,10 +40,10 @@ class CostToGo:
 
     def at(self, poses: Array) -> Array:
         """Estimated number of pushes (...) from poses (..., 3) to the target, at least that of a straight way."""
-        place = (poses - self.low) / self.cell
-        place[..., 2] %= self.costs.shape[2]
+        place = (poses.reshape(-1, 3) - self.low) / self.cell
+        place[:, 2] %= self.costs.shape[2]
         extended = np.concatenate([self.costs, self.costs[..., :1]], axis=2)
-        around = map_coordinates(extended, np.moveaxis(place, -1, 0), order=1, mode="nearest")
+        around = map_coordinates(extended, place.T, order=1, mode="nearest").reshape(poses.shape[:-1])
         distance, turn = self.target.remaining(poses)
         return np.asarray(np.maximum(around, distance / self.longest + turn / self.widest))
 
