@@ -28,11 +28,12 @@ from push_predictor.planning.unscented import FLOOR
 from push_predictor.types import Array, BoolArray, IntArray
 
 SEARCH_DRAWS, FINAL_DRAWS = 64, 512  # the first a power of two up to 256, for Sobol points
-BEAM = 16  # sequences kept of each length
-PER_LENGTH = 16  # pushes tried of each number of windows, over the whole beam
+BEAM = 12  # sequences kept of each length
+PER_LENGTH = 24  # pushes tried of each number of windows, over the whole beam
 SCREENED = 15  # times as many are compared by their means first
 SAME_PLACE, SAME_HEADING = 0.003, 0.05  # m, rad: of pushes with means this close the least noisy is tried
 WEIGHTS = (0.0, 0.5, 2.0)  # pushes for one standard deviation of an average push: some options are quick, some sure
+NOISE_COST = 0.3  # pushes for a standard deviation of an average push, in a belief
 CAUTIONS = (1.0, 0.2)  # weights of risk and noise in the beam; the second if the first finds no sequence
 FINALISTS = 8  # sequences judged again
 PUSH_COST = 0.02  # probability that one push less is worth
@@ -115,7 +116,8 @@ class _Search:
             done += zip(self.scores(tried).tolist(), tried.rows.tolist(), strict=True)
             if not len(tried) or max(done)[0] >= 1.0 - PUSH_COST * (depth + 1):
                 break
-            beam = tried.take(self.promise(tried, caution).argsort(kind="stable")[:BEAM])
+            ahead = self.costs.at(tried.samples[:, :16]).mean(axis=1) + caution * self.penalty(tried)
+            beam = tried.take(ahead.argsort(kind="stable")[:BEAM])
         best = sorted(done, reverse=True)[:FINALISTS]
         return [rows for score, rows in best if score > -PUSH_COST * len(rows)]
 
@@ -134,11 +136,10 @@ class _Search:
         distance, turn = self.target.remaining(tried.mean)
         return np.asarray(score - TIE * (distance / self.costs.longest + turn / self.costs.widest))
 
-    def promise(self, tried: Beliefs, caution: float) -> Array:
-        """Expected further pushes (n,), with risk and noise counted as pushes: the beam keeps the smallest."""
-        ahead = self.costs.at(tried.samples[:, :16]).mean(axis=1)
+    def penalty(self, tried: Beliefs) -> Array:
+        """Risk and noise (n,) counted as pushes."""
         noise = 0.0 if self.observed else _noise(self.repertoire, tried.samples.var(axis=1))
-        return np.asarray(ahead + caution * (noise + tried.risk / PUSH_COST))
+        return np.asarray(NOISE_COST * noise + tried.risk / PUSH_COST)
 
     def judged(self, slider: Array, rows: list[int]) -> PlannedPushes:
         """A sequence with new samples."""
@@ -171,14 +172,17 @@ class _Search:
     def _nearest(self, poses: Array, rows: IntArray) -> tuple[IntArray, IntArray]:
         after = after_displacement(poses[:, None], self.repertoire.mean[rows]).reshape(-1, 3)
         costs = self.costs.at(after)
-        kept = np.argsort(costs, kind="stable")[: SCREENED * PER_LENGTH]
+        each = min(len(rows), SCREENED * PER_LENGTH // len(poses) + 1)
+        nearest = np.argsort(costs.reshape(len(poses), -1), axis=1, kind="stable")[:, :each]
+        kept = (nearest + len(rows) * np.arange(len(poses))[:, None]).ravel()
         kept = kept[self.scene.safe(after[kept], self.margin)]
         noise = _noise(self.repertoire, np.einsum("nii->ni", self.repertoire.covariance[rows]))[kept % len(rows)]
         places = np.rint(after[kept] / np.array([SAME_PLACE, SAME_PLACE, SAME_HEADING]))
         order = np.lexsort((costs[kept], noise))
         kept, noise = kept[order], noise[order]
         first = np.unique(places[order], axis=0, return_index=True)[1]
-        kept = kept[first][_chosen(costs[kept[first]], noise[first], PER_LENGTH)]
+        kept, noise = kept[first], noise[first]
+        kept = kept[_chosen(costs[kept], noise, kept // len(rows), PER_LENGTH)]
         return kept // len(rows), rows[kept % len(rows)]
 
 
@@ -200,14 +204,26 @@ def _noise(repertoire: Repertoire, variance: Array) -> Array:
     return np.asarray(np.sqrt((variance / np.maximum(average, FLOOR)).mean(axis=-1)))
 
 
-def _chosen(costs: Array, noise: Array, count: int) -> IntArray:
-    """Indices of up to `count` of n options: for each weight of the noise an equal share of the cheapest."""
+def _chosen(costs: Array, noise: Array, parents: IntArray, count: int) -> IntArray:
+    """Indices of up to `count` of n options: for each weight of the noise an equal share, the cheapest of each parent.
+
+    Parents take turns.
+    """
     chosen: list[int] = []
     for share, weight in enumerate(WEIGHTS, 1):
         order = np.argsort(costs + weight * noise, kind="stable")
+        order = order[np.argsort(_ranks(parents[order]), kind="stable")]
         new = order[~np.isin(order, chosen)]
         chosen += new[: count * share // len(WEIGHTS) - len(chosen)].tolist()
     return np.array(chosen, dtype=np.int64)
+
+
+def _ranks(groups: IntArray) -> IntArray:
+    """How many earlier entries (n,) have the same group."""
+    order = np.argsort(groups, kind="stable")
+    ranks = np.empty(len(groups), dtype=np.int64)
+    ranks[order] = np.arange(len(groups)) - np.searchsorted(groups[order], groups[order])
+    return ranks
 
 
 def _check(scene: Scene, slider: Array, risk: float, margin: float, most_pushes: int) -> None:
