@@ -38,6 +38,7 @@ from push_predictor.simulation.spec import SimulationSpec
 from push_predictor.types import Array
 
 WINDOWS = (2, 4, 6, 8, 12, 16)  # 8 to 64 mm
+MOST = 8  # pushes of a plan
 LOOSEST = 0.5  # risk above which no plan is made
 MARGINS = (0.0, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02)  # m, without uncertainty
 PIECE = 50  # problems in lockstep
@@ -75,9 +76,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     model = load_model(options.model) if options.model else trained()
     variants = {name: of for name, of in repertoires(model).items() if name in options.variants}
     tasks = [task for task in TASKS if task.name in options.tasks]
-    for first in range(*options.problems, PIECE):
+    start, stop = options.problems
+    for first in range(start, stop, PIECE):
         for task in tasks:
-            numbers = range(first, min(first + PIECE, options.problems[1]))
+            numbers = range(first, min(first + PIECE, stop))
             _run_piece(options.out / "runs.jsonl", task, numbers, variants, model)
     return 0
 
@@ -123,19 +125,22 @@ def _keys(of: Repertoire) -> dict[tuple[float, ...], int]:
 
 def plan(task: Task, of: Repertoire, problem: Problem, slider: Array) -> tuple[PlannedPushes, dict[str, float]] | None:
     """The plan from where the slider is, and what it promises; without uncertainty that with the largest margin."""
-    if of.covariance.any():
-        found = plan_around_obstacles(
-            of, problem.scene, slider, problem.target, LOOSEST, observed=task.observed, most_pushes=8
+
+    def planned(**options: float) -> PlannedPushes | None:
+        return plan_around_obstacles(
+            of, problem.scene, slider, problem.target, LOOSEST, observed=task.observed, most_pushes=MOST, **options
         )
-        return found and (found, {"risk": float(found.risk[-1]), "probability": found.probability})
-    best, low, high = None, 0, len(MARGINS)
+
+    if of.covariance.any():
+        found = planned()
+        return None if found is None else (found, {"risk": float(found.risk[-1]), "probability": found.probability})
+    best: tuple[PlannedPushes, float] | None = None
+    low, high = 0, len(MARGINS)
     while low < high:
         middle = (low + high) // 2
-        found = plan_around_obstacles(
-            of, problem.scene, slider, problem.target, LOOSEST, margin=MARGINS[middle], most_pushes=8
-        )
-        best, low, high = (best, low, middle) if found is None else ((found, middle), middle + 1, high)
-    return best and (best[0], {"margin": MARGINS[best[1]], "probability": best[0].probability})
+        found = planned(margin=MARGINS[middle])
+        best, low, high = (best, low, middle) if found is None else ((found, MARGINS[middle]), middle + 1, high)
+    return None if best is None else (best[0], {"margin": best[1], "probability": best[0].probability})
 
 
 def _run_piece(path: Path, task: Task, numbers: range, variants: Mapping[str, Repertoire], model: PushModel) -> None:

@@ -8,9 +8,10 @@ given share of the odd ones fails, and the reverse. Intervals: 95 %, from resamp
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,14 +52,14 @@ def tables(path: Path) -> str:
 
 def _common(rows: Sequence[dict[str, object]]) -> dict[str, Runs]:
     """Runs by variant, of the problems that every variant has run."""
-    found: dict[str, dict[int, dict]] = {}
+    found: dict[str, dict[int, dict[str, Any]]] = {}
     for row in rows:
         found.setdefault(str(row["variant"]), {})[int(str(row["problem"]))] = row
     numbers = sorted(set.intersection(*(set(of) for of in found.values())))
     return {name: _runs([of[number] for number in numbers]) for name, of in found.items()}
 
 
-def _runs(rows: Sequence[dict]) -> Runs:
+def _runs(rows: Sequence[dict[str, Any]]) -> Runs:
     first = [row["promised"][0] if row["promised"] else {} for row in rows]
     doubt = [max((said.get("risk", -said.get("margin", 0.0)) for said in row["promised"]), default=1.0) for row in rows]
     return Runs(
@@ -87,7 +88,12 @@ def _attempted(runs: Mapping[str, Runs]) -> str:
             _interval(100.0 * (of.failed.astype(float) - base.failed)),
             _interval((of.pushes - base.pushes)[both], 2),
         ]
-        cells = [name, _interval(100.0 * of.reached), _interval(100.0 * of.failed), f"{100.0 * other.mean():.0f}"]
+        cells = [
+            name,
+            _interval(100.0 * of.reached.astype(float)),
+            _interval(100.0 * of.failed.astype(float)),
+            f"{100.0 * other.mean():.0f}",
+        ]
         lines.append(f"| {' | '.join(cells + (['–'] * 3 if of is base else more))} |")
     return "\n".join(lines)
 
@@ -104,9 +110,9 @@ def _calibration(runs: Mapping[str, Runs]) -> str:
         cells = [
             name,
             risk,
-            _interval(100.0 * of.failed[tried]),
+            _interval(100.0 * of.failed[tried].astype(float)),
             f"{100.0 * of.promised[tried].mean():.0f}",
-            _interval(100.0 * of.reached[tried]),
+            _interval(100.0 * of.reached[tried].astype(float)),
             _ranked(of),
         ]
         lines.append(f"| {' | '.join(cells)} |")
@@ -126,10 +132,9 @@ def _equal_risk(runs: Mapping[str, Runs], risk: float) -> str:
     lines = [
         f"At most {100.0 * risk:g} % failed on the tuning problems:",
         "",
-        "| covariance | reached, % | failed, % | reached more than constant, points | more per failure point |",
+        "| covariance | reached, % | failed, % | reached more than constant, points |",
         "|---" * 4 + "|",
     ]
-    lines[2] = "| covariance | reached, % | failed, % | reached more than constant, points |"
     accepted = {name: _accepted(of, risk) for name, of in runs.items()}
     base = (runs[BASE].reached & accepted[BASE]).astype(float)
     for name, of in runs.items():
@@ -155,18 +160,12 @@ def _threshold(doubt: Array, failed: BoolArray, risk: float) -> float:
     return float(max(candidates, default=-np.inf))
 
 
-def _interval(values: Array, digits: int = 1, of: Callable[..., Array] = np.mean) -> str:
+def _interval(values: Array | BoolArray, digits: int = 1) -> str:
     """Mean with its 95 % interval."""
     if not len(values):
         return "–"
     rng = np.random.default_rng(0)
-    drawn = of(values[rng.integers(0, len(values), (DRAWS, len(values)))], axis=1)
+    drawn = values[rng.integers(0, len(values), (DRAWS, len(values)))].mean(axis=1)
     low, high = np.percentile(drawn, [2.5, 97.5])
-    text = f"{np.mean(values):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    text = f"{values.mean():.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
     return text.replace("-", "−")
-
-
-if __name__ == "__main__":
-    import sys
-
-    print(tables(Path(sys.argv[1])))

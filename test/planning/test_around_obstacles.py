@@ -175,7 +175,8 @@ def test_part_of_a_displacement_lies_on_the_arc():
 
 
 @pytest.mark.parametrize(("changes", "field"), [
-    ({"risk": 0.0}, "risk"), ({"risk": 1.0}, "risk"), ({"margin": -0.001}, "margin"), ({"most_pushes": 0}, "most_pushes"),
+    ({"risk": 0.0}, "risk"), ({"risk": 1.0}, "risk"), ({"margin": -0.001}, "margin"),
+    ({"most_pushes": 0}, "most_pushes"),
     ({"slider": np.array([0.0, np.nan, 0.0])}, "slider"), ({"slider": np.zeros(2)}, "slider"),
     ({"slider": np.array([0.31, 0.0, 0.0])}, "slider"),
 ])  # fmt: skip
