@@ -95,11 +95,11 @@ TASKS = (
         10,
         lambda rng, outline: _edge(rng, outline, (0.012, 0.03), (0.17, 0.24), (0.004, 0.01), 0.2),
     ),
-    Task("gate, fixed plan", False, 6, lambda rng, outline: _gate(rng, outline, (0.02, 0.06), (0.09, 0.12), 0.04)),
+    Task("gate, fixed plan", False, 8, lambda rng, outline: _gate(rng, outline, (0.02, 0.06), (0.09, 0.12), 0.04)),
     Task(
         "edge, fixed plan",
         False,
-        6,
+        8,
         lambda rng, outline: _edge(rng, outline, (0.02, 0.05), (0.10, 0.16), (0.012, 0.024), 0.4),
     ),
 )
