@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.planning.planner import IDLE, VELOCITY, WINDOW, trained
 from benchmarks.planning.risk_table import tables
-from benchmarks.planning.risk_tasks import TASKS, Problem, Task, problem
+from benchmarks.planning.risk_tasks import TASKS, Problem, Task, inner_target, problem
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
@@ -40,7 +40,7 @@ from push_predictor.types import Array
 WINDOWS = (2, 4, 6, 8, 12, 16)  # 8 to 64 mm
 MOST = 8  # pushes of a plan
 LOOSEST = 0.5  # risk above which no plan is made
-MARGINS = (0.0, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02)  # m, without uncertainty
+MARGINS = (0.0, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.03, 0.04, 0.05)  # m, without uncertainty
 PIECE = 50  # problems in lockstep
 SEED = 7
 STRIDE = 10  # steps of the simulator between two checks: less than half a millimetre
@@ -124,11 +124,13 @@ def _keys(of: Repertoire) -> dict[tuple[float, ...], int]:
 
 
 def plan(task: Task, of: Repertoire, problem: Problem, slider: Array) -> tuple[PlannedPushes, dict[str, float]] | None:
-    """The plan from where the slider is, and what it promises; without uncertainty that with the largest margin."""
+    """The plan from where the slider is, and what it promises; without uncertainty that with the largest margin from
+    obstacles, edges and the target's bounds."""
 
-    def planned(**options: float) -> PlannedPushes | None:
+    def planned(margin: float = 0.0) -> PlannedPushes | None:
+        target = inner_target(problem.target, margin)
         return plan_around_obstacles(
-            of, problem.scene, slider, problem.target, LOOSEST, observed=task.observed, most_pushes=MOST, **options
+            of, problem.scene, slider, target, LOOSEST, margin=margin, observed=task.observed, most_pushes=MOST
         )
 
     if of.covariance.any():
@@ -138,7 +140,7 @@ def plan(task: Task, of: Repertoire, problem: Problem, slider: Array) -> tuple[P
     low, high = 0, len(MARGINS)
     while low < high:
         middle = (low + high) // 2
-        found = planned(margin=MARGINS[middle])
+        found = planned(MARGINS[middle])
         best, low, high = (best, low, middle) if found is None else ((found, MARGINS[middle]), middle + 1, high)
     return None if best is None else (best[0], {"margin": best[1], "probability": best[0].probability})
 

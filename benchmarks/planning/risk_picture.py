@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 OUT = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "planning_risk.png"
 TASK = TASKS[2]
 RUNS = 40
+CLOUD = 200  # samples shown
+SPREAD = 1e-6  # m, rad; below it a plan was made without uncertainty
 GOAL_COLOUR, WALL_COLOUR = "#009E73", "#8a8a8a"
 SHOWN = (-0.19, 0.19, -0.13, 0.13)  # m
 
@@ -50,7 +52,7 @@ class Repeats:
 def main(arguments: list[str] | None = None) -> int:
     """Plan, repeat and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--problem", type=int, default=0)
+    parser.add_argument("--problem", type=int, default=485)
     parser.add_argument("--model", type=Path, help="a model of bags/square_abs_train (default: train one)")
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args(arguments)
@@ -66,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(
             f"{name}: {len(found[0].pushes)} pushes, {pair[-1].failed.sum()} failed, {pair[-1].reached.sum()} reached"
         )
-    draw(options.out, (7.6, 3.5), lambda figure: _paint(figure, shown, pair))
+    draw(options.out, (7.6, 3.8), lambda figure: _paint(figure, shown, pair))
     return 0
 
 
@@ -84,17 +86,22 @@ def repeated(found: PlannedPushes, shown: Problem) -> Repeats:
 
 
 def _paint(figure: Figure, shown: Problem, pair: list[Repeats]) -> None:
-    for axes, repeats, name in zip(figure.subplots(1, 2, sharey=True), pair, ("Without", "With"), strict=True):
+    for axes, repeats, name in zip(figure.subplots(1, 2, sharey=True), pair, ("without", "with"), strict=True):
         _scene(axes, shown)
         _plan(axes, shown, repeats)
         axes.set_title(
-            f"{name} uncertainty: {len(repeats.plan.pushes)} pushes\n"
+            f"Planned {name} uncertainty: {len(repeats.plan.pushes)} pushes\n"
             f"{repeats.reached.sum()} of {RUNS} runs reach the region, {repeats.failed.sum()} hit the wall",
             loc="left",
         )
         axes.label_outer()
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    named = {
+        label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    legend = figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=3, markerscale=1.5)
+    for handle in legend.legend_handles:
+        if handle is not None:
+            handle.set_alpha(0.4 if handle.get_label() == "region for the slider's centre" else 1.0)
 
 
 def _scene(axes: Axes, shown: Problem) -> None:
@@ -104,7 +111,7 @@ def _scene(axes: Axes, shown: Problem) -> None:
         circle = np.linspace(0.0, 2.0 * np.pi, 80)
         ring = shown.target.goal.distance * np.column_stack([np.cos(circle), np.sin(circle)])
         centre = shown.target.goal.pose[:2]
-        axes.fill(*(1e3 * (centre + ring).T), color=GOAL_COLOUR, alpha=0.25, label="region for the centre")
+        axes.fill(*(1e3 * (centre + ring).T), color=GOAL_COLOUR, alpha=0.25, label="region for the slider's centre")
     low_x, high_x, low_y, high_y = (1e3 * value for value in SHOWN)
     axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)", xlim=(low_x, high_x), ylim=(low_y, high_y))
 
@@ -112,13 +119,24 @@ def _scene(axes: Axes, shown: Problem) -> None:
 def _plan(axes: Axes, shown: Problem, repeats: Repeats) -> None:
     vertices = shown.scene.outline.vertices
     _outline(axes, vertices, repeats.plan.poses[0], color="black", linewidth=1.4, label="start")
-    for count, pose in enumerate(repeats.plan.poses[1:]):
-        _outline(axes, vertices, pose, color=PREDICTED, linewidth=0.8, label="predicted" if count == 0 else None)
+    for pose in repeats.plan.poses[1:-1]:
+        _outline(axes, vertices, pose, color=PREDICTED, linewidth=0.7, alpha=0.4)
+    _outline(
+        axes, vertices, repeats.plan.poses[-1], color=PREDICTED, linewidth=1.2, label="planned: slider after each push"
+    )
+    if repeats.plan.samples[-1].std() > SPREAD:
+        cloud = 1e3 * repeats.plan.samples[-1][:CLOUD, :2].T
+        axes.plot(*cloud, ".", color=PREDICTED, markersize=1.5, alpha=0.4, label="predicted: end of a run")
     good, bad = repeats.ends[~repeats.failed], repeats.ends[repeats.failed]
-    axes.plot(*(1e3 * good[:, :2].T), ".", color=OBSERVED, markersize=5, label="centre at the end of a run")
+    axes.plot(*(1e3 * good[:, :2].T), ".", color=OBSERVED, markersize=5, label="simulated: end of a run")
     if len(bad):
-        axes.plot(*(1e3 * bad[:, :2].T), "x", color="#c0203a", markersize=5, label="centre before the wall was hit")
-    axes.plot(*(1e3 * repeats.plan.poses[:, :2].T), color=PREDICTED, linewidth=0.8, linestyle=":")
+        axes.plot(
+            *(1e3 * bad[:, :2].T),
+            "x",
+            color="#c0203a",
+            markersize=6,
+            label="simulated: the next push hits the wall",
+        )
 
 
 def _outline(axes: Axes, vertices: Array, pose: Array, **style: Any) -> None:

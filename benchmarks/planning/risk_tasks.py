@@ -7,7 +7,8 @@ edge so that a part of the slider hangs over it, both among obstacles.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,6 +50,19 @@ def problem(task: Task, number: int, outline: Outline) -> Problem:
         drawn = task.draw(rng, outline)
         if drawn.scene.clearance(drawn.start) > START_CLEARANCE:
             return drawn
+
+
+@lru_cache(maxsize=1000)
+def inner_target(target: Target, margin: float) -> Target:
+    """The target without its rim of that width (m); at least a quarter of its width remains."""
+    if margin == 0.0:
+        return target
+    if isinstance(target, PoseTarget):
+        goal = target.goal
+        return PoseTarget(Goal(goal.pose, max(goal.distance - margin, 0.25 * goal.distance), goal.turn, goal.symmetry))
+    if isinstance(target, Overhang):
+        return replace(target, least=target.least + min(margin, 0.375 * (HALF - target.least)))
+    raise TypeError(f"no inner target of {type(target).__name__}")
 
 
 def box(x_from: float, x_to: float, y_from: float, y_to: float) -> Array:
