@@ -11,7 +11,7 @@ from scipy.stats import norm
 from push_predictor.errors import RequestError
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.planning.around_obstacles import plan_around_obstacles
-from push_predictor.planning.belief import after_displacement, partial_displacement
+from push_predictor.planning.belief import after_displacement, certain, partial_displacement
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.repertoire import Repertoire, StraightPushes
 from push_predictor.planning.scene import Scene
@@ -124,6 +124,50 @@ def test_sure_push_is_chosen_near_an_obstacle_and_the_bound_is_kept():
     noisy = made_up([[0.05, 0.0, 0.0]], [0.0, 0.005, 0.0])
     assert plan_around_obstacles(noisy, scene, START, region(-0.05, 0.0), 0.1) is None
     assert plan_around_obstacles(noisy, scene, START, region(-0.05, 0.0), 0.3).risk[0] < 0.3
+
+
+def test_bound_is_kept_with_new_samples():
+    scene = Scene(SQUARE, TABLE, [box(-0.2, 0.2, 0.05, 0.2)])
+    plans = []
+    for sd in np.linspace(0.0028, 0.0038, 11):
+        pushes = made_up([[0.05, 0.0, 0.0]], [0.0, sd, 0.0])
+        plans.append(plan_around_obstacles(pushes, scene, START, region(-0.05, 0.0), 0.07, most_pushes=1))
+    assert plans[0] is not None and plans[-1] is None
+    assert all(plan.risk[-1] <= 0.07 for plan in plans if plan is not None)
+
+
+def test_risky_sequences_do_not_crowd_out_a_safe_one():
+    """Nine quick pushes that touch with probability 0.07; seven slow ones are safe and score less."""
+    scene = Scene(SQUARE, TABLE, [box(-0.2, 0.2, 0.05, 0.2)])
+    quick = [[0.026 + 0.004 * k, 0.0, 0.0] for k in range(9)]
+    pushes = made_up([*quick, [0.0025, 0.0, 0.0]], [*[[0.0, 0.0034, 0.0]] * 9, [0.0, 0.0, 0.0]])
+    plan = plan_around_obstacles(pushes, scene, START, region(-0.058, 0.0, 0.025), 0.03)
+    assert labels(plan) == [9] * 7
+
+
+def test_pushes_of_a_sequence_are_independent():
+    """Two pushes: the sd of the end is that of one times the root of 2, not times 2, already in the search."""
+    sd, bound = 0.004, 0.035
+    scene = Scene(SQUARE, TABLE, [box(-0.3, 0.3, 0.045 + 2.3 * np.sqrt(2.0) * sd, 0.2)])
+    one = made_up([[0.05, 0.0, 0.0]], [0.0, sd, 0.0])
+    plan = plan_around_obstacles(one, scene, START, region(0.0, 0.0, 0.04), bound)
+    assert len(plan.pushes) == 2 and plan.risk[-1] < bound < norm.cdf(-2.3 / np.sqrt(2.0))
+
+
+def test_push_without_a_gain_is_not_added():
+    pushes = made_up([[0.05, 0.0, 0.0], [0.0001, 0.0, 0.0]], [[0.0, 0.008, 0.0], [0.0, 0.0, 0.0]])
+    plan = plan_around_obstacles(pushes, Scene(SQUARE, TABLE), START, region(-0.05, 0.0, 0.01))
+    assert labels(plan) == [0] and plan.probability < 0.9
+
+
+def test_slider_that_has_touched_stays_failed():
+    scene = Scene(SQUARE, TABLE, [box(0.0, 0.02, -0.2, 0.2)])
+    there, back = np.array([0.1, 0.0, 0.0]), np.array([-0.1, 0.0, 0.0])
+    belief = certain(START, 2)
+    for moved in (there, back):
+        belief = belief.pushed(np.array([0]), moved[None], np.tile(moved, (1, 2, 1)), scene, 0.0)
+    np.testing.assert_allclose(belief.mean[0], START)
+    assert belief.risk[0] == 1.0
 
 
 def test_motion_between_start_and_end_counts():

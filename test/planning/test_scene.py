@@ -106,3 +106,13 @@ def test_costs_lead_around_an_obstacle():
     start, before_gap = np.array([-0.1, 0.1, 0.0]), np.array([0.01, -0.21, 0.0])
     assert around.at(start) > np.hypot(0.11, 0.31) / 0.05
     assert around.at(before_gap) < around.at(start) - 4.0
+
+
+def test_costs_are_periodic_in_the_heading():
+    """Of a square that any heading suits, by a quarter turn."""
+    wall = np.array([[0.0, -0.11], [0.02, -0.11], [0.02, 0.2], [0.0, 0.2]])
+    costs = cost_to_go(Scene(SQUARE, TABLE, [wall]), PoseTarget(Goal(np.array([0.1, 0.0, 0.0]), 0.01)), 0.05, 0.5)
+    poses = np.random.default_rng(2).uniform([-0.05, -0.2, 0.0], [0.05, 0.0, 1.5], (50, 3))
+    for turn in (-np.pi / 2.0, np.pi / 2.0, 2.0 * np.pi):
+        np.testing.assert_allclose(costs.at(poses + [0.0, 0.0, turn]), costs.at(poses), atol=1e-9)
+    assert np.ptp(costs.at(np.column_stack([np.zeros(10), np.full(10, -0.15), np.linspace(0.0, 1.5, 10)]))) > 0.1
