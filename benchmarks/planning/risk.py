@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.planning.planner import IDLE, VELOCITY, WINDOW, trained
-from benchmarks.planning.risk_table import tables
+from benchmarks.planning.risk_table import VARIANTS, tables
 from benchmarks.planning.risk_tasks import TASKS, Problem, Task, inner_target, problem
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
@@ -44,7 +44,6 @@ MARGINS = (0.0, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.03, 0.04, 0.05)  # m,
 PIECE = 50  # problems in lockstep
 SEED = 7
 STRIDE = 10  # steps of the simulator between two checks: less than half a millimetre
-VARIANTS = ("none", "constant", "input-dependent, independent", "input-dependent, push effects")
 
 
 @dataclass

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.planning.planner import WINDOW, trained
-from benchmarks.planning.risk import SEED, STRIDE, VARIANTS, plan, repertoires
+from benchmarks.planning.risk import SEED, STRIDE, plan, repertoires
+from benchmarks.planning.risk_table import VARIANTS
 from benchmarks.planning.risk_tasks import TASKS, Problem, problem
 from push_predictor.geometry.frames import to_world
 from push_predictor.models.store.model_file import load_model

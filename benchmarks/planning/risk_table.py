@@ -19,6 +19,7 @@ from push_predictor.types import Array, BoolArray
 
 DRAWS = 4000  # of the bootstrap
 RISKS = (0.02, 0.05, 0.1)  # shares of failed runs
+VARIANTS = ("none", "constant", "input-dependent, independent", "input-dependent, push effects")
 BASE = "constant"
 
 
@@ -56,7 +57,7 @@ def _common(rows: Sequence[dict[str, object]]) -> dict[str, Runs]:
     for row in rows:
         found.setdefault(str(row["variant"]), {})[int(str(row["problem"]))] = row
     numbers = sorted(set.intersection(*(set(of) for of in found.values())))
-    return {name: _runs([of[number] for number in numbers]) for name, of in found.items()}
+    return {name: _runs([found[name][number] for number in numbers]) for name in VARIANTS if name in found}
 
 
 def _runs(rows: Sequence[dict[str, Any]]) -> Runs:

@@ -47,11 +47,14 @@ def test_equal_risk_declines_the_problems_with_the_largest_promised_risk(tmp_pat
     for number in range(40):
         failed = number % 10 < 2
         result = "failed" if failed else "reached"
-        rows += [_row("constant", number, result, 0.1), _row("informed", number, result, 0.3 if failed else 0.01)]
+        rows += [
+            _row("constant", number, result, 0.1),
+            _row("input-dependent, push effects", number, result, 0.3 if failed else 0.01),
+        ]
     (tmp_path / "runs.jsonl").write_text("\n".join(map(json.dumps, rows)))
     text = tables(tmp_path / "runs.jsonl")
     assert "40 problems" in text
     strict = text.split("At most 2 %")[1].split("At most 5 %")[0]
     assert re.search(r"\| constant \| 0\.0 .*\| 0\.0 ", strict)
-    assert re.search(r"\| informed \| 80\.0 .*\| 0\.0 .*\| 80\.0 \(", strict)
-    assert re.search(r"\| informed \| 6\.8 \| 20\.0 .*\| 93 \| 80\.0 .*\| 1\.00 \|", text)
+    assert re.search(r"\| input-dependent, push effects \| 80\.0 .*\| 0\.0 .*\| 80\.0 \(", strict)
+    assert re.search(r"\| input-dependent, push effects \| 6\.8 \| 20\.0 .*\| 93 \| 80\.0 .*\| 1\.00 \|", text)

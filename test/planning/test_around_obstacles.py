@@ -129,11 +129,11 @@ def test_sure_push_is_chosen_near_an_obstacle_and_the_bound_is_kept():
 def test_bound_is_kept_with_new_samples():
     scene = Scene(SQUARE, TABLE, [box(-0.2, 0.2, 0.05, 0.2)])
     plans = []
-    for sd in np.linspace(0.0028, 0.0038, 11):
+    for sd in np.linspace(0.0028, 0.0038, 41):
         pushes = made_up([[0.05, 0.0, 0.0]], [0.0, sd, 0.0])
-        plans.append(plan_around_obstacles(pushes, scene, START, region(-0.05, 0.0), 0.07, most_pushes=1))
+        plans.append(plan_around_obstacles(pushes, scene, START, region(-0.05, 0.0), 0.063, most_pushes=1))
     assert plans[0] is not None and plans[-1] is None
-    assert all(plan.risk[-1] <= 0.07 for plan in plans if plan is not None)
+    assert all(plan.risk[-1] <= 0.063 for plan in plans if plan is not None)
 
 
 def test_risky_sequences_do_not_crowd_out_a_safe_one():
@@ -155,18 +155,18 @@ def test_pushes_of_a_sequence_are_independent():
 
 
 def test_push_without_a_gain_is_not_added():
-    pushes = made_up([[0.05, 0.0, 0.0], [0.0001, 0.0, 0.0]], [[0.0, 0.008, 0.0], [0.0, 0.0, 0.0]])
-    plan = plan_around_obstacles(pushes, Scene(SQUARE, TABLE), START, region(-0.05, 0.0, 0.01))
-    assert labels(plan) == [0] and plan.probability < 0.9
+    pushes = made_up([[0.05, 0.0, 0.0], [0.0001, 0.0, 0.0]], [[0.0, 0.015, 0.0], [0.0, 0.0, 0.0]])
+    plan = plan_around_obstacles(pushes, Scene(SQUARE, TABLE), START, region(-0.05, 0.0, 0.01), most_pushes=12)
+    assert labels(plan) == [0] and plan.probability < 0.6
 
 
 def test_slider_that_has_touched_stays_failed():
     scene = Scene(SQUARE, TABLE, [box(0.0, 0.02, -0.2, 0.2)])
-    there, back = np.array([0.1, 0.0, 0.0]), np.array([-0.1, 0.0, 0.0])
+    through, onward = np.array([0.2, 0.0, 0.0]), np.array([0.02, 0.0, 0.0])
     belief = certain(START, 2)
-    for moved in (there, back):
+    for moved in (through, onward):
         belief = belief.pushed(np.array([0]), moved[None], np.tile(moved, (1, 2, 1)), scene, 0.0)
-    np.testing.assert_allclose(belief.mean[0], START)
+    np.testing.assert_allclose(belief.mean[0], [0.12, 0.0, 0.0])
     assert belief.risk[0] == 1.0
 
 
