@@ -17,11 +17,11 @@ import numpy as np
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.train import train_model
-from push_predictor.planning.around_obstacles import PlannedPushes, plan_around_obstacles
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import PoseTarget
+from push_predictor.planning.obstacles.around_obstacles import PlannedPushes, plan_around_obstacles
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import PoseTarget
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor.simulation.interactive_rig import push_motion
 from push_predictor.simulation.pushes import PushPlan

@@ -3,10 +3,10 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.planning.risk --out FOLDER [--tasks NAME ...] [--problems FROM TO]
     python -m benchmarks.planning.risk --table FOLDER
 
-The planner (planning/around_obstacles.py), the pushes, their means, the problems and the noise of each push are the
-same; only the covariance differs (VARIANTS). A run ends if the slider touches an obstacle or its centre leaves the
-table. Every run is appended to FOLDER/runs.jsonl at once, with what was promised before each push; runs that are there
-already are skipped. The thresholds of equal risk are applied afterwards (risk_table.py).
+The planner (planning/obstacles), the pushes, their means, the problems and the noise of each push are the same; only
+the covariance differs (VARIANTS). A run ends if the slider touches an obstacle or its centre leaves the table. Every
+run is appended to FOLDER/runs.jsonl at once, with what was promised before each push; runs that are there already are
+skipped. The thresholds of equal risk are applied afterwards (risk_table.py).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import tabulate
-from push_predictor.planning.around_obstacles import PlannedPushes, plan_around_obstacles
 from push_predictor.planning.model_repertoire import candidate_pushes, persistent_fraction
+from push_predictor.planning.obstacles.around_obstacles import PlannedPushes, plan_around_obstacles
 from push_predictor.planning.repertoire import Repertoire, repertoire
 from push_predictor.planning.unscented import PusherGeometry
 from push_predictor.simulation.interactive_rig import push_motion

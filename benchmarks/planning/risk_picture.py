@@ -19,8 +19,8 @@ from benchmarks.planning.risk_table import VARIANTS
 from benchmarks.planning.risk_tasks import TASKS, Problem, problem
 from push_predictor.geometry.frames import to_world
 from push_predictor.models.store.model_file import load_model
-from push_predictor.planning.around_obstacles import PlannedPushes
-from push_predictor.planning.targets import PoseTarget
+from push_predictor.planning.obstacles.around_obstacles import PlannedPushes
+from push_predictor.planning.obstacles.targets import PoseTarget
 from push_predictor.reporting.canvas import OBSERVED, PREDICTED, draw
 from push_predictor.simulation.interactive_rig import push_motion
 from push_predictor.simulation.pushes import PushPlan

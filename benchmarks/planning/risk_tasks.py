@@ -14,8 +14,8 @@ import numpy as np
 
 from push_predictor.geometry.outline import Outline
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import Overhang, PoseTarget, Target
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import Overhang, PoseTarget, Target
 from push_predictor.types import Array
 
 TABLE = (-0.25, 0.25, -0.18, 0.18)  # m: x from, to, y from, to

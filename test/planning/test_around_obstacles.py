@@ -10,12 +10,12 @@ from scipy.stats import norm
 
 from push_predictor.errors import RequestError
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.planning.around_obstacles import plan_around_obstacles
-from push_predictor.planning.belief import after_displacement, certain, partial_displacement
 from push_predictor.planning.goal import Goal
+from push_predictor.planning.obstacles.around_obstacles import plan_around_obstacles
+from push_predictor.planning.obstacles.belief import after_displacement, certain, partial_displacement
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import Overhang, PoseTarget
 from push_predictor.planning.repertoire import Repertoire, StraightPushes
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import Overhang, PoseTarget
 
 SQUARE = shape_outline("rect1")
 START = np.array([-0.1, 0.0, 0.0])

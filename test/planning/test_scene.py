@@ -7,10 +7,10 @@ import pytest
 
 from push_predictor.errors import RequestError
 from push_predictor.geometry.shapes import shape_outline
-from push_predictor.planning.cost_to_go import cost_to_go
 from push_predictor.planning.goal import Goal
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import Overhang, PoseTarget
+from push_predictor.planning.obstacles.cost_to_go import cost_to_go
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import Overhang, PoseTarget
 
 TABLE = np.array([[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]])
 BLOCK = np.array([[0.1, 0.05], [0.14, 0.05], [0.14, 0.2], [0.1, 0.2]])

@@ -15,8 +15,8 @@ from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import Target
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import Target
 from push_predictor.types import Array, BoolArray, IntArray
 
 CELL = 0.01  # m

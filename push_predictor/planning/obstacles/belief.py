@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_world
-from push_predictor.planning.scene import Scene
+from push_predictor.planning.obstacles.scene import Scene
 from push_predictor.types import Array, BoolArray, IntArray
 
 FRACTIONS = (0.25, 0.5, 0.75, 1.0)  # of a push, at which the slider is checked

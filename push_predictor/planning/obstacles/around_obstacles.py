@@ -18,12 +18,12 @@ from functools import lru_cache
 import numpy as np
 
 from push_predictor.errors import RequestError
-from push_predictor.planning.belief import Beliefs, after_displacement, certain
 from push_predictor.planning.choose import SMALLEST_PUSH
-from push_predictor.planning.cost_to_go import CostToGo, cost_to_go
+from push_predictor.planning.obstacles.belief import Beliefs, after_displacement, certain
+from push_predictor.planning.obstacles.cost_to_go import CostToGo, cost_to_go
+from push_predictor.planning.obstacles.scene import Scene
+from push_predictor.planning.obstacles.targets import Target
 from push_predictor.planning.repertoire import Repertoire, StraightPushes
-from push_predictor.planning.scene import Scene
-from push_predictor.planning.targets import Target
 from push_predictor.planning.unscented import FLOOR
 from push_predictor.types import Array, BoolArray, IntArray
 
