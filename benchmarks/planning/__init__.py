@@ -1,4 +1,4 @@
 """Rollouts and planned pushes against the rig simulator.
 
-`rollout`, `planner` and `planner_promises` are scripts; the other modules belong to them.
+`rollout`, `planner`, `planner_promises`, `risk` and `risk_picture` are scripts; the other modules belong to them.
 """

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from push_predictor.simulation.batches import conditions_of, end_times
-from push_predictor.simulation.dynamics import run
+from push_predictor.simulation.dynamics import Motion, run
 from push_predictor.simulation.pushes import pusher_path
 from push_predictor.simulation.spec import PUSHER_RADIUS, SimulationSpec, physics_of
 from push_predictor.types import Array
@@ -22,7 +20,12 @@ def push_once(spec: SimulationSpec, sliders: Array) -> Array:
     noise of a push: with the same seed, push k gets the same noise for any commands. The noise stays constant beyond
     LONGEST_TRAVEL. Raises RigError for an unknown shape or surface.
     """
+    return push_motion(spec, sliders).slider[:, -1].copy()
+
+
+def push_motion(spec: SimulationSpec, sliders: Array) -> Motion:
+    """The whole motion of the pushes of `push_once`."""
     path = pusher_path(spec.pushes, spec.slider.outline, PUSHER_RADIUS, sliders, spec.acceleration)
     end = end_times(path, spec.table.friction)
     physics = replace(physics_of(spec, LONGEST_TRAVEL), conditions=conditions_of(spec, sliders, path, end))
-    return np.asarray(run(physics, path, sliders, end).slider[:, -1])
+    return run(physics, path, sliders, end)
