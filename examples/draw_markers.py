@@ -26,7 +26,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from examples.marker_canvas import draw_array
 from examples.processes import LOGS, node
 from push_predictor.geometry.outline import Outline
-from push_predictor.models.predictors.tails import joint_radius
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.recordings.load import load_rig_for
 from push_predictor.reporting.canvas import draw
@@ -44,7 +43,7 @@ COLUMNS, WIDTH = 3, 9.0  # inches
 CAPTION, FOOT = 0.25, 0.42  # inches
 BACKGROUND = "#303030"  # RViz's default
 
-FAR = joint_radius(None, 0.95)  # standard deviations
+FAR = 3.2  # standard deviations: outside the 95 % region, also of a distribution with tails
 
 Kind = Callable[[PushResidual, float], bool]  # (window, place along its edge: 0 to 1)
 KINDS: tuple[tuple[str, Kind], ...] = (

@@ -1,8 +1,9 @@
 """What the earlier windows of a push tell about its next one: docs/results/intervals.md.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.push_under_way --data FOLDER [--sizes N ...] [--means ...]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.models.push_under_way --data FOLDER [--earlier K] [--sizes N ...]
+        [--means ...]
 
-Every held-out window but the first of each push is predicted alone and given up to EARLIER windows before it. The
+Every held-out window but the first of each push is predicted alone and given up to K windows before it. The
 density is the model's own. Intervals resample whole pushes.
 """
 
@@ -26,7 +27,6 @@ from push_predictor.planning.persistence import persistence_of
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import IntArray
 
-EARLIER = 5  # windows
 NEAREST = 1e-6  # m, between the starts of two windows
 HEAD = (
     "| n | mean | windows | 95 % alone: dx dy dtheta | 95 % given earlier | NMSE, difference | exact NLPD, difference |"
@@ -45,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True, help="the folder of the measured data")
+    parser.add_argument("--earlier", type=int, default=5, metavar="K", help="windows (default %(default)s)")
     parser.add_argument("--sizes", nargs="+", type=int, default=(200, 1000))
     parser.add_argument("--means", nargs="+", default=("mechanics", "zero"))
     options = parser.parse_args(arguments)
@@ -52,12 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for _, cases in measured_cases(options.data):
         for n in options.sizes:
             for mean in options.means:
-                print_row(cases, n, mean)
+                print_row(cases, n, mean, options.earlier)
 
 
-def print_row(cases: Sequence[Case], n: int, mean: str) -> None:
+def print_row(cases: Sequence[Case], n: int, mean: str, earlier: int) -> None:
     """Print the row of a size and mean."""
-    pairs = [compared(trained(case, n, "vhgp", mean, tails=True)[0], case.test) for case in cases]
+    pairs = [compared(trained(case, n, "vhgp", mean, tails=True)[0], case.test, earlier) for case in cases]
     alone, given = (pooled([push_scores(pair[k]) for pair in pairs]) for k in (0, 1))
     windows = sum(len(pair[0].observed) for pair in pairs)
     change = [difference_by_push(alone, given, figure) for figure in (total_nmse, total_exact_nlpd)]
@@ -65,10 +66,10 @@ def print_row(cases: Sequence[Case], n: int, mean: str) -> None:
     print(f"| {n} | {mean} | {windows} | {' | '.join(cells)} |", flush=True)
 
 
-def compared(model: PushModel, table: PushTable) -> tuple[Comparison, Comparison]:
+def compared(model: PushModel, table: PushTable, earlier: int) -> tuple[Comparison, Comparison]:
     """Predictions of all windows that have an earlier one in their push: alone, and given the earlier ones."""
     prediction, persistence = model.predict_rows(table.inputs, table.duration, table.covariates), persistence_of(model)
-    rows, found = _rows(table), []
+    rows, found = _rows(table, earlier), []
     for row in rows:
         before = EarlierWindows(_taken(prediction, row.before), table.outcomes[row.before], _distance(table, row))
         found.append(given_earlier(_taken(prediction, np.array([row.own])), before, persistence))
@@ -98,12 +99,12 @@ def _comparison(model: PushModel, table: PushTable, own: IntArray, prediction: P
     )
 
 
-def _rows(table: PushTable) -> list[Row]:
+def _rows(table: PushTable, earlier: int) -> list[Row]:
     rows = []
     for push in table.pushes:
         own = np.flatnonzero(table.push_id == push)
         own = own[np.argsort(table.covariates.get("elapsed_time", np.arange(len(table)))[own], kind="stable")]
-        rows += [Row(int(own[k]), own[max(0, k - EARLIER) : k]) for k in range(1, len(own))]
+        rows += [Row(int(own[k]), own[max(0, k - earlier) : k]) for k in range(1, len(own))]
     return rows
 
 

@@ -25,7 +25,7 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.planning.choose import Choice, choose_push
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import candidate_pushes, persistent_fraction
@@ -162,7 +162,14 @@ def _with_covariance(predict: Predict, covariance: Array) -> Predict:
 
 def trained() -> PushModel:
     """Train a VHGP on the recording."""
-    return train_model(load_data([TRAINING]), load_rig_for([TRAINING]), "vhgp", name="vhgp", sources=[TRAINING.name])
+    return train_model(
+        load_data([TRAINING]),
+        load_rig_for([TRAINING]),
+        "vhgp",
+        name="vhgp",
+        sources=[TRAINING.name],
+        options=TrainingOptions(tails=False),
+    )
 
 
 if __name__ == "__main__":

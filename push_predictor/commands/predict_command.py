@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.commands.output import add_command, add_covariate, covariates_of, write_json
+from push_predictor.errors import RequestError
+
+if TYPE_CHECKING:
+    from push_predictor.models.prediction import Prediction
+    from push_predictor.models.predictors.tails import IntervalKind
+    from push_predictor.models.push_model import PushModel
+    from push_predictor.types import Array
 
 INSIDE = "The push lies within the training data."
 INSIDE_PRIORS = "The push lies within the speeds and angles for which the priors are meant."
@@ -60,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
     check_request(model, push)
     prediction = model.predict_rows(*push.arrays)
     mean, covariance = prediction.mean[0], prediction.covariance[0]
-    low, high = (end[0] for end in prediction.interval(LEVEL, options.interval))
+    low, high = (end[0] for end in _interval(model, prediction, options.interval))
     result = {
         "model": model.name,
         "mean": mean.tolist(),
@@ -80,3 +88,13 @@ def run(options: argparse.Namespace) -> None:
         )
     inside, outside = (INSIDE_PRIORS, OUTSIDE_PRIORS) if model.kind == "prior" else (INSIDE, OUTSIDE)
     print(inside if result["in_domain"] else outside)
+
+
+def _interval(model: PushModel, prediction: Prediction, kind: IntervalKind) -> tuple[Array, Array]:
+    """The ends of the intervals; an error names the option."""
+    try:
+        return prediction.interval(LEVEL, kind)
+    except RequestError as error:
+        pushes = 0 if prediction.tails is None else prediction.tails.pushes
+        accepted = f"student: conformal 95 % intervals need 19 held-out training pushes, {model.name} has {pushes}"
+        raise RequestError("--interval", kind, accepted) from error

@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    """The robot's limits; an error names the option."""
+    """The robot's limits."""
     from push_predictor.design.limits import Limits
 
     speed, angle = (None if pair is None else (pair[0], pair[1]) for pair in (options.speed, options.angle))

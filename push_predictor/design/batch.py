@@ -28,7 +28,7 @@ from push_predictor.planning.persistence import Persistence, persistence_of
 from push_predictor.types import Array, IntArray
 
 CANDIDATES, MATTER = 256, 128  # pushes
-MOST_PUSHES = 1000
+MOST_PUSHES = 200  # half a minute; later pushes should wait for the outcomes of the first
 FIRST = 10  # pushes that are spread evenly; docs/results/suggest.md compares this start with others
 
 
@@ -70,6 +70,8 @@ def suggest_pushes(
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
+    if check_cancelled is not None:
+        check_cancelled()
     inputs = candidate_pushes(model, limits, CANDIDATES, seed)
     relevant = _matter(model, limits, seed) if matter is None else Push(matter.inputs, matter.duration, {})
     tried = courses(model, inputs, limits.travel)

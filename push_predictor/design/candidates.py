@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.design.limits import Limits
+from push_predictor.errors import RequestError
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.planning.straight_drive import start_drive
 from push_predictor.types import Array, BoolArray
 
-MOST_WINDOWS = 60  # of a push; later ones of a longer push are not looked at
+MOST_WINDOWS = 16  # of a push; what later ones of a longer push would show is not counted
+MOST_DRAWN = 2**17  # points of the sequence; with less than 1 % of the outline left, candidates are not found
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +44,19 @@ class Courses:
 
 
 def candidate_pushes(model: PushModel, limits: Limits, count: int, seed: int = 0) -> Array:
-    """Inputs (count, 3) of pushes that a robot can make: a scrambled Sobol' sequence over the limits."""
+    """Inputs (count, 3) of pushes that a robot can make: a scrambled Sobol' sequence over the limits.
+
+    Raises RequestError for limits that leave hardly anything of the outline.
+    """
     from scipy.stats import qmc  # its import would take every node 0.4 s at the start
 
     sequence = qmc.Sobol(3, scramble=True, seed=seed)
     low, high = np.array([[*pair] for pair in (limits.ranges(model)[0], (0.0, 1.0), limits.ranges(model)[1])]).T
-    found = np.empty((0, 3))
+    size, found = 2 ** int(np.ceil(np.log2(count))), np.empty((0, 3))
     while len(found) < count:
-        drawn = low + (high - low) * sequence.random_base2(int(np.ceil(np.log2(count))))
+        if sequence.num_generated >= MOST_DRAWN:
+            raise RequestError("excluded", limits.excluded, "intervals that leave more of the outline to push")
+        drawn = low + (high - low) * sequence.random(size)
         found = np.concatenate([found, drawn[limits.allows(drawn[:, 1])]])
     found[:, 1] = np.minimum(found[:, 1], np.nextafter(1.0, 0.0))
     return np.asarray(found[:count])

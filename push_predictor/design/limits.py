@@ -13,6 +13,7 @@ from push_predictor.types import Array, BoolArray
 
 USUAL_TRAVEL = 0.03  # m
 WIDEST = 1.0  # rad, where the model's pushes do not reach farther
+LONGEST = 600.0  # s, of a push
 MOST_EXCLUDED = 0.99  # of the perimeter; with less left, candidates are hard to find
 
 Interval = tuple[float, float]
@@ -26,7 +27,7 @@ class Limits:
     angle, rad; None for ±1 or the training pushes' range where that is wider. travel: length of a push, m. excluded:
     intervals of the contact, as fractions of the perimeter, that are not pushed; one that begins above its end passes
     the first vertex. transfer_speed: of the tip around the outline between two pushes, m/s. With it, pushes are chosen
-    by what they tell per second; without it, time is free.
+    by what they would show per second; without it, time is free.
     """
 
     speed: Interval | None = None
@@ -44,6 +45,9 @@ class Limits:
             raise RequestError("travel", self.travel, f"a number above 0 and up to {FARTHEST:g}, in m")
         if self.transfer_speed is not None and not 0.0 < self.transfer_speed < np.inf:
             raise RequestError("transfer_speed", self.transfer_speed, "a finite number above 0, in m/s")
+        if self.speed is not None and self.travel / self.speed[0] > LONGEST:
+            least = f"at least {self.travel / LONGEST:.3g} m/s: a push lasts at most {LONGEST:g} s"
+            raise RequestError("speed", self.speed, least)
         for interval in self.excluded:
             if not all(0.0 <= end <= 1.0 for end in interval):
                 raise RequestError("excluded", interval, "two fractions of the perimeter, from 0 to 1")
@@ -59,10 +63,16 @@ class Limits:
         return allowed
 
     def ranges(self, model: PushModel) -> tuple[Interval, Interval]:
-        """The range of the speed, m/s, and of the angle, rad, of pushes for a model."""
+        """The range of the speed, m/s, and of the angle, rad, of pushes for a model.
+
+        Raises RequestError for a speed that the model cannot predict.
+        """
         known = model.training.inputs
         speed, angle = (model.usual_speed, model.usual_speed), (-WIDEST, WIDEST)
         if len(known):
             speed = float(known[:, 0].min()), float(known[:, 0].max())
             angle = min(-WIDEST, float(known[:, 2].min())), max(WIDEST, float(known[:, 2].max()))
+        if self.speed is not None and self.speed[1] * model.usual_duration > FARTHEST:
+            most, window = FARTHEST / model.usual_duration, f"{model.usual_duration:g} s"
+            raise RequestError("speed", self.speed, f"at most {most:.3g} m/s: {FARTHEST:g} m in a window of {window}")
         return self.speed or speed, self.angle or angle

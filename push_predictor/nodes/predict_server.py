@@ -64,7 +64,7 @@ class PredictServer(LifecycleNode):
         declare(self, PARAMETERS)
         self._registry, self._statistics = ModelRegistry(), RequestStatistics()
         self._problems: list[str] = []
-        self._predict_push: ThreadedService | None = None
+        self._threaded: list[ThreadedService] = []
         self._other_services: list[Service] = []
         self._closing = Event()
         self._starting = False
@@ -81,13 +81,13 @@ class PredictServer(LifecycleNode):
     def start(self) -> None:
         """Configure and activate, as a lifecycle manager would; without a model the node stays inactive.
 
-        predict_push queues requests until the activation is over, so that no early client gets a refusal.
+        predict_push and suggest_pushes queue requests until the activation is over, so that no early client is refused.
         """
         self._starting = True
         if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             self.trigger_activate()
         self._starting = False
-        self._start_predict_push()
+        self._start_threaded()
 
     def close(self) -> None:
         """End a trace and long requests, publish the last diagnostics."""
@@ -125,25 +125,30 @@ class PredictServer(LifecycleNode):
         self._introspect(self.value("introspection"))
         self._state = "inactive"
         if not self._starting:
-            self._start_predict_push()
+            self._start_threaded()
 
     def _create_services(self) -> None:
-        self._predict_push = ThreadedService(self, PredictPush, "predict_push", self._on_push, SERVICE_QOS)
+        self._threaded = [
+            ThreadedService(self, kind, name, callback, SERVICE_QOS)
+            for kind, name, callback in (
+                (PredictPush, "predict_push", self._on_push),
+                (SuggestPushes, "suggest_pushes", self._on_suggest),  # takes up to half a minute
+            )
+        ]
         self._other_services = [
             self.create_service(kind, name, callback, qos_profile=SERVICE_QOS)
             for kind, name, callback in (
                 (PredictPushBatch, "predict_push_batch", self._on_batch),
                 (PredictSliderPose, "predict_slider_pose", self._on_pose),
                 (RolloutPushes, "rollout_pushes", self._on_rollout),
-                (SuggestPushes, "suggest_pushes", self._on_suggest),
                 (ListModels, "list_models", self._on_list),
                 (LoadModel, "load_model", self._on_load),
             )
         ]
 
-    def _start_predict_push(self) -> None:
-        if self._predict_push is not None:
-            self._predict_push.start()
+    def _start_threaded(self) -> None:
+        for service in self._threaded:
+            service.start()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer predictions from now on. Fails while no model is loaded; the node then stays inactive."""
@@ -178,9 +183,8 @@ class PredictServer(LifecycleNode):
         gc.collect()  # models contain reference cycles and take many MB each
 
     def _destroy_services(self) -> None:
-        if self._predict_push is not None:
-            self._predict_push.close()
-            self._predict_push = None
+        while self._threaded:
+            self._threaded.pop().close()
         while self._other_services:
             self.destroy_service(self._other_services.pop())
 
@@ -229,9 +233,11 @@ class PredictServer(LifecycleNode):
         return response
 
     def _check_cancelled(self) -> None:
-        """Raise InactiveError when the node ends; long requests call it between their parts."""
+        """Raise InactiveError when the node ends or is not active; long requests call it between their parts."""
         if self._closing.is_set():
             raise InactiveError("the node ends")
+        if self._state != "active":
+            raise InactiveError(f"the node is {self._state}")
 
     def _refuse_inactive(self, registry: ModelRegistry, request: Any, response: Any) -> None:
         raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
@@ -276,8 +282,7 @@ class PredictServer(LifecycleNode):
                 self._introspect(parameter.value)
 
     def _introspect(self, mode: str) -> None:
-        threaded = [] if self._predict_push is None else [self._predict_push.service]
-        for service in [*threaded, *self._other_services]:
+        for service in [*(threaded.service for threaded in self._threaded), *self._other_services]:
             service.configure_introspection(self.get_clock(), qos_profile_system_default, INTROSPECTION[mode])
 
     def _log_diagnostics_error(self, error: Exception) -> None:

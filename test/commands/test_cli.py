@@ -236,7 +236,10 @@ def test_predict_equals_the_model(place: Place, run):
     assert found["interval"]["high"] == pytest.approx(high[0].tolist(), rel=1e-2)
 
 
-@pytest.mark.parametrize(("name", "words"), [("gp", ("0.95", "6 training pushes")), ("analytical", ("student",))])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("gp", ("--interval: 'conformal'", "gp has 6")), ("analytical", ("--interval", "analytical has 0"))],
+)
 def test_predict_refuses_conformal_intervals_that_the_training_pushes_do_not_give(
     name: str, words: Sequence[str], place: Place, run
 ):

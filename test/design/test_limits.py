@@ -22,6 +22,8 @@ from push_predictor.recordings.table import empty_table
         ("speed", (0.1, 0.05)),
         ("speed", (0.1, np.inf)),
         ("speed", (np.nan, 0.1)),
+        ("speed", (1e-310, 0.1)),
+        ("speed", (0.03 / 601.0, 0.1)),
         ("angle", (-1.6, 0.0)),
         ("angle", (0.0, 1.6)),
         ("angle", (0.5, 0.4)),
@@ -37,6 +39,16 @@ from push_predictor.recordings.table import empty_table
 def test_a_value_out_of_range_is_refused_by_name(field: str, value: Any) -> None:
     with pytest.raises(RequestError, match=field):
         Limits(**{field: value})
+
+
+def test_a_push_may_last_ten_minutes_and_a_window_be_a_metre_long() -> None:
+    table, rig = square_pushes(30)
+    model = train_model(table, rig, "analytical", name="m")
+    fastest = 1.0 / model.usual_duration
+    limits = Limits(speed=(0.03 / 599.0, 0.999 * fastest))
+    assert limits.ranges(model)[0] == limits.speed
+    with pytest.raises(RequestError, match=r"speed.*at most 5 m/s"):
+        Limits(speed=(0.1, 1.001 * fastest)).ranges(model)
 
 
 def test_excluded_contacts_are_not_allowed() -> None:

@@ -61,6 +61,16 @@ class TestCandidates:
         assert limits.allows(found[:, 1]).all()
         assert np.histogram(found[:, 1], 4, (0.0, 1.0))[0] == pytest.approx([100, 0, 100, 100], abs=8)
 
+    @pytest.mark.parametrize("excluded", [0.5, 0.8, 0.985])
+    def test_a_small_part_of_the_outline_is_filled_too(self, learnt: PushModel, excluded: float) -> None:
+        found = candidate_pushes(learnt, Limits(excluded=((0.0, excluded),)), 256)
+        assert found.shape == (256, 3) and found[:, 1].min() > excluded
+
+    def test_an_outline_of_which_hardly_anything_is_left_is_refused(self, learnt: PushModel) -> None:
+        slits = tuple((k / 1000 + 1e-9, (k + 1) / 1000 - 1e-9) for k in range(1000))
+        with pytest.raises(RequestError, match=r"excluded.*leave more of the outline"):
+            candidate_pushes(learnt, Limits(excluded=slits), 16)
+
     def test_differ_by_seed_only(self, learnt: PushModel) -> None:
         first, same, other = (candidate_pushes(learnt, Limits(), 50, seed) for seed in (0, 0, 1))
         assert np.array_equal(first, same) and not np.array_equal(first, other)
@@ -198,7 +208,7 @@ class TestSuggestedPushes:
             suggest_pushes(model, 2)
         assert len(suggest_pushes(model, 2, covariates={"elapsed_time": 900.0})) == 2
 
-    @pytest.mark.parametrize("count", [0, 1001])
+    @pytest.mark.parametrize("count", [0, 201])
     def test_a_wrong_count_is_refused(self, untrained: PushModel, count: int) -> None:
         with pytest.raises(RequestError, match="count"):
             suggest_pushes(untrained, count)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
-from scipy.stats import chi2, f
+from scipy.stats import chi2, f, norm, t
 from visualization_msgs.msg import Marker, MarkerArray
 
 from examples.marker_canvas import draw_array
@@ -56,6 +56,12 @@ def markers(at: PushWindow, shape: str = "rect1") -> dict[str, Marker]:
     named = {marker.ns: marker for marker in array.markers}
     assert len(named) == len(array.markers) and {marker.id for marker in array.markers} == {0}
     return named
+
+
+def half_of_dial(shown: dict[str, Marker], zero: float) -> float:
+    """Half the angle of the heading's interval, enlarged."""
+    band = points(shown["magnified_heading"]) - points(shown["predicted_ellipse"])[:-1].mean(axis=0)
+    return float(np.max((np.arctan2(band[:, 1], band[:, 0]) - zero + np.pi) % (2 * np.pi) - np.pi))
 
 
 def points(marker: Marker) -> np.ndarray:
@@ -110,9 +116,8 @@ def test_true_and_enlarged_markers_agree_on_inside_or_outside(error):
             inside, rel=1e-6, abs=1e-9
         )
     middle = points(shown["predicted_ellipse"])[:-1].mean(axis=0)
-    band, stroke = (points(shown[f"magnified_{name}"]) - middle for name in ("heading", "observed_heading"))
-    zero = window(MEAN).push_heading
-    half = np.max((np.arctan2(band[:, 1], band[:, 0]) - zero + np.pi) % (2 * np.pi) - np.pi)
+    stroke, zero = points(shown["magnified_observed_heading"]) - middle, window(MEAN).push_heading
+    half = half_of_dial(shown, zero)
     turned = (np.arctan2(stroke[0, 1], stroke[0, 0]) - zero + np.pi) % (2 * np.pi) - np.pi
     assert turned / half == pytest.approx(away[2] / (NORMAL_95 * SD[2]), rel=1e-6, abs=1e-9)
 
@@ -140,6 +145,8 @@ def test_tails_widen_the_ellipse_and_the_limit_of_the_label():
     across = [np.ptp(points(shown["predicted_ellipse"]), axis=0) for shown in (narrow, wide)]
     expected = 0.8 * np.sqrt(2.0 * f.ppf(0.95, 2, 3.0)) / np.sqrt(chi2.ppf(0.95, 2))
     assert across[1] / across[0] == pytest.approx(np.full(2, expected))
+    halves = [half_of_dial(shown, window(MEAN + away).push_heading) for shown in (narrow, wide)]
+    assert halves[1] / halves[0] == pytest.approx(np.sqrt(0.5) * t.ppf(0.975, 4.0) / norm.ppf(0.975), rel=1e-6)
     assert narrow["label"].color.g < 0.5 < wide["label"].color.g and 0.8 * np.sqrt(3.0 * f.ppf(0.95, 3, 3.0)) > 3.0
 
 

@@ -69,8 +69,10 @@ def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> Non
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"count": 0}, "count: 0 is not accepted, give an integer from 1 to 1000"),
-        ({"count": 1001}, "count: 1001"),
+        ({"count": 0}, "count: 0 is not accepted, give an integer from 1 to 200"),
+        ({"count": 201}, "count: 201"),
+        ({"speed": [1e-310, 1e-310]}, "speed: (1e-310, 1e-310)"),
+        ({"speed": [0.1, 1e308]}, "speed: (0.1, 1e+308) is not accepted, give at most"),
         ({"speed": [0.02]}, "speed length: 1 is not accepted, give 2 values, or none"),
         ({"angle": [0.0, 0.1, 0.2, 0.3]}, "angle length: 4"),
         ({"speed": [0.05, 0.02]}, "speed: (0.05, 0.02)"),
@@ -102,5 +104,5 @@ def test_a_long_request_ends_with_the_node(folder: Path) -> None:
             raise RequestError("node", "closing", "no more requests")
 
     with pytest.raises(RequestError, match="closing"):
-        handle_suggest_pushes(check_cancelled, registry, SuggestPushes.Request(count=500), SuggestPushes.Response())
+        handle_suggest_pushes(check_cancelled, registry, SuggestPushes.Request(count=200), SuggestPushes.Response())
     assert len(asked) == 3

@@ -9,7 +9,7 @@ from msg_adapters.markers import MAGNIFICATION, label_marker, magnified_markers,
 from push_predictor.geometry.frames import to_world
 from push_predictor.geometry.touch import covariance_in_world, displaced
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors.tails import joint_radius
+from push_predictor.models.predictors.tails import Tails, half_widths, joint_radius
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.types import Array
@@ -24,8 +24,8 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
     """
     heading = np.array([window.push_heading])
     predicted = displaced(window.slider_start[None], heading, prediction.mean)[0]
-    wider = joint_radius(prediction.tails, LEVEL, 2) / joint_radius(None, LEVEL, 2)  # the markers draw a Gaussian's
-    covariance = wider**2 * covariance_in_world(prediction.covariance, heading)[0]
+    wider = _wider(prediction.tails)
+    covariance = np.outer(wider, wider) * covariance_in_world(prediction.covariance, heading)[0]
     start, end, where = window.slider_start, window.slider_end, (frame_id, window.end)
     reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
     distance, limit = error_in_sd(window, prediction), joint_radius(prediction.tails, LEVEL)
@@ -36,6 +36,13 @@ def window_markers(rig: Rig, window: PushWindow, prediction: Prediction, frame_i
         label_marker(_label(window, distance, limit), start[:2], reach, distance > limit, *where),
     )
     return MarkerArray(markers=[marker for part in parts for marker in part.markers])
+
+
+def _wider(tails: Tails | None) -> Array:
+    """Factors (3,) on the sd of a Gaussian, which the markers draw, whose 95 % regions are those of the tails."""
+    plane = joint_radius(tails, LEVEL, 2) / joint_radius(None, LEVEL, 2)
+    turn = (half_widths(tails, LEVEL) / half_widths(None, LEVEL))[2]
+    return np.array([plane, plane, turn])
 
 
 def tip_of(rig: Rig, window: PushWindow) -> Array:
