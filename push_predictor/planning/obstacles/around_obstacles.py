@@ -73,7 +73,7 @@ def plan_around_obstacles(
     observed: whether the slider will be observed, and the plan made again, after every push; then each push starts
     from its predicted pose, and only its own noise counts. Otherwise noise adds up over the pushes. The pusher is
     placed relative to the slider in both cases. Raises RequestError for a value out of range and for a slider that
-    touches or lies beside the table at the start.
+    touches an obstacle or lies off the table at the start.
     """
     slider = np.asarray(slider, dtype=np.float64)
     _check(scene, slider, risk, margin, most_pushes)
