@@ -20,6 +20,9 @@ class RefusedError(PushPredictorError):
     """The server answered success=false; the text is its message."""
 
 
+MOST_EARLIER = 10  # windows of a push under way; none further apart were compared for what persists
+
+
 @dataclass(frozen=True, eq=False)
 class PushQuery:
     """n pushes to predict by one model.
@@ -41,7 +44,7 @@ def query_to_request(
     covariates: Mapping[str, float] | None = None,
     residual: Array | None = None,
 ) -> PredictPush.Request:
-    """The request for one push (3,). residual (3,): of the window just before, m, m, rad; None: not known."""
+    """The request for one push (3,). residual (3,) or (k, 3): of the windows before, oldest first, m, m, rad."""
     request = PredictPush.Request(model=model, duration=float(duration))
     request.velocity, request.contact, request.angle = (float(value) for value in push)
     request.covariate_names = list(covariates or {})
@@ -66,14 +69,16 @@ def push_from_request(request: Any) -> PushRequest:
 
 
 def residual_from_request(request: Any) -> Array | None:
-    """The residual (3,) of the window just before, m, m, rad; None if it is not known. Raises RequestError."""
+    """Residuals (k, 3) of the k windows before, oldest first, m, m, rad; None for none. Raises RequestError."""
     if not len(request.push_residual):
         return None
     residual = np.array(request.push_residual, dtype=np.float64)
-    if residual.shape != (3,) or not np.isfinite(residual).all():
-        accepted = "three finite numbers: dx, dy in m and dtheta in rad, observed minus predicted; or none"
+    if len(residual) % 3 or len(residual) > 3 * MOST_EARLIER or not np.isfinite(residual).all():
+        accepted = (
+            f"three finite numbers (dx, dy in m, dtheta in rad) for each of at most {MOST_EARLIER} windows, or none"
+        )
         raise RequestError("push_residual", residual.tolist(), accepted)
-    return residual
+    return residual.reshape(-1, 3)
 
 
 def query_from_batch_request(request: Any) -> PushQuery:

@@ -37,6 +37,7 @@ from push_predictor.nodes.runtime import Stop
 from push_predictor.nodes.server import prediction_services
 from push_predictor.nodes.server.parameters import PARAMETERS
 from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_predict_push_batch
+from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
@@ -134,6 +135,21 @@ def test_residual_of_the_window_before_moves_the_prediction(folder, monkeypatch)
         np.testing.assert_allclose(getattr(moved, name)[0], shrunk @ shrunk.T, rtol=1e-6, atol=1e-18)
 
 
+def test_residuals_of_several_windows_count_by_their_distance(folder, monkeypatch):
+    """As EarlierWindows counts them, the oldest first and farthest away."""
+    persistence = Persistence(np.full(3, 0.2), np.array([0.6, 0.3, 0.0]), np.array([4e-3, 8e-3, 1e-3]))
+    monkeypatch.setattr(prediction_services, "persistence_of", lambda model: persistence)
+    registry = ModelRegistry()
+    registry.load(folder / "gp.model")
+    plain, residuals = answered(registry, None), np.array([[4e-5, 0.0, 1e-3], [-1e-5, 2e-5, 0.0]])
+    both = replace(plain, mean=plain.mean.repeat(2, 0), covariance=plain.covariance.repeat(2, 0))
+    earlier = EarlierWindows(both, both.mean + residuals, GOOD[0] * 0.2 * np.array([2.0, 1.0]))
+    expected, found = given_earlier(plain, earlier, persistence), answered(registry, residuals)
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9)
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-9, atol=1e-20)
+    assert not np.allclose(found.mean, answered(registry, residuals[::-1]).mean, rtol=1e-6)
+
+
 def answered(registry, residual):
     """The prediction of the usual push, given the residual of the window before."""
     response = PredictPush.Response()
@@ -148,7 +164,7 @@ def test_residual_may_be_huge(server):
     assert np.all(np.abs(np.array(moved.mean) - np.array(plain.mean)) < 10.0 * sd)
 
 
-@pytest.mark.parametrize("residual", [[0.0], [0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0]])
+@pytest.mark.parametrize("residual", [[0.0], [0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0], [0.0] * 33])
 def test_rejects_bad_residual(server, residual):
     response = server.push(residual=np.array(residual))
     assert not response.success and not np.any(response.mean)

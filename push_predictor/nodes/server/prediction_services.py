@@ -73,12 +73,19 @@ def handle_predict_push_batch(
 
 
 def _given_residual(model: PushModel, push: PushRequest, prediction: Prediction, residual: Array) -> Prediction:
-    """The prediction for the next window of a push, given the residual (3,) of the window just before.
+    """The prediction for the next window of a push, given the residuals (k, 3) of the windows before, oldest first.
 
-    That window is taken to have had the same prediction, speed and duration.
+    These windows are taken to follow one another, with the same prediction, speed and duration.
     """
-    earlier = EarlierWindows(prediction, prediction.mean + residual, np.array([push.velocity * push.duration]))
-    return given_earlier(prediction, earlier, persistence_of(model))
+    k = len(residual)
+    same = Prediction(
+        prediction.mean.repeat(k, axis=0),
+        prediction.covariance.repeat(k, axis=0),
+        prediction.process_covariance.repeat(k, axis=0),
+        prediction.in_domain.repeat(k),
+    )
+    distance = push.velocity * push.duration * np.arange(k, 0, -1)
+    return given_earlier(prediction, EarlierWindows(same, same.mean + residual, distance), persistence_of(model))
 
 
 def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
