@@ -84,7 +84,7 @@ def _given_residual(model: PushModel, push: PushRequest, prediction: Prediction,
         prediction.process_covariance.repeat(k, axis=0),
         prediction.in_domain.repeat(k),
     )
-    distance = push.velocity * push.duration * np.arange(k, 0, -1)
+    distance = push.velocity * push.duration * np.arange(k, 0, -1, dtype=np.float64)
     return given_earlier(prediction, EarlierWindows(same, same.mean + residual, distance), persistence_of(model))
 
 
