@@ -69,7 +69,7 @@ class TestCandidates:
     def test_an_outline_of_which_hardly_anything_is_left_is_refused(self, learnt: PushModel) -> None:
         slits = tuple((k / 1000 + 1e-9, (k + 1) / 1000 - 1e-9) for k in range(1000))
         with pytest.raises(RequestError, match=r"excluded.*leave more of the outline"):
-            candidate_pushes(learnt, Limits(excluded=slits), 16)
+            candidate_pushes(learnt, Limits(excluded=slits), 1024)
 
     def test_differ_by_seed_only(self, learnt: PushModel) -> None:
         first, same, other = (candidate_pushes(learnt, Limits(), 50, seed) for seed in (0, 0, 1))

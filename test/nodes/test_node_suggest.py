@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_harness as harness
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from synthetic import square_pushes, square_rig
 
 from push_predictor.design.batch import Suggested, suggest_pushes
@@ -19,7 +21,7 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
 from push_predictor.recordings.table import empty_table
-from push_predictor_interfaces.srv import SuggestPushes
+from push_predictor_interfaces.srv import ListModels, SuggestPushes
 
 Ask = Callable[..., SuggestPushes.Response]
 ARRAYS = ("velocity", "contact", "angle", "duration", "variance_left")
@@ -91,6 +93,23 @@ def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any]
     response = ask(**fields)
     assert not response.success and response.message.startswith(message)
     assert not len(response.velocity)
+
+
+def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactivated(folder: Path) -> None:
+    domain = harness.free_domain()
+    running = harness.node_process("predict_server", domain=domain, params={"models": [str(folder / "gp.model")]})
+    with running, harness.ros_context(domain) as node:
+        suggest = node.create_client(SuggestPushes, "suggest_pushes")
+        change = node.create_client(ChangeState, "push_predictor/change_state")
+        harness.acquaint(node, "push_predictor")
+        assert suggest.wait_for_service(harness.START_TIMEOUT)
+        long = suggest.call_async(SuggestPushes.Request(count=200))
+        assert harness.call(node.create_client(ListModels, "list_models"), ListModels.Request()).names == ["gp"]
+        assert not long.done()
+        stop = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        assert harness.call(change, stop).success
+        assert harness.wait_until(long.done)
+        assert long.result().message == "the node is inactive"
 
 
 def test_a_long_request_ends_with_the_node(folder: Path) -> None:
