@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.measured.square import imported_square
 from benchmarks.models.active_table import REFERENCE, print_tables
-from push_predictor.design.batch import FIRST, information_of
+from push_predictor.design.batch import CHOSEN_OF_PRIOR, FIRST, information_of
 from push_predictor.design.candidates import Courses
 from push_predictor.design.information import Information
 from push_predictor.evaluation.push_scores import push_scores
@@ -48,6 +48,7 @@ MODELS: dict[str, tuple[str, MeanChoice]] = {
     "gp": ("gp", "zero"),
     "prior": ("prior", "zero"),
     "gp, mechanics": ("gp", "mechanics"),
+    "vhgp, mechanics": ("vhgp", "mechanics"),
 }
 WAYS = ("random", "Sobol", "suggest", "other start", "variance", "BAIT")
 WITH_MECHANICS = ("random", "Sobol", "suggest", "other start")
@@ -203,12 +204,10 @@ def _chosen(
 ) -> IntArray:
     """Indices (count,) of further pushes of the pool.
 
-    The first pushes are random without mechanics, and chosen by a prior model with them. But `suggest` without and
-    `other start` with mechanics begin with FIRST pushes of the Sobol' sequence.
+    The first pushes are random without mechanics, and chosen by a prior model with them, unless they are spread evenly.
     """
     left = np.setdiff1d(np.arange(len(case.pool.pushes)), taken)
-    evenly = way == ("suggest" if model == "gp" else "other start") and len(taken) < FIRST
-    if way == "Sobol" or evenly:
+    if way == "Sobol" or _spread_evenly(model, way, len(taken)):
         return _nearest_to_sobol(case, left, len(taken), count)
     if trained is None and model != "gp":
         trained = train_model(empty_table(), case.rig, "prior", name="prior")
@@ -216,6 +215,13 @@ def _chosen(
         return rng.choice(left, count, replace=False)
     tried, matter = _pool_courses(case, left), _pool_windows(case)
     return left[distinct(DESIGNS[way](information_of(trained, tried, matter)), count)]
+
+
+def _spread_evenly(model: str, way: str, taken: int) -> bool:
+    """Whether the next pushes are of the Sobol' sequence, as `suggest` has it or as its alternative does."""
+    if way == "suggest" and model == "prior":
+        return taken >= CHOSEN_OF_PRIOR
+    return way == ("suggest" if model == "gp" else "other start") and taken < FIRST
 
 
 def distinct(information: Information, count: int) -> IntArray:

@@ -1,8 +1,9 @@
 """The batch of pushes that a model learns most from.
 
 Greedy selection: each push is the one that most reduces what is left of the expected loss when the pushes before it are
-known. A learnt model without mechanics begins with pushes that are spread evenly: from fewer pushes, its
-hyperparameters are not known well enough to choose by.
+known. Where the criterion is no better than that, pushes are spread evenly: those up to the tenth of a learnt model
+without mechanics, whose hyperparameters are not yet known well enough to choose by; and those from the sixth on of a
+prior model, whose mechanics are known by then but for what they cannot express.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from push_predictor.types import Array, IntArray
 
 CANDIDATES, MATTER = 256, 128  # pushes
 MOST_PUSHES = 200  # half a minute; later pushes should wait for the outcomes of the first
-FIRST = 10  # pushes that are spread evenly; docs/results/suggest.md compares this start with others
+FIRST = 10  # pushes of a learnt model that are spread evenly; docs/results/suggest.md compares this start with others
+CHOSEN_OF_PRIOR = 5  # pushes; the same page has those of a prior model
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +65,10 @@ def suggest_pushes(
     """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
 
     The cost is in log predictive density: the process noise, which no push reduces, is no part of it. It is the mean
-    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. Then the pushes up to the
-    tenth of a learnt model without mechanics, those that it was trained on included, are spread evenly. covariates: of
-    all pushes, as an extended model needs them. seed: of the candidates. check_cancelled is called before each push and
-    may raise. Raises RequestError that names the field.
+    over the pushes that matter: `matter`, or by default all that the robot can make, evenly. Then the first ten pushes
+    of a learnt model without mechanics and all but the first five of a prior model, those that it was trained on
+    included, are spread evenly. covariates: of all pushes, as an extended model needs them. seed: of the candidates.
+    check_cancelled is called before each push and may raise. Raises RequestError that names the field.
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
@@ -77,7 +79,7 @@ def suggest_pushes(
     tried = courses(model, inputs, limits.travel)
     found = information_of(model, tried, relevant, covariates or {})
     before = found.variance
-    evenly = _spread_evenly(model, count) if matter is None else []
+    evenly = _spread_evenly(model, count) if matter is None else [None] * count
     order, variances = greedy(found, count, evenly, _seconds(model, inputs, limits), check_cancelled)
     return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
 
@@ -98,34 +100,37 @@ def information_of(
 def greedy(
     information: Information,
     count: int,
-    first: Sequence[int] = (),
+    given: Sequence[int | None] = (),
     seconds: Callable[[int | None], Array] | None = None,
     check_cancelled: Callable[[], None] | None = None,
 ) -> tuple[IntArray, Array]:
     """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
 
-    first: candidates to begin with. seconds: time (c,) that each candidate takes after the last chosen one (None at
-    first); the largest reduction per second is chosen. Without it, the largest reduction. check_cancelled is called
-    before each choice and may raise.
+    given (count,): candidates that are taken in their place, None where one is chosen. seconds: time (c,) that each
+    candidate takes after the last chosen one (None at first); the largest reduction per second is chosen. Without it,
+    the largest reduction. check_cancelled is called before each choice and may raise.
     """
     order, variances = np.empty(count, dtype=np.int64), np.empty(count)
     last: int | None = None
     for k in range(count):
         if check_cancelled is not None:
             check_cancelled()
-        last = first[k] if k < len(first) else _best(information.gains(), None if seconds is None else seconds(last))
+        fixed = given[k] if k < len(given) else None
+        last = _best(information.gains(), None if seconds is None else seconds(last)) if fixed is None else fixed
         information.observe(last)
         order[k], variances[k] = last, information.variance
     return order, variances
 
 
-def _spread_evenly(model: PushModel, count: int) -> list[int]:
-    """Indices of candidates, at most `count`, which follow a Sobol' sequence: its points of the pushes up to FIRST."""
-    base = model.predictor.base
-    if not isinstance(base, GaussianProcessPredictor) or base.mean is not None:
-        return []
-    known = len(model.training.pushes)
-    return list(range(known, min(known + count, FIRST)))
+def _spread_evenly(model: PushModel, count: int) -> list[int | None]:
+    """The next `count` candidates, which follow a Sobol' sequence; None for those that are to be chosen."""
+    base, known = model.predictor.base, len(model.training.pushes)
+    places = range(known, known + count)
+    if isinstance(base, PriorPredictor):
+        return [place % CANDIDATES if place >= CHOSEN_OF_PRIOR else None for place in places]
+    if isinstance(base, GaussianProcessPredictor) and base.mean is None:
+        return [place if place < FIRST else None for place in places]
+    return [None] * count
 
 
 def _best(gains: Array, seconds: Array | None) -> int:

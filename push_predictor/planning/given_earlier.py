@@ -19,9 +19,7 @@ from push_predictor.models.prediction import Prediction
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.types import Array
 
-LARGEST = (
-    3.0  # whitened residual of an earlier window that counts as it is: tails are heavy, and outliers do not persist
-)
+LARGEST = 3.0  # whitened residual of an earlier window: tails are heavy, and outliers do not persist
 
 
 @dataclass(frozen=True, eq=False)

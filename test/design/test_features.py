@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from push_predictor.design.features import DIFFERENCE, NEGLIGIBLE, features_of
 from push_predictor.errors import RequestError
 from push_predictor.models.mechanics.parameters import BY_NAME
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors import GaussianProcessPredictor
+from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.recordings.table import PushTable, empty_table
@@ -25,8 +26,8 @@ pytestmark = pytest.mark.slow
 TABLE = noisy_pushes(60)
 
 
-def trained(kind: str, table: PushTable = TABLE, **options: object) -> PushModel:
-    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**options))  # type: ignore[arg-type]
+def trained(kind: str, table: PushTable = TABLE, **options: Any) -> PushModel:
+    return train_model(table, square_rig(), kind, name=kind, options=TrainingOptions(**options))
 
 
 def some(count: int = 40, seed: int = 3) -> Push:
@@ -144,7 +145,8 @@ def test_an_effect_adds_its_uncertainty_and_scales_that_of_the_base() -> None:
 def test_effects_that_were_estimated_together_share_their_uncertainty() -> None:
     base = trained("gp", drifting_pushes(40))
     model = extended(base, slippery(0.1, 0.05), grain(0.1))
-    together = replace(model.predictor, cross={(0, 1): np.array([[4e-4, -3e-4]])})  # type: ignore[type-var]
+    assert isinstance(model.predictor, ExtendedPredictor)
+    together = replace(model.predictor, cross={(0, 1): np.array([[4e-4, -3e-4]])})
     covariates = {"elapsed_time": np.full(40, 800.0), "slider_heading": np.linspace(-3.0, 3.0, 40)}
     push = Push(some().inputs, some().duration, covariates)
     found = features_of(replace(model, predictor=together), push)

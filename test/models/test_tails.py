@@ -20,7 +20,7 @@ from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors import ExtendedPredictor, GaussianProcessPredictor
-from push_predictor.models.predictors.tails import STEPS, Tails, half_widths, joint_radius
+from push_predictor.models.predictors.tails import INTERVAL_KINDS, STEPS, Tails, half_widths, joint_radius
 from push_predictor.models.predictors.tails_fit import FEWEST_PUSHES, fit_tails
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model, save_model
@@ -127,7 +127,7 @@ def test_level_outside_zero_and_one_is_refused(level: float, tails: Tails | None
 
 def test_unknown_kind_and_conformal_without_tails_are_refused() -> None:
     with pytest.raises(RequestError, match=r"interval.*bayes.*student or conformal"):
-        made_up().half_width(0.9, "bayes")  # type: ignore[arg-type]
+        made_up().half_width(0.9, "bayes")  # type: ignore[arg-type]  # the point of the test
     with pytest.raises(RequestError, match=r"interval.*conformal"):
         half_widths(None, 0.9, "conformal")
 
@@ -251,8 +251,8 @@ def test_too_few_pushes_and_constant_residuals_have_no_tails() -> None:
 def test_intervals_cover_new_pushes_that_share_an_error(kind: str) -> None:
     model, test = trained(kind), shared_errors(400, 7)
     for level in (0.5, 0.9, 0.95):
-        for interval in ("student", "conformal"):
-            low, high = predicted(model, test).interval(level, interval)  # type: ignore[arg-type]
+        for interval in INTERVAL_KINDS:
+            low, high = predicted(model, test).interval(level, interval)
             inside = (test.outcomes >= low) & (test.outcomes <= high)
             tolerance = 0.12 if level == 0.5 else 0.06  # of 40 training pushes
             assert inside.mean(axis=0) == pytest.approx(np.full(3, level), abs=tolerance)
@@ -343,8 +343,8 @@ def test_saved_model_has_the_same_intervals(tmp_path: Path) -> None:
     model, test = trained("vhgp"), shared_errors(5, 3)
     save_model(model, tmp_path / "a.pushmodel")
     again = load_model(tmp_path / "a.pushmodel")
-    for kind in ("student", "conformal"):
-        ends = [predicted(m, test).interval(0.9, kind) for m in (model, again)]  # type: ignore[arg-type]
+    for kind in INTERVAL_KINDS:
+        ends = [predicted(m, test).interval(0.9, kind) for m in (model, again)]
         assert np.array(ends[1]) == pytest.approx(np.array(ends[0]), rel=1e-6)
     assert joint_radius(tails_of(again), 0.9) == joint_radius(tails_of(model), 0.9)
 
