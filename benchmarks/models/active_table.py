@@ -1,8 +1,9 @@
-"""The tables of active.py: scores by number of pushes, and the pushes that each way needs for the same scores.
+"""The tables of active.py: scores by number of pushes, the pushes that each way needs for the same scores, differences.
 
 Scores are pooled over the pushes to predict of all cases that every way has finished. Intervals (95 %) come from
-resampling these pushes, the same for all ways. A number of pushes is where the line between two sizes crosses the score
-that is to be reached, for the first time.
+resampling these pushes, the same for all ways; of simulated cases, which are pools of different rigs, the pools are
+resampled first. A number of pushes is where the line between two sizes crosses the score that is to be reached, for the
+first time.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ def print_tables(path: Path) -> None:
         print(f"\n## {kind}: {', '.join(cases)}\n")
         _print_scores(curves)
         _print_needed(curves)
+        _print_differences(curves)
 
 
 def curves_of(rows: Sequence[Mapping[str, Any]]) -> tuple[dict[tuple[str, str], Curve], list[str]]:
@@ -48,10 +50,19 @@ def curves_of(rows: Sequence[Mapping[str, Any]]) -> tuple[dict[tuple[str, str], 
     names = sorted({row["case"] for row in rows})
     cases = [case for case in names if all((*way, case, n) in known for way in ways for n in sizes[way])]
     kept = [row for row in rows if row["case"] in cases]
-    pushes = sorted({(row["case"], push) for row in kept for push in row["push_id"]})
-    count = np.random.default_rng(0).multinomial(len(pushes), np.full(len(pushes), 1.0 / len(pushes)), DRAWS)
-    weights = np.concatenate([np.ones((1, len(pushes))), count])
+    pushes = {case: len(next(row for row in kept if row["case"] == case)["push_id"]) for case in cases}
+    groups = list(pushes.values()) if kept[0]["kind"] == "simulated" else [sum(pushes.values())]
+    weights = np.concatenate([np.ones((1, sum(groups))), resampled(groups, np.random.default_rng(0))])
     return {way: _curve([row for row in kept if (row["model"], row["way"]) == way], weights) for way in ways}, cases
+
+
+def resampled(groups: Sequence[int], rng: np.random.Generator) -> Array:
+    """How often each push is drawn, (DRAWS, n): as many groups of these sizes as there are, then pushes of each."""
+    times = rng.multinomial(len(groups), np.full(len(groups), 1.0 / len(groups)), DRAWS)
+    parts = [
+        rng.multinomial(size * drawn, np.full(size, 1.0 / size)) for size, drawn in zip(groups, times.T, strict=True)
+    ]
+    return np.concatenate(parts, axis=1).astype(np.float64)
 
 
 def _curve(rows: Sequence[Mapping[str, Any]], weights: Array) -> Curve:
@@ -121,5 +132,33 @@ def _count(pushes: float, curve: Curve) -> str:
     return f"{pushes:.0f}" if np.isfinite(pushes) else f"over {curve.sizes[-1]:.0f}"
 
 
-def _minus(value: float) -> str:
-    return f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
+def _print_differences(curves: Mapping[tuple[str, str], Curve]) -> None:
+    """`suggest` minus the other ways on the same predicted pushes."""
+    others = [way for way in dict.fromkeys(way for _, way in curves) if way != "suggest"]
+    heads = [f"minus {way}: {score}" for way in others for score in ("NMSE", "NLPD")]
+    print("\n| model | pushes | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 2) + "|")
+    for model in dict.fromkeys(model for model, _ in curves):
+        own = curves[model, "suggest"]
+        for k, size in enumerate(own.sizes.tolist()):
+            compared = [curves.get((model, way)) for way in others]
+            cells = [cell for other in compared for cell in _differences(own, k, other)]
+            print(f"| {model} | {size:.0f} | " + " | ".join(cells) + " |")
+
+
+def _differences(own: Curve, k: int, other: Curve | None) -> list[str]:
+    if other is None or own.sizes[k] not in other.sizes:
+        return ["", ""]
+    at = int(np.flatnonzero(other.sizes == own.sizes[k])[0])
+    return [
+        _interval(own.nmse[:, k] - other.nmse[:, at], 3),
+        _interval(own.nlpd[:, k] - other.nlpd[:, at], 2),
+    ]
+
+
+def _interval(values: Array, digits: int) -> str:
+    low, high = np.quantile(values[1:], [0.025, 0.975])
+    return f"{_minus(values[0], digits)} ({_minus(low, digits)} to {_minus(high, digits)})"
+
+
+def _minus(value: float, digits: int = 2) -> str:
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}")

@@ -10,7 +10,7 @@ from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
-from push_predictor.design.batch import FIRST, _seconds, _spread_evenly, information_of, suggest_pushes
+from push_predictor.design.batch import CHOSEN_OF_PRIOR, FIRST, _seconds, _spread_evenly, information_of, suggest_pushes
 from push_predictor.design.candidates import Courses, candidate_pushes, courses
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
@@ -128,6 +128,16 @@ class TestSuggestedPushes:
         assert _spread_evenly(few_pushes(FIRST), 2) == [None, None]
         assert _spread_evenly(few_pushes(7, mean="mechanics"), 2) == [None, None]
 
+    def test_of_a_prior_model_are_spread_evenly_from_the_sixth_on(self, untrained: PushModel) -> None:
+        short = Limits(travel=0.004)
+        expected = candidate_pushes(untrained, short, 64)
+        found = suggest_pushes(untrained, 8, short).inputs
+        np.testing.assert_array_equal(found[CHOSEN_OF_PRIOR:], expected[CHOSEN_OF_PRIOR:8])
+        assert not np.array_equal(found[:CHOSEN_OF_PRIOR], expected[:CHOSEN_OF_PRIOR])
+        table = noisy_pushes(300)
+        many = train_model(table.take(np.isin(table.push_id, table.pushes[:260])), square_rig(), "prior", name="many")
+        assert _spread_evenly(many, 2) == [4, 5]  # the sequence begins anew after its last candidate
+
     def test_are_where_the_model_was_not_trained(self) -> None:
         known = train_model(one_side(noisy_pushes(200)), square_rig(), "gp", name="one side")
         found = suggest_pushes(known, 5, Limits(angle=(-1.0, 1.0)))
@@ -230,9 +240,7 @@ def _retold(model: PushModel, rows: PushTable) -> PushModel:
 
     predictor = _learnt(model)
     features = predictor.scaling.features(model.rig.outline, rows.inputs)
-    regressions = tuple(
-        GaussianProcess(features, np.zeros(len(rows)), one.parameters) for one in predictor.regressions
-    )
+    regressions = tuple(GaussianProcess(features, np.zeros(len(rows)), one.parameters) for one in predictor.regressions)
     return replace(model, predictor=replace(predictor, regressions=regressions))
 
 
