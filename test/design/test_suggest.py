@@ -134,8 +134,7 @@ class TestSuggestedPushes:
         found = suggest_pushes(untrained, 8, short).inputs
         np.testing.assert_array_equal(found[CHOSEN_OF_PRIOR:], expected[CHOSEN_OF_PRIOR:8])
         assert not np.array_equal(found[:CHOSEN_OF_PRIOR], expected[:CHOSEN_OF_PRIOR])
-        table = noisy_pushes(300)
-        many = train_model(table.take(np.isin(table.push_id, table.pushes[:260])), square_rig(), "prior", name="many")
+        many = train_model(noisy_pushes(260, windows_per_push=1), square_rig(), "prior", name="many")
         assert _spread_evenly(many, 2) == [4, 5]  # the sequence begins anew after its last candidate
 
     def test_are_where_the_model_was_not_trained(self) -> None:
