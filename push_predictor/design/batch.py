@@ -1,9 +1,9 @@
 """The batch of pushes that a model learns most from.
 
-Greedy selection: each push is the one that most reduces what is left of the expected loss when the pushes before it are
-known. Where the criterion is no better than that, pushes are spread evenly: those up to the tenth of a learnt model
-without mechanics, whose hyperparameters are not yet known well enough to choose by; and those from the sixth on of a
-prior model, whose mechanics are known by then but for what they cannot express.
+Greedy selection by what each push would add to the model's knowledge (information.py, greedy.py). Where the criterion
+is no better than that, pushes are spread evenly: those up to the tenth of a learnt model without mechanics, whose
+hyperparameters are not yet known well enough to choose by; and those from the sixth on of a prior model, whose
+mechanics are known by then but for what they cannot express.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.design.candidates import Courses, candidate_pushes, courses
 from push_predictor.design.features import features_of
+from push_predictor.design.greedy import greedy
 from push_predictor.design.information import Information
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
@@ -26,7 +27,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_requests
 from push_predictor.planning.persistence import Persistence, persistence_of
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array
 
 CANDIDATES, MATTER = 256, 128  # pushes
 MOST_PUSHES = 200  # half a minute; later pushes should wait for the outcomes of the first
@@ -80,7 +81,7 @@ def suggest_pushes(
     found = information_of(model, tried, relevant, covariates or {})
     before = found.variance
     evenly = _spread_evenly(model, count) if matter is None else [None] * count
-    order, variances = greedy(found, count, evenly, _seconds(model, inputs, limits), check_cancelled)
+    order, variances = greedy(found, count, evenly, _per_second(model, inputs, limits), check_cancelled)
     return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
 
 
@@ -97,31 +98,6 @@ def information_of(
     return Information(candidates.reshape(count, -1, q), _noise(model, tried), values[cut:].reshape(-1, q))
 
 
-def greedy(
-    information: Information,
-    count: int,
-    given: Sequence[int | None] = (),
-    seconds: Callable[[int | None], Array] | None = None,
-    check_cancelled: Callable[[], None] | None = None,
-) -> tuple[IntArray, Array]:
-    """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
-
-    given (count,): candidates that are taken in their place, None where one is chosen. seconds: time (c,) that each
-    candidate takes after the last chosen one (None at first); the largest reduction per second is chosen. Without it,
-    the largest reduction. check_cancelled is called before each choice and may raise.
-    """
-    order, variances = np.empty(count, dtype=np.int64), np.empty(count)
-    last: int | None = None
-    for k in range(count):
-        if check_cancelled is not None:
-            check_cancelled()
-        fixed = given[k] if k < len(given) else None
-        last = _best(information.gains(), None if seconds is None else seconds(last)) if fixed is None else fixed
-        information.observe(last)
-        order[k], variances[k] = last, information.variance
-    return order, variances
-
-
 def _spread_evenly(model: PushModel, count: int) -> list[int | None]:
     """The next `count` candidates, which follow a Sobol' sequence; None for those that are to be chosen."""
     base, known = model.predictor.base, len(model.training.pushes)
@@ -131,10 +107,6 @@ def _spread_evenly(model: PushModel, count: int) -> list[int | None]:
     if isinstance(base, GaussianProcessPredictor) and base.mean is None:
         return [place if place < FIRST else None for place in places]
     return [None] * count
-
-
-def _best(gains: Array, seconds: Array | None) -> int:
-    return int(np.argmax(gains if seconds is None else gains / seconds))
 
 
 def _matter(model: PushModel, limits: Limits, seed: int) -> Push:
@@ -173,17 +145,17 @@ def _persistence(model: PushModel) -> Persistence:
     return persistence_of(model)
 
 
-def _seconds(model: PushModel, inputs: Array, limits: Limits) -> Callable[[int | None], Array] | None:
-    """Time (c,) of each push after another: its own, and that of the tip around the outline before it."""
+def _per_second(model: PushModel, inputs: Array, limits: Limits) -> Callable[[Sequence[int]], Array] | None:
+    """One over the time (c,) of each push after those chosen: its own, and that of the tip around the outline to it."""
     if limits.transfer_speed is None:
         return None
     own, contact, perimeter = limits.travel / inputs[:, 0], inputs[:, 1], model.rig.outline.perimeter
     speed = limits.transfer_speed
 
-    def seconds(last: int | None) -> Array:
-        if last is None:
-            return np.asarray(own)
-        away = np.abs(contact - contact[last])
-        return np.asarray(own + np.minimum(away, 1.0 - away) * perimeter / speed)
+    def per_second(chosen: Sequence[int]) -> Array:
+        if not len(chosen):
+            return np.asarray(1.0 / own)
+        away = np.abs(contact - contact[chosen[-1]])
+        return np.asarray(1.0 / (own + np.minimum(away, 1.0 - away) * perimeter / speed))
 
-    return seconds
+    return per_second

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from push_predictor.design.batch import greedy
+from push_predictor.design.greedy import greedy
 from push_predictor.design.information import Information
 from push_predictor.types import Array
 
@@ -67,29 +69,34 @@ def test_the_greedy_batch_takes_the_largest_gain_each_time(parts: tuple[Array, A
         assert after == pytest.approx(np.mean(variances(parts, chosen)))
 
 
-def test_the_greedy_batch_may_count_gain_per_second(parts: tuple[Array, Array, Array]) -> None:
-    gains, slow = Information(*parts).gains(), np.ones(C)
+def test_the_gain_of_a_candidate_may_count_less(parts: tuple[Array, Array, Array]) -> None:
+    gains, factor = Information(*parts).gains(), np.ones(C)
     best = int(np.argmax(gains))
-    slow[best] = 1.01 * gains[best] / np.sort(gains)[-2]
+    factor[best] = 0.99 * np.sort(gains)[-2] / gains[best]
     assert greedy(Information(*parts), 1)[0][0] == best
-    assert greedy(Information(*parts), 1, seconds=lambda last: slow)[0][0] == np.argsort(gains)[-2]
+    assert greedy(Information(*parts), 1, factor=lambda order: factor)[0][0] == np.argsort(gains)[-2]
 
 
-def test_the_time_of_a_push_may_depend_on_the_one_before(parts: tuple[Array, Array, Array]) -> None:
-    asked: list[int | None] = []
+def test_by_how_much_a_gain_counts_may_depend_on_those_chosen_before(parts: tuple[Array, Array, Array]) -> None:
+    asked: list[list[int]] = []
 
-    def seconds(last: int | None) -> Array:
-        asked.append(last)
+    def factor(order: Sequence[int]) -> Array:
+        asked.append(list(order))
         return np.ones(C)
 
-    order, _ = greedy(Information(*parts), 3, seconds=seconds)
-    assert asked == [None, *order[:2].tolist()]
+    order = greedy(Information(*parts), 3, factor=factor)[0].tolist()
+    assert asked == [[], order[:1], order[:2]]
 
 
 def test_the_batch_begins_with_given_candidates_and_counts_their_outcomes(parts: tuple[Array, Array, Array]) -> None:
     order, left = greedy(Information(*parts), 3, [4, 1])
     assert order[:2].tolist() == [4, 1]
     assert order[2] == min(range(C), key=lambda other: loss(parts, [4, 1, other]))
+    assert greedy(Information(*parts), 3, [4, None, 1])[0].tolist() == [
+        4,
+        min(range(C), key=lambda other: loss(parts, [4, other])),
+        1,
+    ]
     assert left[1] == pytest.approx(np.mean(variances(parts, [4, 1])))
 
 

@@ -10,7 +10,14 @@ from drifting_models import extended, slippery
 from drifting_models import pushes as drifting_pushes
 from synthetic import noisy_pushes, square_rig
 
-from push_predictor.design.batch import CHOSEN_OF_PRIOR, FIRST, _seconds, _spread_evenly, information_of, suggest_pushes
+from push_predictor.design.batch import (
+    CHOSEN_OF_PRIOR,
+    FIRST,
+    _per_second,
+    _spread_evenly,
+    information_of,
+    suggest_pushes,
+)
 from push_predictor.design.candidates import Courses, candidate_pushes, courses
 from push_predictor.design.limits import Limits
 from push_predictor.errors import RequestError
@@ -200,12 +207,12 @@ class TestSuggestedPushes:
 
     def test_with_a_transfer_speed_the_way_around_the_slider_counts(self, untrained: PushModel) -> None:
         inputs = np.array([[0.02, 0.1, 0.0], [0.03, 0.3, 0.0], [0.02, 0.9, 0.0]])
-        seconds = _seconds(untrained, inputs, Limits(travel=0.03, transfer_speed=0.1))
-        assert seconds is not None
-        np.testing.assert_allclose(seconds(None), [1.5, 1.0, 1.5])
+        per_second = _per_second(untrained, inputs, Limits(travel=0.03, transfer_speed=0.1))
+        assert per_second is not None
+        np.testing.assert_allclose(1.0 / per_second([]), [1.5, 1.0, 1.5])
         perimeter = untrained.rig.outline.perimeter
-        np.testing.assert_allclose(seconds(0), [1.5, 1.0 + 2.0 * perimeter, 1.5 + 2.0 * perimeter])
-        assert _seconds(untrained, inputs, Limits()) is None
+        np.testing.assert_allclose(1.0 / per_second([1, 0]), [1.5, 1.0 + 2.0 * perimeter, 1.5 + 2.0 * perimeter])
+        assert _per_second(untrained, inputs, Limits()) is None
         near = suggest_pushes(untrained, 6, Limits(transfer_speed=0.005))
         far = suggest_pushes(untrained, 6)
         assert _way(near.inputs[:, 1]) < 0.5 * _way(far.inputs[:, 1])

@@ -1,17 +1,19 @@
 """Pushes that would separate rivals: where their predictions differ most, as far as an operator can set them.
 
-The rivals are compared as in a design for discrimination between models (Atkinson and Fedorov 1975): a push is worth
-the squared standardised difference of their predictions. What a rival could still make up by another size, with the
-pushes at hand, does not count as evidence.
+They are designed as the pushes that a model learns most from are (push_predictor.design), with other unknowns. The
+first rival and each other one are a case of their own, in which the effect is a mixture of the two: its unknown is the
+share of the other one. The pushes are chosen that most reduce what is not known of these shares.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_predictor.design.greedy import greedy
+from push_predictor.design.information import Information
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.effects.exact import joint_shift
 from push_predictor.models.mechanisms import Push
@@ -24,6 +26,8 @@ PUSHES = 20
 ROWS = 150  # windows whose inputs are tried; more would only take longer
 APART = 0.25  # distance of inputs, each in units of its range, from which two pushes are different
 HOPELESS = 1.0  # expected difference of the rivals' log densities, in standard errors: below it nothing is decided
+LARGEST_FACTOR = 10.0  # of a rival's size; a rival that needs more does not resemble the first
+UNKNOWN = 1e3  # standard deviation of a size before the pushes made, in units of what was fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,16 +42,18 @@ class Experiment:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pair:
-    """Two rivals at settings (s,) of rows (r,): the squared difference of their predictions (s, r).
+class _Trials:
+    """What could be pushed next: each row of `rows` (r,) at each setting, as c = s * r candidates, setting by setting.
 
-    expected: how clearly the best PUSHES of these would decide, in standard errors.
+    made (p, m, 2), tried (p, c, 3, 2): standardised shifts by the first rival and by each of p others, of the pushes
+    made and of a candidate push.
     """
 
     drivers: tuple[str, ...]
+    rows: IntArray
     settings: list[dict[str, Array]]
-    difference: Array
-    expected: float
+    made: Array
+    tried: Array
 
 
 def separating_pushes(
@@ -55,17 +61,22 @@ def separating_pushes(
 ) -> Experiment:
     """Pushes that would separate the first rival from each other one, within the range of the training inputs.
 
-    The inputs of each push are in the evidence; its covariates are set, as far as they can be, where the two rivals
-    differ most. inside (n,): windows among the inputs of training, all if None. No pushes without rivals.
+    The inputs of each push are in the evidence; its covariates are set, as far as they can be, where they tell most.
+    inside (n,): windows among the inputs of training, all if None. No pushes without rivals.
     """
     usable = _within(evidence.table, training) & (True if inside is None else inside)
     if len(rivals) < 2 or not usable.any():
         return Experiment()
-    rows = _sample(evidence.table, usable, drivers_of(rivals))
-    pairs = [_pair(evidence, rows, rivals[0], other) for other in rivals[1:]]
-    hopeless = [other.covariate for other, pair in zip(rivals[1:], pairs, strict=True) if pair.expected < HOPELESS]
-    known = [pair for pair in pairs if pair.expected >= HOPELESS]
-    return Experiment(_proposed(evidence.table, rows, known) if known else (), tuple(dict.fromkeys(hopeless)))
+    trials = _trials(evidence, usable, rivals)
+    order, clear = _chosen(evidence, trials)
+    known = [other for other, decided in zip(rivals[1:], clear, strict=True) if decided]
+    hopeless = tuple(dict.fromkeys(o.covariate for o, decided in zip(rivals[1:], clear, strict=True) if not decided))
+    if not known:
+        return Experiment(inseparable=hopeless)
+    if hopeless:  # nothing is set for them
+        trials = _trials(evidence, usable, [rivals[0], *known])
+        order, _ = _chosen(evidence, trials)
+    return Experiment(_proposed(evidence.table, trials, order), hopeless)
 
 
 def drivers_of(rivals: Sequence[Effect]) -> tuple[str, ...]:
@@ -92,45 +103,67 @@ def _sample(table: PushTable, usable: BoolArray, drivers: Sequence[str]) -> IntA
     return np.asarray(rows[np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(np.intp)])
 
 
-def _pair(evidence: Evidence, rows: IntArray, first: Effect, other: Effect) -> _Pair:
-    """The rivals at all settings of these rows."""
-    session, near = evidence.table, evidence.take(rows)
-    drivers = drivers_of([first, other])
-    tried = settings(session, near.table, drivers, PUSHES)
-    one, two = (np.stack([_shift(near, covariates, rival) for covariates in tried]) for rival in (first, other))
-    difference = np.sum((one - two) ** 2, axis=2)
-    best = np.unravel_index(np.argsort(-difference, axis=None)[:PUSHES], difference.shape)
-    now = [_shift(near, near.table.covariates, rival) for rival in (first, other)]
-    windows = len(session) / len(session.pushes)
-    weights = (len(session) / len(rows), windows)
-    expected = min(
-        _expected(now[0], now[1], one[best], two[best], weights),
-        _expected(now[1], now[0], two[best], one[best], weights),
-    )
-    return _Pair(drivers, tried, difference, expected)
+def _trials(evidence: Evidence, usable: BoolArray, rivals: Sequence[Effect]) -> _Trials:
+    """The candidates: for each other rival what can be set for it and the first, in the middle of the further pushes.
 
-
-def _expected(now: Array, false_now: Array, then: Array, false_then: Array, weights: tuple[float, float]) -> float:
-    """Expected difference of two rivals' log densities by further pushes, in standard errors.
-
-    Standardised shifts (n, 3) by the true rival and by the false one, at the pushes made and at the further ones, each
-    row with a weight. The false rival may take any multiple of its size.
+    Each counts as a push of as many equal windows as pushes have on average.
     """
-    made, further = weights
-    scale = made * _product(now, false_now) + further * _product(then, false_then)
-    size = made * _product(false_now, false_now) + further * _product(false_then, false_then)
-    factor = scale / max(size, np.finfo(float).tiny)
-    alone = _product(now, false_now) / max(_product(false_now, false_now), np.finfo(float).tiny)
-    after = made * _square(now - factor * false_now) + further * _square(then - factor * false_then)
-    return 0.5 * float(np.sqrt(max(after - made * _square(now - alone * false_now), 0.0)))
+    drivers = drivers_of(rivals)
+    rows = _sample(evidence.table, usable, drivers)
+    near = evidence.take(rows)
+    later = continued(evidence.table, drivers, PUSHES)
+    grown = {name: np.full(len(rows), values[PUSHES // 2]) for name, values in later.items()}
+    pairs = [drivers_of([rivals[0], other]) for other in rivals[1:]]
+    tried = [one | grown for pair in pairs for one in settings(evidence.table, near.table, pair)]
+    rivals = [rivals[0], *(_as_large(near, rivals[0], other) for other in rivals[1:])]
+    made = np.stack([_shift(near, near.table.covariates, rival) for rival in rivals])
+    then = np.stack([np.concatenate([_shift(near, one, rival) for one in tried]) for rival in rivals])
+    weight, windows = len(evidence.table) / len(rows), len(evidence.table) / len(evidence.table.pushes)
+    made, then = np.sqrt(weight) * made.reshape(len(rivals), -1), np.sqrt(windows) * then
+    compared = [[0, other] for other in range(1, len(rivals))]
+    return _Trials(drivers, rows, tried, made[compared].transpose(0, 2, 1), then[compared].transpose(0, 2, 3, 1))
 
 
-def _product(one: Array, other: Array) -> float:
-    return float(np.sum(one * other))
+def _chosen(evidence: Evidence, trials: _Trials) -> tuple[IntArray, BoolArray]:
+    """Candidates in order, and for each other rival (p,) whether they would decide between it and the first."""
+    made, tried = (shifts[..., 0] - shifts[..., 1] for shifts in (trials.made, trials.tried))
+    sd = 1.0 / np.sqrt(1.0 + np.sum(made**2, axis=1))  # of the shares, after the pushes made
+    features = tried.transpose(1, 2, 0) * sd
+    information = Information(_apart(features), _unit(len(features), features[0].size), np.diag(sd))
+    inputs, many = evidence.table.inputs[trials.rows], len(trials.settings)
+
+    def novelty(order: Sequence[int]) -> Array:
+        return np.tile(_novelty(inputs, np.array(order, dtype=np.intp) % len(inputs)), many)
+
+    order, _ = greedy(information, min(PUSHES, len(inputs)), factor=novelty)
+    seen = trials.tried[:, order].reshape(len(sd), -1, 2)
+    gain = [_precision(np.concatenate(both)) - _precision(both[0]) for both in zip(trials.made, seen, strict=True)]
+    return order, np.array([0.5 * np.sqrt(max(one, 0.0)) >= HOPELESS for one in gain])
 
 
-def _square(values: Array) -> float:
-    return float(np.sum(values**2))
+def _apart(features: Array) -> Array:
+    """Features (c, 3 p, p) of candidates whose outcomes (c, 3, p) in each case have an unknown of its own."""
+    c, k, p = features.shape
+    return np.asarray((features[:, :, :, None] * np.eye(p)).transpose(0, 2, 1, 3).reshape(c, p * k, p))
+
+
+def _unit(count: int, size: int) -> Array:
+    return np.broadcast_to(np.eye(size), (count, size, size))
+
+
+def _precision(shifts: Array) -> float:
+    """1 / variance of the less certain of two sizes after pushes with shifts (m, 2), in units of those fitted."""
+    covariance = np.linalg.inv(shifts.T @ shifts + np.eye(2) / UNKNOWN**2)
+    return float(1.0 / covariance.diagonal().max())
+
+
+def _as_large(near: Evidence, first: Effect, other: Effect) -> Effect:
+    """The other rival at the size that explains most of the first: shifts are not quite proportional to sizes."""
+    one, two = (_shift(near, near.table.covariates, rival) for rival in (first, other))
+    size = float(np.sum(one * two) / max(float(np.sum(two**2)), np.finfo(float).tiny))
+    if not 1.0 / LARGEST_FACTOR < size < LARGEST_FACTOR:
+        return other
+    return replace(other, coefficients=size * np.asarray(other.coefficients))
 
 
 def _shift(evidence: Evidence, covariates: Mapping[str, Array], rival: Effect) -> Array:
@@ -139,29 +172,18 @@ def _shift(evidence: Evidence, covariates: Mapping[str, Array], rival: Effect) -
     return np.asarray(np.einsum("nij,nj->ni", evidence.whitener, joint_shift(evidence.mechanics, [rival], push)))
 
 
-def _proposed(session: PushTable, rows: IntArray, pairs: Sequence[_Pair]) -> tuple[Mapping[str, float], ...]:
-    """The pushes of all pairs in turn, each with what to set."""
-    drivers = tuple(dict.fromkeys(name for pair in pairs for name in pair.drivers))
+def _proposed(session: PushTable, trials: _Trials, order: IntArray) -> tuple[Mapping[str, float], ...]:
+    """The candidates in order, each with what to set."""
+    drivers = trials.drivers
     later, travels = continued(session, drivers, PUSHES), travels_of(session, drivers, PUSHES)
     usual = float(travels_of(session, (), 1)[0])
-    inputs, taken = session.inputs[rows], np.zeros(0, dtype=np.intp)
     pushes: list[Mapping[str, float]] = []
-    for k in range(min(PUSHES, len(rows))):
-        pair, turn = pairs[k % len(pairs)], k // len(pairs)
-        setting = _separating(pair)[turn % len(_separating(pair))]
-        row = int(np.argmax(pair.difference[setting] * _novelty(inputs, taken)))
-        taken = np.append(taken, row)
-        push = dict(zip(INPUTS, inputs[row].tolist(), strict=True))
+    for k, (setting, row) in enumerate(zip(*np.divmod(order, len(trials.rows)), strict=True)):
+        push = dict(zip(INPUTS, session.inputs[trials.rows[row]].tolist(), strict=True))
         push |= {"travel": float(travels[k])} if travels[k] > usual else {}
         now = {name: float(values[k]) for name, values in later.items() if name in drivers}
-        pushes.append({**push, **proposed(pair.settings[setting], drivers, row), **now})
+        pushes.append({**push, **proposed(trials.settings[setting], drivers, int(row)), **now})
     return tuple(pushes)
-
-
-def _separating(pair: _Pair) -> list[int]:
-    """The settings at which the rivals differ at least half as much as at the best."""
-    best = pair.difference.max(axis=1)
-    return [int(k) for k in np.flatnonzero(best >= 0.5 * best.max())]
 
 
 def _novelty(inputs: Array, taken: IntArray) -> Array:

@@ -35,19 +35,16 @@ def is_proposed(name: str) -> bool:
     return is_set(name) or name in CUMULATIVE
 
 
-def settings(session: PushTable, rows: PushTable, drivers: Sequence[str], count: int) -> list[dict[str, Array]]:
-    """Covariates (n,) of these n rows of a session, pushed again after it, in each combination of what can be set.
+def settings(session: PushTable, rows: PushTable, drivers: Sequence[str]) -> list[dict[str, Array]]:
+    """Covariates (n,) of these n rows of a session in each combination of what can be set.
 
-    Drivers that can be set are at the low or the high end of the session's values, the slider at TURNS headings. Those
-    that only grow have their values in the middle of `count` further pushes.
+    Drivers that can be set are at the low or the high end of the session's values, the slider at TURNS headings.
     """
     free = [name for name in drivers if is_set(name) and name not in HEADINGS]
     choices: list[list[dict[str, Array]]] = [_ends(session, name, len(rows)) for name in free]
     if any(name in HEADINGS for name in drivers):
         choices.append(_turned(rows))
-    later = continued(session, drivers, count)
-    base = {**rows.covariates, **{name: np.full(len(rows), values[count // 2]) for name, values in later.items()}}
-    return [{**base, **{k: v for part in chosen for k, v in part.items()}} for chosen in product(*choices)]
+    return [{**rows.covariates, **{k: v for part in chosen for k, v in part.items()}} for chosen in product(*choices)]
 
 
 def continued(session: PushTable, drivers: Sequence[str], count: int) -> dict[str, Array]:
