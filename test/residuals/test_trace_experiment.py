@@ -20,7 +20,22 @@ from push_predictor.recordings.table import concatenate
 from push_predictor.residuals.channels.motion import motion_effects
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
-from push_predictor.residuals.selection.experiment import APART, PUSHES, Experiment, _novelty, separating_pushes
+from push_predictor.residuals.selection.experiment import (
+    APART,
+    PUSHES,
+    ROWS,
+    Experiment,
+    _apart,
+    _chosen,
+    _novelty,
+    _precision,
+    _shift,
+    _Trials,
+    _trials,
+    drivers_of,
+    separating_pushes,
+)
+from push_predictor.residuals.selection.settable import continued
 
 SESSION = pushes(120, 2)
 SLID = 0.01 * SESSION.covariates["push_index"]  # m
@@ -155,6 +170,54 @@ def test_contacts_on_both_sides_of_the_first_vertex_are_near() -> None:
     inputs = np.array([[0.02, 0.01, 0.0], [0.02, 0.99, 0.0], [0.02, 0.5, 0.0]])
     novelty = _novelty(inputs, np.array([0]))
     assert novelty[0] == 0.0 and novelty[1] < 0.01 and novelty[2] == 1.0
+
+
+class TestTrials:
+    """What a design compares: the pushes made and those that could be made, as shifts by two rivals."""
+
+    RIVALS = (along("elapsed_time"), along("topic:/warmth"))
+
+    def test_the_pushes_made_count_as_all_windows_of_the_session(self, evidence: Evidence) -> None:
+        made = _trials(evidence, np.ones(len(TABLE), dtype=bool), self.RIVALS).made
+        every = _shift(evidence, TABLE.covariates, self.RIVALS[0])
+        assert len(TABLE) > ROWS and made.shape == (1, 3 * ROWS, 2)
+        assert np.sum(made[0, :, 0] ** 2) == pytest.approx(np.sum(every**2), rel=0.1)
+
+    def test_a_further_push_counts_as_its_windows_in_the_middle_of_the_pushes(self, evidence: Evidence) -> None:
+        found = _trials(evidence, np.ones(len(TABLE), dtype=bool), self.RIVALS)
+        drivers = drivers_of(self.RIVALS)
+        middle = continued(TABLE, drivers, PUSHES)["elapsed_time"][PUSHES // 2]
+        assert all(np.all(one["elapsed_time"] == middle) for one in found.settings)
+        near = evidence.take(found.rows)
+        assert len(TABLE) == 3 * len(TABLE.pushes)
+        window = _shift(near, found.settings[0], self.RIVALS[0])
+        np.testing.assert_allclose(found.tried[0, : len(found.rows), :, 0], np.sqrt(3.0) * window)
+
+    def test_what_the_pushes_made_have_shown_is_not_asked_again(self, evidence: Evidence) -> None:
+        """Each of two cases has 150 candidates that tell as much about it; the first case is settled already."""
+        rows = np.arange(ROWS)
+        tried = np.zeros((2, 2 * ROWS, 3, 2))
+        tried[0, :ROWS, 0, 0] = tried[1, ROWS:, 0, 0] = 1.0
+        made = np.zeros((2, 3 * ROWS, 2))
+        made[0, 0, 0] = 100.0
+        order, _ = _chosen(evidence, _Trials((), rows, [{}, {}], made, tried))
+        assert np.all(order >= ROWS)
+        order, _ = _chosen(evidence, _Trials((), rows, [{}, {}], 0.0 * made, tried))
+        assert 5 < np.sum(order >= ROWS) < 15
+
+
+def test_cases_have_no_unknown_in_common() -> None:
+    features = np.arange(12.0).reshape(2, 3, 2)
+    found = _apart(features)
+    assert found.shape == (2, 6, 2)
+    np.testing.assert_array_equal(found[:, :3, 0], features[:, :, 0])
+    np.testing.assert_array_equal(found[:, 3:, 1], features[:, :, 1])
+    assert not found[:, :3, 1].any() and not found[:, 3:, 0].any()
+
+
+def test_two_sizes_are_as_certain_as_the_less_certain_one() -> None:
+    assert _precision(np.array([[1.0, 0.0], [0.0, 2.0]])) == pytest.approx(1.0, rel=1e-5)
+    assert _precision(np.array([[1.0, 1.0], [2.0, 2.0]])) < 1e-5
 
 
 class TestPushesOfAnExperiment:
