@@ -193,6 +193,17 @@ class TestTrials:
         window = _shift(near, found.settings[0], self.RIVALS[0])
         np.testing.assert_allclose(found.tried[0, : len(found.rows), :, 0], np.sqrt(3.0) * window)
 
+    def test_each_other_rival_is_set_to_both_ends(self, model: PushModel) -> None:
+        damp = WARMTH[::-1].copy()
+        known = evidence_of(model, replace(TABLE, covariates={**TABLE.covariates, "topic:/damp": damp}))
+        of_damp = planted(
+            "contact_friction", "topic:/damp", DriverBasis("linear", ("topic:/damp",), (20.0,), (1.0,)), 0.05
+        )
+        found = _trials(known, np.ones(len(TABLE), dtype=bool), [*self.RIVALS, of_damp])
+        ends = np.quantile(WARMTH, [0.05, 0.95])
+        for name, settings in (("topic:/warmth", found.settings[:2]), ("topic:/damp", found.settings[2:])):
+            np.testing.assert_allclose([one[name][0] for one in settings], ends)
+
     def test_what_the_pushes_made_have_shown_is_not_asked_again(self, evidence: Evidence) -> None:
         """Each of two cases has 150 candidates that tell as much about it; the first case is settled already."""
         rows = np.arange(ROWS)
