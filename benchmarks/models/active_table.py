@@ -44,7 +44,7 @@ def print_tables(path: Path) -> None:
 
 def curves_of(rows: Sequence[Mapping[str, Any]]) -> tuple[dict[tuple[str, str], Curve], list[str]]:
     """The curve of each model and way, and the cases that all have finished."""
-    ways = sorted({(row["model"], row["way"]) for row in rows})
+    ways = list(dict.fromkeys((row["model"], row["way"]) for row in rows))
     sizes = {way: sorted({row["pushes"] for row in rows if (row["model"], row["way"]) == way}) for way in ways}
     known = {(row["model"], row["way"], row["case"], row["pushes"]) for row in rows}
     names = sorted({row["case"] for row in rows})
