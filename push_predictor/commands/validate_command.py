@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from push_predictor.commands.output import add_command, add_rig, check_output, progress, warn, write_json
+from push_predictor.errors import RequestError
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -13,8 +14,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = add_command(
         commands,
         "validate",
-        "Compare a model's predictions with a recording, window by window. Prints the scores, and whether the "
-        "alarm fires, which means that the model no longer fits.",
+        "Compare a model's predictions with a recording, window by window. Prints whether the model fits, the scores, "
+        "and the alarm with its evidence.",
         "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
@@ -37,6 +38,7 @@ def run(options: argparse.Namespace) -> None:
     """Compare, print the scores, and warn about training pushes and other sliders."""
     from push_predictor.evaluation.alarm.evidence import alarm_sentence
     from push_predictor.evaluation.alarm.scores import recording_alarm
+    from push_predictor.evaluation.judgement import judgement
     from push_predictor.evaluation.metrics_text import metrics_lines
     from push_predictor.evaluation.offline import recording_rig, rig_difference, training_overlap, validate_recording
     from push_predictor.evaluation.validation import metrics_json
@@ -46,6 +48,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.windows.push_window import windows_to_table
 
     check_output("--windows", options.windows)
+    _check_recording(options.recording)
     model = load_model(options.model)
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
@@ -53,6 +56,7 @@ def run(options: argparse.Namespace) -> None:
         table = windows_to_table(windows)
         alarm = recording_alarm(model, table, comparison, options.false_alarm_rate)
         metrics = {**metrics_json(comparison), "alarm": alarm}
+        metrics["judgement"] = judgement(metrics)
     if difference := rig_difference(model, rig):
         warn(difference)
     if overlap := training_overlap(model, table):
@@ -60,5 +64,13 @@ def run(options: argparse.Namespace) -> None:
     if options.windows:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):
+        print(metrics["judgement"])
         print("\n".join(metrics_lines(metrics)))
         print(alarm_sentence(alarm))
+
+
+def _check_recording(path: Path) -> None:
+    """Raise RequestError for a push table, which has no streams to find windows in."""
+    if path.name.endswith((".csv", ".csv.gz")):
+        accepted = "a recording; `push_predictor evaluate MODEL TABLE` scores a model on a push table"
+        raise RequestError("RECORDING", str(path), accepted)

@@ -282,6 +282,7 @@ def test_evaluate_and_validate_equal_the_library(kind: str, place: Place, run):
     _, comparison = validate_recording(loaded, Path(recording))
     online = validated.json
     assert online.pop("alarm")["fired"] is False
+    assert online.pop("judgement").startswith("Nothing speaks against the model: 95 % intervals cover ")
     assert online == json.loads(json.dumps(metrics_json(comparison)))
     for metrics in (evaluated.json, online):
         assert_metrics_format(metrics)
@@ -316,7 +317,9 @@ def test_validate_warns_about_a_model_of_another_slider(place: Place, run):
 def test_printed_scores_equal_the_json(place: Place, run):
     call = ["validate", place.path("vhgp.pushmodel"), place.path("test.mcap")]
     metrics, words = run(*call, "--json", "-").json, run(*call).out
-    assert words.startswith(f"hetero: {metrics['n_test']} windows of 4 pushes, trained on 15 windows")
+    judged, scored, *_ = words.splitlines()
+    assert judged == metrics["judgement"]
+    assert scored == f"hetero: {metrics['n_test']} windows of 4 pushes, trained on 15 windows"
     (total,) = (line.split() for line in words.splitlines() if line.startswith("total"))
     assert total[1:4] == [f"{metrics[key]['total']:.3f}" for key in ("nmse", "nlpd", "exact_nlpd")]
 
@@ -325,7 +328,7 @@ def test_json_is_written_to_a_file_and_text_to_stdout(place: Place, run, tmp_pat
     file, log = tmp_path / "new" / "metrics.json", tmp_path / "windows.json"
     call = ["validate", place.path("gp.pushmodel"), place.path("test.mcap")]
     outcome = run(*call, "--json", str(file), "--windows", str(log))
-    assert outcome.out.startswith("gp: ")
+    assert outcome.out.splitlines()[1].startswith("gp: ")
     assert json.loads(file.read_text()) == run(*call, "--json", "-").json
     windows = json.loads(log.read_text())["windows"]
     assert len(windows) == json.loads(file.read_text())["n_test"]
@@ -443,6 +446,7 @@ def changed(call: list[str], option: str, value: str) -> list[str]:
         (["evaluate", "{train}", "{train}"], ["{train}"]),
         (["validate", "{gp}", "{junk}.mcap"], ["junk.mcap", "not an MCAP file"]),
         (["validate", "{gp}", "{gp}"], ["{gp}"]),
+        (["validate", "{gp}", "{tmp}/test.csv"], ["RECORDING", "{tmp}/test.csv", "push_predictor evaluate"]),
         (["validate", "{gp}", "{test}", "--windows", "{tmp}"], ["{tmp}"]),
         (["report", "validation", "--model", "{gp}", "--out", "{tmp}/r"], ["--recording", "both"]),
         (["report", "validation", "--recording", "{test}", "--out", "{tmp}/r"], ["--model", "both"]),
