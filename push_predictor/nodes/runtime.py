@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import queue
 import signal
 import sys
@@ -17,6 +18,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from push_predictor import __version__
 from push_predictor.errors import PushPredictorError
 from push_predictor.nodes.network_security import LIMITED, limit_discovery, require_security, security_hint
 
@@ -69,8 +71,9 @@ def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | 
 
     make_node: returns a rclpy Node that is Closable; its PushPredictorError becomes one line on stderr and status 1.
     Discovery is limited to this machine unless the environment states otherwise. The node is not created without the
-    security that the environment requires.
+    security that the environment requires, for --help and --version, nor with an unknown argument (SystemExit).
     """
+    _parse(name, args)
     stop = Stop()
     _handle_signals(stop)
     try:
@@ -84,6 +87,29 @@ def run(name: str, make_node: Callable[[Stop], Closable], args: Sequence[str] | 
         return _spin(name, node, stop)
     finally:
         rclpy.try_shutdown()
+
+
+def _parse(name: str, args: Sequence[str] | None) -> None:
+    """Answer --help and --version, and refuse every other argument that is not one of ROS, by SystemExit."""
+    parser = argparse.ArgumentParser(
+        prog=name,
+        description=f"The node {name}. docs/reference/{name}.md has its parameters, topics and services.",
+        epilog=f"example: {name} --ros-args --params-file PARAMS.yaml -r __ns:=/cell",
+    )
+    parser.add_argument("--ros-args", metavar="...", help="names, remappings and parameters, as ROS 2 has them")
+    parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")
+    parser.parse_args(_own_arguments(sys.argv[1:] if args is None else args))
+
+
+def _own_arguments(words: Sequence[str]) -> list[str]:
+    """The words outside --ros-args ... --."""
+    own: list[str] = []
+    of_ros = False
+    for word in words:
+        if not of_ros and word != "--ros-args":
+            own.append(word)
+        of_ros = word == "--ros-args" or (of_ros and word != "--")
+    return own
 
 
 def one_line(error: BaseException) -> str:

@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
-from push_predictor.nodes.runtime import Stop
+from push_predictor import __version__
+from push_predictor.errors import PushPredictorError
+from push_predictor.nodes.runtime import Stop, run
 
 
 @pytest.mark.parametrize("events_before", range(6))
@@ -45,3 +47,41 @@ def test_the_first_error_is_kept_and_ends_the_wait() -> None:
     stop.fail(RuntimeError("second"))
     stop.wait()
     assert stop.error is first
+
+
+def no_node(stop: Stop) -> Any:
+    pytest.fail("a node was created")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "stream", "words"),
+    [
+        (["--help"], 0, "out", "docs/reference/push_replay.md"),
+        (["--version"], 0, "out", f"push_predictor {__version__}"),
+        (["--help", "--ros-args", "-p", "rate:=2.0"], 0, "out", "usage: push_replay"),
+        (["recordng:=bags/square_abs_test"], 2, "err", "unrecognized arguments: recordng:=bags/square_abs_test"),
+        (["--rate", "3", "--ros-args", "-r", "__ns:=/cell"], 2, "err", "unrecognized arguments: --rate 3"),
+    ],
+)
+def test_help_version_and_unknown_arguments_start_no_node(
+    arguments: list[str], status: int, stream: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        run("push_replay", no_node, arguments)
+    assert end.value.code == status and words in getattr(capsys.readouterr(), stream)
+
+
+@pytest.mark.parametrize("arguments", [[], ["--ros-args", "-p", "rate:=2.0"], ["--ros-args", "-r", "__ns:=/a", "--"]])
+def test_arguments_of_ros_are_left_to_it(arguments: list[str]) -> None:
+    made = []
+
+    def make_node(stop: Stop) -> Any:
+        made.append(True)
+        raise PushPredictorError("enough")
+
+    assert run("push_replay", make_node, arguments) == 1 and made == [True]
+
+
+def test_arguments_that_ros_refuses_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("push_replay", no_node, ["--ros-args", "-r", "nonsense"]) == 1
+    assert capsys.readouterr().err.startswith("push_replay: ")
