@@ -26,12 +26,14 @@ if TYPE_CHECKING:
     from push_predictor.models.store.model_file import load_model
     from push_predictor.planning.goal import Goal
     from push_predictor.recordings.read import read_recording
+    from push_predictor.recordings.topics import Topics
 
 _PLACES = {
     "Goal": "planning.goal",
     "Limits": "design.limits",
     "PushModel": "models.push_model",
     "Pushes": "models.pushes",
+    "Topics": "recordings.topics",
     "Validation": "api",
     "choose_push": "api",
     "find_windows": "api",
@@ -48,6 +50,7 @@ __all__ = [
     "Limits",
     "PushModel",
     "Pushes",
+    "Topics",
     "Validation",
     "__version__",
     "choose_push",

@@ -33,6 +33,7 @@ from push_predictor.recordings.read import require_rig
 from push_predictor.recordings.rig import Rig, load_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import empty_table
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows import finder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
 
@@ -52,6 +53,7 @@ def train(
     seed: int = 0,
     fit: bool = False,
     mean: MeanChoice = "auto",
+    topics: Topics = Topics(),
     watch: Watch | None = None,
 ) -> PushModel:
     """Train a model on recordings or push tables; a prior model needs none, but then a rig.
@@ -61,7 +63,7 @@ def train(
     default all up to 1000, beyond that 1000 spread evenly over the pushes. fit: choose and estimate the parameters of
     an analytical model. mean: of a vhgp or gp: mechanics fitted first, about which the residual is learnt; zero; or
     auto, which takes the one that predicts held-out training pushes better. watch: called with each stage
-    and the share of the work done; by default stages are printed to stderr.
+    and the share of the work done; by default stages are printed to stderr. topics: of the recordings.
     Raises PushPredictorError (RecordingError, TableError, RigError, TrainingError) that names the file or field.
     """
     watch = watch or _print_stage
@@ -69,7 +71,7 @@ def train(
     watch("read the data", 0.0)
     known = _rig(rig) or load_rig_for(paths)
     supports = different_supports(paths) if (fit or kind == "prior") and rig is None else {}
-    table = load_data(paths, known, numbered=bool(supports)) if paths else empty_table()
+    table = load_data(paths, known, numbered=bool(supports), topics=topics) if paths else empty_table()
     return train_model(
         table,
         known,
@@ -113,12 +115,14 @@ class Validation:
 
 
 @one_blas_thread()
-def validate(model: PushModel, recording: AnyPath, *, rig: Rig | AnyPath | None = None) -> Validation:
+def validate(
+    model: PushModel, recording: AnyPath, *, rig: Rig | AnyPath | None = None, topics: Topics = Topics()
+) -> Validation:
     """Predict every window of a recording that the model was not trained on, and score the predictions.
 
     Raises RecordingError or RigError that names the file.
     """
-    return Validation(*validate_recording(model, Path(recording), _rig(rig)))
+    return Validation(*validate_recording(model, Path(recording), _rig(rig), None, topics))
 
 
 @one_blas_thread()
@@ -132,18 +136,19 @@ def trace(
     seed: int = 0,
     watch: Watch | None = None,
     experiment: AnyPath | Sequence[AnyPath] = (),
+    topics: Topics = Topics(),
 ) -> Trace:
     """Find out why a model no longer fits new recordings: the effect it lacks, its size, and the extended model.
 
     alpha: probability of reporting any effect where there is none. covariates: those to try; all unless given.
     experiment: recordings of the pushes that an earlier trace proposed; they are analysed and never held out.
-    Raises RequestError, RecordingError, TableError or RigError.
+    topics: of the recordings. Raises RequestError, RecordingError, TableError or RigError.
     """
     from push_predictor.residuals.evidence.loading import load_evidence
     from push_predictor.residuals.trace import trace as trace_loaded
 
     designed = _paths(experiment) if experiment else []
-    loaded = load_evidence(_paths(data), _rig(rig), window_options(model), experiment=designed)
+    loaded = load_evidence(_paths(data), _rig(rig), window_options(model), experiment=designed, topics=topics)
     watch = watch or _print_stage
     return trace_loaded(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 

@@ -11,9 +11,13 @@ import tempfile
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.commands.doctor_findings import Finding
 from push_predictor.errors import PushPredictorError
+
+if TYPE_CHECKING:
+    from push_predictor.recordings.topics import Topics
 
 PYTHON = ((3, 10), (3, 13))
 NEEDED = {
@@ -63,14 +67,14 @@ def model_predicts(given: Path | None) -> Finding:
     return Finding("model", "ok", f"{path} loads and predicts ({model.kind}, {len(model.training)} windows)")
 
 
-def recording_reads(given: Path | None) -> Finding:
+def recording_reads(given: Path | None, topics: Topics | None = None) -> Finding:
     """Check that a recording (default: a simulated one) can be read and contains pushes."""
     try:
         from push_predictor.recordings.describe import describe_recording
 
         with tempfile.TemporaryDirectory(prefix="push_predictor_doctor_") as folder:
             path = given or _simulated(Path(folder))
-            found = describe_recording(path)
+            found = describe_recording(path, *([topics] if topics else []))
     except Exception as error:  # as above
         return _broken("recording", _words(error), _OF_A_RECORDING)
     source = str(given) if given else "simulated recording"

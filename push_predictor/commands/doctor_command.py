@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor import __version__
 from push_predictor.commands.doctor_checks import (
@@ -20,8 +21,11 @@ from push_predictor.commands.doctor_checks import (
     space,
 )
 from push_predictor.commands.doctor_findings import Finding
-from push_predictor.commands.output import add_command, progress, write_json
+from push_predictor.commands.output import add_command, add_topics, progress, save_topics_of, topics_of, write_json
 from push_predictor.errors import PushPredictorError
+
+if TYPE_CHECKING:
+    from push_predictor.recordings.topics import Topics
 
 PATIENCE = 90.0  # s for all checks of ROS
 
@@ -40,13 +44,15 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--recording", type=Path, metavar="RECORDING", help="check this recording (default: a simulated one)"
     )
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Run all checks and print the findings. Raises PushPredictorError that names what is missing."""
     with progress("doctor"):
-        findings = list(_findings(options.model, options.recording))
+        findings = list(_findings(options.model, options.recording, topics_of(options)))
+        save_topics_of(options, [options.recording] if options.recording else [])
     missing = [finding.name for finding in findings if finding.state == "missing"]
     content = {"version": __version__, "sound": not missing, "checks": [finding.record() for finding in findings]}
     if not write_json(options, content):
@@ -57,12 +63,12 @@ def run(options: argparse.Namespace) -> None:
         raise PushPredictorError(f"missing or broken: {', '.join(missing)}")
 
 
-def _findings(model: Path | None, recording: Path | None) -> Iterator[Finding]:
+def _findings(model: Path | None, recording: Path | None, topics: Topics) -> Iterator[Finding]:
     yield from python_and_packages()
     yield from _ros_findings()
     yield executables()
     yield model_predicts(model)
-    yield recording_reads(recording)
+    yield recording_reads(recording, topics)
     yield space()
 
 

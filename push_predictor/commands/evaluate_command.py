@@ -5,7 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, check_data, progress, warn, write_json
+from push_predictor.commands.output import (
+    add_command,
+    add_rig,
+    add_topics,
+    check_data,
+    progress,
+    save_topics_of,
+    topics_of,
+    warn,
+    write_json,
+)
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,6 +29,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
@@ -38,7 +49,8 @@ def run(options: argparse.Namespace) -> None:
     check_data(options.data)
     with progress("evaluate"):
         supports = {} if given else different_supports(options.data)
-        table = load_data(options.data, given, numbered=bool(supports))
+        table = load_data(options.data, given, numbered=bool(supports), topics=topics_of(options))
+        save_topics_of(options, options.data)
         model = on_supports(model, given or known_rig(options.data[0]), supports)
         check_table(model, table)
         metrics = metrics_json(compare(model, table))

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, write_json
+from push_predictor.commands.output import add_command, add_topics, save_topics_of, topics_of, write_json
 
 if TYPE_CHECKING:
     from push_predictor.types import Array
@@ -25,6 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor info bags/square_abs_test",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
@@ -37,7 +38,8 @@ def run(options: argparse.Namespace) -> None:
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
     if is_recording(path):
-        found = describe_recording(path)
+        found = describe_recording(path, topics_of(options))
+        save_topics_of(options, [path])
     elif path.name.endswith((".csv", ".csv.gz")):
         found = describe_table(path)
     else:

@@ -1,4 +1,4 @@
-"""What all commands share: options such as --json and --rig, checks of paths, warnings and progress messages."""
+"""What all commands share: options such as --json, --rig and topics, checks of paths, warnings, progress messages."""
 
 from __future__ import annotations
 
@@ -12,9 +12,13 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
+
+if TYPE_CHECKING:
+    from push_predictor.recordings.topics import Topics
 
 PATIENCE = 2.0  # s before the first progress message, and between messages
 
@@ -41,6 +45,50 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig", type=Path, metavar="FILE.yaml", help="rig file, needed if the data contain no push_rig record"
     )
+
+
+def add_topics(parser: argparse.ArgumentParser) -> None:
+    """Add the options that name the topics of recordings; `topics_of` reads them."""
+    group = parser.add_argument_group(
+        "topics of recordings",
+        "TOPIC is a name, TOPIC.FIELD a field of another type, /tf:FRAME a frame. What is not given is read from "
+        "NAME.recording.yaml next to the recording.",
+    )
+    for name, default in (("slider", "slider/pose"), ("pusher", "pusher/pose"), ("wrench", "pusher/wrench")):
+        group.add_argument(f"--{name}-topic", default="", metavar="TOPIC", help=f"default: {default}")
+    group.add_argument(
+        "--covariate-topic",
+        action="append",
+        default=[],
+        metavar="TOPIC",
+        help="a further covariate: TOPIC or TOPIC.FIELD; may be repeated. Topics of scalar types need no option",
+    )
+    group.add_argument("--save-topics", action="store_true", help="save these options in NAME.recording.yaml")
+
+
+def topics_of(options: argparse.Namespace) -> Topics:
+    """The topics given on the command line. Raises RequestError for an empty name."""
+    from push_predictor.recordings.topics import Topics
+
+    for option in ("slider_topic", "pusher_topic", "wrench_topic", "covariate_topic"):
+        given = getattr(options, option)
+        for text in [given] if isinstance(given, str) else given:
+            if text and not text.partition(":")[0].partition(".")[0].strip("/ "):
+                raise RequestError(f"--{option.replace('_', '-')}", text, "TOPIC, TOPIC.FIELD or /tf:FRAME")
+    return Topics(options.slider_topic, options.pusher_topic, options.wrench_topic, tuple(options.covariate_topic))
+
+
+def save_topics_of(options: argparse.Namespace, paths: Sequence[Path]) -> None:
+    """Save the topics next to the recordings among the paths, if --save-topics asks for it; call it once all are read.
+
+    Topics that were saved before and are not given stay. Raises OSError that names the path.
+    """
+    from push_predictor.recordings.table_file import is_recording
+    from push_predictor.recordings.topics import load_topics, save_topics
+
+    for path in (path for path in paths if options.save_topics and is_recording(path)):
+        saved = save_topics(path, topics_of(options).over(load_topics(path)))
+        print(f"topics: {saved}", file=sys.stderr)
 
 
 def add_covariate(parser: argparse.ArgumentParser) -> None:

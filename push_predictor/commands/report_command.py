@@ -8,7 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, check_output, progress, write_json, write_text
+from push_predictor.commands.output import (
+    add_command,
+    add_rig,
+    add_topics,
+    check_output,
+    progress,
+    save_topics_of,
+    topics_of,
+    write_json,
+    write_text,
+)
 from push_predictor.errors import PushPredictorError, RequestError
 
 if TYPE_CHECKING:
@@ -38,6 +48,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
     _add_paper_options(parser.add_argument_group("report paper"))
     _add_validation_options(parser.add_argument_group("report validation"))
+    add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
@@ -129,16 +141,19 @@ def _validation(options: argparse.Namespace) -> None:
 
     from push_predictor.evaluation.offline import report_recording
     from push_predictor.models.store.model_file import load_model
+    from push_predictor.recordings.rig import load_rig
 
     if (options.model is None) != (options.recording is None):
         missing = "--model" if options.model is None else "--recording"
         raise RequestError(missing, "missing", "both --model and --recording, or neither")
+    rig = load_rig(options.rig) if options.rig else None
     with progress("report"):
         if options.model is None:
             models, recording = _simulated(options.out, 60 if options.quick else 300)
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
-        page, metrics = report_recording(models, recording, options.out)
+        page, metrics = report_recording(models, recording, options.out, rig, topics_of(options))
+        save_topics_of(options, [recording])
     write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):
         print(page)

@@ -10,11 +10,14 @@ from push_predictor.commands.output import (
     add_command,
     add_covariate,
     add_rig,
+    add_topics,
     check_data,
     check_output,
     check_seed,
     covariates_of,
     progress,
+    save_topics_of,
+    topics_of,
     write_json,
     write_text,
 )
@@ -73,6 +76,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of the candidates (default 0)")
     parser.add_argument("--out", required=True, type=Path, metavar="FILE.csv", help="output: the pushes, in order")
     add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
 
 
@@ -85,7 +89,7 @@ def run(options: argparse.Namespace) -> None:
     check_seed(options.seed)
     check_output("--out", options.out)
     limits, model = _limits(options), _model(options)
-    matter = None if options.matter is None else _matter(options.matter, model)
+    matter = None if options.matter is None else _matter(options, model)
     with progress("suggest"):
         found = suggest_pushes(
             model, options.count, limits, matter=matter, covariates=covariates_of(options), seed=options.seed
@@ -120,12 +124,14 @@ def _model(options: argparse.Namespace) -> PushModel:
     return train_model(empty_table(), load_rig(options.rig), "prior", name=options.rig.stem)
 
 
-def _matter(path: Path, model: PushModel) -> Pushes:
+def _matter(options: argparse.Namespace, model: PushModel) -> Pushes:
     from push_predictor.models.pushes import Pushes
     from push_predictor.recordings.load import load_data
 
+    path = options.matter
     check_data([path])
-    table = load_data([path], model.rig)
+    table = load_data([path], model.rig, topics=topics_of(options))
+    save_topics_of(options, [path])
     if not len(table):
         raise RequestError("--matter", str(path), "a recording or table with at least one window")
     velocity, contact, angle = table.inputs.T

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 from push_predictor.commands.output import (
     add_command,
     add_rig,
+    add_topics,
     check_data,
     check_output,
     check_seed,
     progress,
+    save_topics_of,
+    topics_of,
     warn,
     write_json,
 )
@@ -59,6 +62,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="write the extended model to this file, if it improves the log density of held-out pushes",
     )
     add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
@@ -79,7 +83,9 @@ def run(options: argparse.Namespace) -> None:
             rig=rig,
             seed=options.seed,
             experiment=options.experiment,
+            topics=topics_of(options),
         )
+    save_topics_of(options, [*options.data, *options.experiment])
     saved = False
     try:
         saved = _write_results(options, found)

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING
 from push_predictor.commands.output import (
     add_command,
     add_rig,
+    add_topics,
     check_data,
     check_output,
     check_seed,
     progress,
+    save_topics_of,
+    topics_of,
     warn,
     write_json,
     write_text,
@@ -86,6 +89,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--name", help="name of the model in the services (default: the name of the file)")
     parser.add_argument("--out", required=True, type=Path, metavar="FILE.pushmodel", help="output: the model file")
     add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
 
 
@@ -106,7 +110,11 @@ def run(options: argparse.Namespace) -> None:
     supports = different_supports(options.data) if (options.fit or kind == "prior") and options.rig is None else {}
     windows = WindowOptions(stride=options.stride)
     with progress("read"):
-        table = load_data(options.data, rig, windows, numbered=bool(supports)) if options.data else empty_table()
+        numbered, topics = bool(supports), topics_of(options)
+        table = (
+            load_data(options.data, rig, windows, numbered=numbered, topics=topics) if options.data else empty_table()
+        )
+        save_topics_of(options, options.data)
     model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
     lines = _saved_ladder(model, ladder, options.out)

@@ -5,7 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, check_output, progress, warn, write_json
+from push_predictor.commands.output import (
+    add_command,
+    add_rig,
+    add_topics,
+    check_output,
+    progress,
+    save_topics_of,
+    topics_of,
+    warn,
+    write_json,
+)
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,6 +40,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
     )
     add_rig(parser)
+    add_topics(parser)
     parser.set_defaults(run=run)
 
 
@@ -49,7 +60,8 @@ def run(options: argparse.Namespace) -> None:
     model = load_model(options.model)
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
     with progress("validate"):
-        windows, comparison = validate_recording(model, options.recording, rig, warn)
+        windows, comparison = validate_recording(model, options.recording, rig, warn, topics_of(options))
+        save_topics_of(options, [options.recording])
         table = windows_to_table(windows)
         alarm = recording_alarm(model, table, comparison, options.false_alarm_rate)
         metrics = {**metrics_json(comparison), "alarm": alarm}

@@ -17,19 +17,24 @@ from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 from push_predictor.recordings.windows.stream_faults import describe_recording_faults
 
 
 def recorded_windows(
-    model: PushModel, path: Path, rig: Rig | None = None, report: Callable[[str], None] | None = None
+    model: PushModel,
+    path: Path,
+    rig: Rig | None = None,
+    report: Callable[[str], None] | None = None,
+    topics: Topics = Topics(),
 ) -> tuple[list[PushWindow], PushTable]:
     """Find the windows of a recording, with the model's duration. Raises RecordingError if there is none.
 
     report receives a sentence for each fault of the streams.
     """
-    recording = read_recording(path, rig=rig)
+    recording = read_recording(path, rig=rig, topics=topics)
     finder = WindowFinder(require_rig(recording), window_options(model))
     windows = finder.find(recording)
     if report is not None:
@@ -72,20 +77,26 @@ def training_overlap(model: PushModel, table: PushTable) -> str:
 
 
 def validate_recording(
-    model: PushModel, path: Path, rig: Rig | None = None, report: Callable[[str], None] | None = None
+    model: PushModel,
+    path: Path,
+    rig: Rig | None = None,
+    report: Callable[[str], None] | None = None,
+    topics: Topics = Topics(),
 ) -> tuple[list[PushWindow], Comparison]:
     """Predict every window of a recording, as predict_server does; report as for `recorded_windows`."""
-    windows, table = recorded_windows(model, path, rig, report)
+    windows, table = recorded_windows(model, path, rig, report, topics)
     model = on_supports(model, rig or recording_rig(path), {})
     check_table(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
     return windows, comparison_of(model, table, prediction.mean, prediction.covariance)
 
 
-def report_recording(models: Sequence[PushModel], path: Path, out: Path) -> tuple[Path, list[dict[str, object]]]:
+def report_recording(
+    models: Sequence[PushModel], path: Path, out: Path, rig: Rig | None = None, topics: Topics = Topics()
+) -> tuple[Path, list[dict[str, object]]]:
     """Write the HTML report of models on a recording, the main model first; return page and metrics."""
-    windows, table = recorded_windows(models[0], path)
-    models = [on_supports(model, recording_rig(path), {}) for model in models]
+    windows, table = recorded_windows(models[0], path, rig, topics=topics)
+    models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
     for model in models:
         check_table(model, table)
     comparisons = [compare(model, table) for model in models]

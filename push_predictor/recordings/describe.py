@@ -9,12 +9,13 @@ import numpy as np
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.table_file import read_table, rig_of_table
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 
 
-def describe_recording(path: Path) -> dict[str, object]:
+def describe_recording(path: Path, topics: Topics = Topics()) -> dict[str, object]:
     """Streams, rig, pushes and windows of a recording. Raises RecordingError for an unreadable file."""
-    recording = read_recording(path)
+    recording = read_recording(path, topics=topics)
     found: dict[str, object] = {"recording": recording.name, "rig": _rig(recording), "streams": _streams(recording)}
     if recording.rig is not None:
         windows = find_windows(recording, recording.rig)

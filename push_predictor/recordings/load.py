@@ -14,22 +14,28 @@ from push_predictor.recordings.read import read_recording, recorded_rig, require
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, rig_path
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 from push_predictor.types import Array
 
 
 def load_data(
-    paths: Sequence[Path], rig: Rig | None = None, options: WindowOptions = WindowOptions(), *, numbered: bool = False
+    paths: Sequence[Path],
+    rig: Rig | None = None,
+    options: WindowOptions = WindowOptions(),
+    *,
+    numbered: bool = False,
+    topics: Topics = Topics(),
 ) -> PushTable:
     """The windows of all recordings and the rows of all tables, in the order given.
 
-    rig replaces the recorded one. numbered: add the covariate `recording`, the number of the path from 0. A covariate
-    is kept if all data have it. If two paths use the same push_id for different rows, the name of the path is prefixed
-    to it; the same rows twice remain one push. Raises RecordingError (also if no recording has a window), TableError or
-    RigError.
+    rig replaces the recorded one; topics: of all recordings. numbered: add the covariate `recording`, the number of
+    the path from 0. A covariate is kept if all data have it. If two paths use the same push_id for different rows, the
+    name of the path is prefixed to it; the same rows twice remain one push. Raises RecordingError (also if no recording
+    has a window), TableError or RigError.
     """
-    tables = [_load(Path(path), rig, options) for path in paths]
+    tables = [_load(Path(path), rig, options, topics) for path in paths]
     if numbered:
         tables = [_numbered(number, table) for number, table in enumerate(tables)]
     if paths and not any(map(len, tables)):
@@ -76,10 +82,10 @@ def distinct_pushes(names: Sequence[str], tables: Sequence[PushTable]) -> list[P
     return list(tables)
 
 
-def _load(path: Path, rig: Rig | None, options: WindowOptions) -> PushTable:
+def _load(path: Path, rig: Rig | None, options: WindowOptions, topics: Topics) -> PushTable:
     if not is_recording(path):
         return read_table(path)
-    recording = read_recording(path, rig=rig)
+    recording = read_recording(path, rig=rig, topics=topics)
     return windows_to_table(find_windows(recording, require_rig(recording), options))
 
 

@@ -1,14 +1,109 @@
-"""The topic names of a recording's streams."""
+"""The topics of a recording's streams: given by the caller, or saved in NAME.recording.yaml next to the bag."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.atomic import write_whole
+
+ENDING = ".recording.yaml"
+FRAMES = ("slider", "pusher", "world")
 
 
 @dataclass(frozen=True)
-class TopicNames:
-    """Topics of a recording (docs/reference/recordings.md); a leading slash makes no difference."""
+class Topics:
+    """Where the streams of a recording are (docs/reference/recordings.md); '' and () mean: not given.
 
-    slider: str = "slider/pose"
-    pusher: str = "pusher/pose"
-    wrench: str = "pusher/wrench"
+    slider, pusher and wrench are topics; a leading slash makes no difference. `TOPIC.FIELD` names a field of another
+    type, `/tf:FRAME` a frame. covariates: further scalars, each a topic or TOPIC.FIELD. world: the frame in which
+    poses from tf are given.
+    """
+
+    slider: str = ""
+    pusher: str = ""
+    wrench: str = ""
+    covariates: tuple[str, ...] = ()
+    world: str = ""
+
+    def over(self, other: Topics) -> Topics:
+        """These topics, and those of another where these are not given."""
+        return replace(other, **{key: value for key, value in vars(self).items() if value})
+
+
+DEFAULT_TOPICS = Topics("slider/pose", "pusher/pose", "pusher/wrench")
+
+
+def topics_path(recording: Path) -> Path:
+    """NAME.recording.yaml for the folder NAME or the file NAME.mcap."""
+    path = Path(os.path.abspath(recording))
+    return path.with_name(f"{path.name if path.is_dir() else path.stem}{ENDING}")
+
+
+def load_topics(recording: Path) -> Topics:
+    """The topics saved next to a recording, none without a file.
+
+    Raises RecordingError that names file, key, value and what is accepted.
+    """
+    import yaml
+
+    path = topics_path(recording)
+    if not path.is_file():
+        return Topics()
+    try:
+        saved = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RecordingError(f"{path}: cannot be read ({' '.join(str(error).split())})") from None
+    return _parsed(saved, path)
+
+
+def save_topics(recording: Path, topics: Topics) -> Path:
+    """Save topics next to a recording and return the file's path. Raises OSError that names the path."""
+    import yaml
+
+    content: dict[str, object] = {_key(name): getattr(topics, name) for name in ("slider", "pusher", "wrench")}
+    content |= {"covariate_topics": list(topics.covariates)}
+    content |= {"frames": {"world": topics.world} if topics.world else {}}
+    path = topics_path(recording)
+    write_whole(path, yaml.safe_dump({key: value for key, value in content.items() if value}, sort_keys=False).encode())
+    return path
+
+
+def _key(name: str) -> str:
+    return f"{name}_topic"
+
+
+def _parsed(saved: object, path: Path) -> Topics:
+    keys = [*(_key(field.name) for field in fields(Topics)[:3]), "covariate_topics", "frames"]
+    if not isinstance(saved, dict):
+        raise RecordingError(f"{path}: contains {saved!r}, give the keys {', '.join(keys)}")
+    if unknown := [key for key in saved if key not in keys]:
+        raise RecordingError(f"{path}: key {unknown[0]!r} is not accepted, give {', '.join(keys)}")
+    frames = _frames(saved.get("frames"), path)
+    given = {name: _text(saved.get(_key(name)), path, _key(name)) for name in ("slider", "pusher", "wrench")}
+    for name in ("slider", "pusher"):
+        if frames[name] and given[name]:
+            raise RecordingError(f"{path}: gives both {_key(name)} and frames {name}, give one of them")
+        given[name] = given[name] or (f"/tf:{frames[name]}" if frames[name] else "")
+    return Topics(**given, covariates=_list(saved.get("covariate_topics"), path), world=frames["world"])
+
+
+def _frames(value: object, path: Path) -> dict[str, str]:
+    if value is not None and not (isinstance(value, dict) and set(value) <= set(FRAMES)):
+        raise RecordingError(f"{path}: frames is {value!r}, give a mapping with the keys {', '.join(FRAMES)}")
+    given = value if isinstance(value, dict) else {}
+    return {name: _text(given.get(name), path, f"frames {name}") for name in FRAMES}
+
+
+def _list(value: object, path: Path) -> tuple[str, ...]:
+    if value is not None and not isinstance(value, list):
+        raise RecordingError(f"{path}: covariate_topics is {value!r}, give a list of topics")
+    return tuple(_text(item, path, "covariate_topics") for item in value or ())
+
+
+def _text(value: object, path: Path, key: str) -> str:
+    if value is not None and not (isinstance(value, str) and value.strip()):
+        raise RecordingError(f"{path}: {key} is {value!r}, give a name")
+    return value.strip() if isinstance(value, str) else ""

@@ -15,7 +15,7 @@ from push_predictor.recordings.bag.definitions import FLOAT64, POSE, SCALAR_LAYO
 from push_predictor.recordings.bag.writer import BagWriter
 from push_predictor.recordings.rig import RECORD_NAME
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
-from push_predictor.recordings.topics import TopicNames
+from push_predictor.recordings.topics import DEFAULT_TOPICS
 from push_predictor.types import IntArray
 
 __all__ = ["BagWriter", "write_recording"]
@@ -46,7 +46,7 @@ def write_recording(path: Path, recording: Recording, *, compression: str = "zst
 
 
 def _encoded(recording: Recording) -> list[_Encoded]:
-    names = TopicNames()
+    names = DEFAULT_TOPICS
     try:
         topics = [_pose(names.slider, recording.slider), _pose(names.pusher, recording.pusher)]
         if recording.wrench is not None:

@@ -18,6 +18,7 @@ from push_predictor.models.store.model_file import load_model
 from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.topics import Topics
 from push_predictor.residuals.candidates.coefficients import estimated_effects
 from push_predictor.residuals.channel_search import Corrected, Searched, search_all
 from push_predictor.residuals.channels.motion import MotionFinding
@@ -50,16 +51,17 @@ def trace_data(
     seed: int = 0,
     watch: Watch = no_watch,
     experiment: Sequence[Path | str] = (),
+    topics: Topics = Topics(),
 ) -> Trace:
     """Judge a model file on recordings or push tables that it was not trained on; see `trace`.
 
     experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
-    the errors before and after are of the same pushes as in that trace.
+    the errors before and after are of the same pushes as in that trace. topics: of all recordings.
     """
     watch("windows", 0.0)
     model = load_model(Path(model_path))
     data, designed = ([Path(path) for path in given] for given in (paths, experiment))
-    loaded = load_evidence(data, rig, window_options(model), experiment=designed)
+    loaded = load_evidence(data, rig, window_options(model), experiment=designed, topics=topics)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 

@@ -18,22 +18,22 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
 from push_predictor.recordings.bag.definitions import FLOAT64, POSE, WRENCH, MessageType
 from push_predictor.recordings.bag.reader import open_bag
-from push_predictor.recordings.read import TopicNames, read_recording, require_rig
+from push_predictor.recordings.read import Topics, read_recording, require_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.write import write_recording
 
 N = 40
 STAMP = 1_700_000_000_000_000_000 + 4_000_000 * np.arange(N, dtype=np.int64)
 POSES = np.column_stack([0.001 * np.arange(N), np.zeros((N, 5)), np.ones(N)])
-Topics = dict[str, tuple[MessageType, list[bytes]]]
+Content = dict[str, tuple[MessageType, list[bytes]]]
 
 
-def pose_topics(frame_id: str = "world") -> Topics:
+def pose_topics(frame_id: str = "world") -> Content:
     messages = encode(STAMP, POSES, POSE_STAMPED, frame_id)
     return {"/slider/pose": (POSE, messages), "/pusher/pose": (POSE, messages)}
 
 
-def write_mcap(path: Path, topics: Topics, stamp: np.ndarray = STAMP, **options: object) -> Path:
+def write_mcap(path: Path, topics: Content, stamp: np.ndarray = STAMP, **options: object) -> Path:
     """A file written by the mcap package; metadata=(name, record) is at its end, encoding is that of the channels."""
     metadata, encoding = options.pop("metadata", None), str(options.pop("encoding", "cdr"))
     with path.open("wb") as stream:
@@ -213,7 +213,7 @@ def test_missing_topic_is_reported_with_the_existing_topics(tmp_path: Path) -> N
 def test_topics_can_have_other_names(tmp_path: Path) -> None:
     topics = {"/vicon/square/square": pose_topics()["/slider/pose"], "/tip": pose_topics()["/pusher/pose"]}
     path = write_mcap(tmp_path / "a.mcap", topics)
-    read = read_recording(path, topics=TopicNames(slider="vicon/square/square", pusher="/tip"))
+    read = read_recording(path, topics=Topics(slider="vicon/square/square", pusher="/tip"))
     assert len(read.slider) == len(read.pusher) == N
 
 
@@ -283,7 +283,7 @@ def test_every_scalar_type_becomes_a_possible_covariate(tmp_path: Path) -> None:
     def kind(name: str) -> MessageType:
         return MessageType(name, "", "")
 
-    topics: Topics = {
+    topics: Content = {
         "/float64": (FLOAT64, encode(STAMP, value, Layout(False, 1))),
         "/float32": (kind("std_msgs/msg/Float32"), encode(STAMP, value, Layout(False, 1, 4))),
         "/temperature": (kind("sensor_msgs/msg/Temperature"), with_variance),

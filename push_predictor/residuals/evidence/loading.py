@@ -15,6 +15,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import INPUTS, PushTable, concatenate, empty_table
 from push_predictor.recordings.table_file import is_recording, read_table
+from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 from push_predictor.recordings.windows.track import NANOSECOND
@@ -45,8 +46,9 @@ def load_evidence(
     options: WindowOptions = WindowOptions(),
     *,
     experiment: Sequence[Path] = (),
+    topics: Topics = Topics(),
 ) -> LoadedData:
-    """Load recordings and push tables; rig overrides theirs.
+    """Load recordings and push tables; rig and topics override theirs.
 
     experiment: recordings of pushes that an earlier trace proposed. They continue the recordings before them, with the
     same number, so that the experiment adds no covariate `recording` of its own. Raises RecordingError (also if no file
@@ -57,7 +59,11 @@ def load_evidence(
     if twice := designed & {Path(path).resolve() for path in paths}:
         raise RecordingError(f"{min(twice)}: given as data and as experiment, give it once")
     rig = rig or load_rig_for(every)
-    bags = [(path.resolve() in designed, read_recording(path, rig=rig)) for path in every if is_recording(path)]
+    bags = [
+        (path.resolve() in designed, read_recording(path, rig=rig, topics=topics))
+        for path in every
+        if is_recording(path)
+    ]
     bags.sort(key=lambda bag: _first_stamp(bag[1]))
     files = [path for path in every if not is_recording(path)]
     tables = [(path.resolve() in designed, path.name, _read(path, rig)) for path in files]

@@ -1,0 +1,161 @@
+"""Columns of fields from CDR messages of any type (XCDR1, either byte order), many messages at a time.
+
+Where a field lies depends only on the lengths of the strings and sequences before it. One message is walked; all
+messages that have the same lengths at the same bytes are then read at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from push_predictor.recordings.fields.message_text import Field, short_name
+from push_predictor.types import Array, IntArray
+
+_PREFIX = 4  # bytes of encapsulation, from which numbers are aligned
+_NUMBERS = {
+    **dict.fromkeys(("bool", "byte", "char"), "u1"),
+    **{f"{sign}int{bits}": f"{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)},
+    "float32": "f4",
+    "float64": "f8",
+}
+NUMBERS = frozenset(_NUMBERS)
+
+
+@dataclass
+class _Layout:
+    """Where fields of one message lie: numbers {path: (byte, type code)}, texts {path: (byte, length)}.
+
+    lengths: (byte, value) of every length that was read on the way.
+    """
+
+    numbers: dict[str, tuple[int, str]] = field(default_factory=dict)
+    texts: dict[str, tuple[int, int]] = field(default_factory=dict)
+    lengths: list[tuple[int, int]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Messages of the same layout: rows (n,) among those given; numbers and texts by field path, of n messages."""
+
+    rows: IntArray
+    order: str
+    data: NDArray[np.uint8]
+    layout: _Layout
+
+    def paths(self, prefix: str) -> list[str]:
+        """The paths of the numbers at a field or below it, in their order in the message."""
+        return [path for path in self.layout.numbers if path == prefix or path.startswith((f"{prefix}.", f"{prefix}["))]
+
+    def number(self, path: str) -> Array:
+        """The numbers (n,) of a field; 64-bit integers are rounded."""
+        at, code = self.layout.numbers[path]
+        column = np.ascontiguousarray(self.data[:, at : at + int(code[1:])])
+        with np.errstate(invalid="ignore"):  # widening a signalling NaN
+            return np.asarray(column.view(f"{self.order}{code}")[:, 0].astype(np.float64))
+
+    def text(self, path: str) -> list[str]:
+        """The texts (n,) of a field."""
+        at, length = self.layout.texts[path]
+        column = self.data[:, at : at + length]
+        if len(column) and (column == column[0]).all():
+            return [_decoded(column[0])] * len(column)
+        return [_decoded(row) for row in column]
+
+
+def blocks(
+    messages: Sequence[bytes],
+    type_name: str,
+    definitions: Mapping[str, tuple[Field, ...]],
+    wanted: Sequence[str],
+) -> Iterator[Block]:
+    """The wanted top-level fields of all readable messages; a message that is not readable is in no block."""
+    lengths = np.fromiter(map(len, messages), np.int64, len(messages))
+    for length in np.unique(lengths):
+        rows = np.flatnonzero(lengths == length)
+        data = np.frombuffer(b"".join([messages[i] for i in rows.tolist()]), np.uint8).reshape(len(rows), int(length))
+        while len(rows):
+            try:
+                order, layout = _walked(data[0].tobytes(), short_name(type_name), definitions, wanted)
+            except (ValueError, LookupError):
+                rows, data = rows[1:], data[1:]
+                continue
+            same = _same(data, order, layout)
+            yield Block(rows[same], order, data[same], layout)
+            rows, data = rows[~same], data[~same]
+
+
+def _same(data: NDArray[np.uint8], order: str, layout: _Layout) -> NDArray[np.bool_]:
+    same = (data[:, :2] == data[0, :2]).all(axis=1)
+    for at, value in layout.lengths:
+        same &= np.ascontiguousarray(data[:, at : at + 4]).view(f"{order}u4")[:, 0] == value
+    return np.asarray(same)
+
+
+def _walked(
+    message: bytes, type_name: str, definitions: Mapping[str, tuple[Field, ...]], wanted: Sequence[str]
+) -> tuple[str, _Layout]:
+    """(byte order, layout) of one message up to the last wanted field. Raises ValueError or LookupError."""
+    if len(message) < _PREFIX or message[0] != 0 or message[1] not in (0, 1):
+        raise ValueError("not XCDR1")
+    order = "<" if message[1] else ">"
+    walk = _Walk(message, order, definitions)
+    fields = definitions[type_name]
+    last = max(number for number, each in enumerate(fields) if each.name in wanted)
+    for each in fields[: last + 1]:
+        walk.field(each, each.name)
+    return order, walk.layout
+
+
+class _Walk:
+    """A place in one message, and the layout of what came before it."""
+
+    def __init__(self, message: bytes, order: str, definitions: Mapping[str, tuple[Field, ...]]) -> None:
+        self.message, self.definitions = message, definitions
+        self.at, self.layout = _PREFIX, _Layout()
+        self._byteorder = order
+
+    def field(self, each: Field, path: str) -> None:
+        if each.array is None:
+            self._value(each.type, path)
+            return
+        count = each.array or self._length()
+        if count > len(self.message):
+            raise ValueError(f"{path} has {count} elements")
+        for number in range(count):
+            self._value(each.type, f"{path}[{number}]")
+
+    def _value(self, kind: str, path: str) -> None:
+        if code := _NUMBERS.get(kind):
+            at = self._take(int(code[1:]), int(code[1:]))
+            self.layout.numbers[path] = (at, code)
+        elif kind == "string":
+            length = self._length()
+            self.layout.texts[path] = (self._take(1, length), length)
+        else:
+            fields = self.definitions[kind]
+            for each in fields:
+                self.field(each, f"{path}.{each.name}")
+            if not fields:
+                self._take(1, 1)  # an empty message has one byte in CDR
+
+    def _length(self) -> int:
+        at = self._take(4, 4)
+        value = int.from_bytes(self.message[at : at + 4], "little" if self._byteorder == "<" else "big")
+        self.layout.lengths.append((at, value))
+        return value
+
+    def _take(self, size: int, length: int) -> int:
+        """Where `length` bytes aligned to `size` begin."""
+        at = _PREFIX + -(-(self.at - _PREFIX) // size) * size
+        self.at = at + length
+        if self.at > len(self.message):
+            raise ValueError("the message is too short")
+        return at
+
+
+def _decoded(row: NDArray[np.uint8]) -> str:
+    return row.tobytes().rstrip(b"\0").decode(errors="replace")

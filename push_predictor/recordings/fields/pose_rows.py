@@ -1,0 +1,53 @@
+"""Poses in space as rows of numbers: composed, inverted and interpolated many at a time.
+
+A row is x, y, z (m) and a unit quaternion x, y, z, w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.types import Array
+
+_PARALLEL = 1.0 - 1e-10  # cosine above which a straight line between two quaternions is exact to rounding
+
+
+def normalised(rows: Array) -> Array:
+    """Rows (n, 7) with unit quaternions; a quaternion of length zero becomes NaN."""
+    length = np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.hstack([rows[:, :3], np.where(length > 1e-6, rows[:, 3:] / length, np.nan)])
+
+
+def composed(outer: Array, inner: Array) -> Array:
+    """Poses (n, 7) given in frames whose poses (n, 7) are `outer`, in the frame in which `outer` is given."""
+    q, p = outer[:, 3:], inner[:, 3:]
+    vector = q[:, 3:] * p[:, :3] + p[:, 3:] * q[:, :3] + np.cross(q[:, :3], p[:, :3])
+    scalar = q[:, 3] * p[:, 3] - np.sum(q[:, :3] * p[:, :3], axis=1)
+    return np.column_stack([outer[:, :3] + turned(q, inner[:, :3]), vector, scalar])
+
+
+def inverted(rows: Array) -> Array:
+    """The poses (n, 7) of the outer frames in the inner ones."""
+    inverse = rows[:, 3:] * [-1.0, -1.0, -1.0, 1.0]
+    return np.hstack([-turned(inverse, rows[:, :3]), inverse])
+
+
+def turned(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (n, 3) rotated by quaternions (n, 4)."""
+    axis, w = quaternions[:, :3], quaternions[:, 3:]
+    twice = 2.0 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * twice + np.cross(axis, twice))
+
+
+def interpolated(first: Array, second: Array, share: Array) -> Array:
+    """Poses (n, 7) at a share (n,) of the way from the first to the second, turning the shorter way round."""
+    cosine = np.sum(first[:, 3:] * second[:, 3:], axis=1)
+    sign = np.where(cosine < 0.0, -1.0, 1.0)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, _PARALLEL))
+    near = np.abs(cosine) > _PARALLEL
+    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / np.sin(angle))
+    b = np.where(near, share, np.sin(share * angle) / np.sin(angle))
+    quaternion = a[:, None] * first[:, 3:] + (sign * b)[:, None] * second[:, 3:]
+    position = (1.0 - share)[:, None] * first[:, :3] + share[:, None] * second[:, :3]
+    return normalised(np.hstack([position, quaternion]))

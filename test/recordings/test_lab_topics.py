@@ -1,0 +1,367 @@
+"""A laboratory's own topics, types and frames give the windows of the original recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("rosbags")
+from lab_bags import Lab, pose_rows, short_recording
+
+from push_predictor.cli import main
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.fields.message_text import STANDARD
+from push_predictor.recordings.fields.pose_rows import composed, interpolated, inverted, normalised
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.topics import Topics, load_topics, save_topics, topics_path
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+
+VICON, UR = "/vicon/block/block", "/ur5/tool0_pose"
+TRANSFORM = "geometry_msgs/msg/TransformStamped"
+TIP = {
+    "lab_msgs/msg/Tip": "string[] notes\nint8 state\nOdom odom\ngeometry_msgs/Wrench ft\nfloat32[] volts\n",
+    "lab_msgs/msg/Odom": "std_msgs/Header header\nfloat64 age # s\nint8 K=3\ngeometry_msgs/PoseStamped pose\n",
+}
+
+
+@cache
+def original() -> Recording:
+    return short_recording()
+
+
+def table(recording: Recording) -> PushTable:
+    assert recording.rig is not None
+    return windows_to_table(find_windows(recording, recording.rig))
+
+
+def assert_same_windows(found: Recording) -> None:
+    one, other = table(found), table(replace(original(), name=found.name))
+    tolerance = {"rtol": 0.0, "atol": 1e-9}  # of rounding: a heading becomes a quaternion and a heading again
+    assert len(one) == len(other) > 10 and one.push_id.tolist() == other.push_id.tolist()
+    np.testing.assert_allclose(one.inputs, other.inputs, **tolerance)
+    np.testing.assert_allclose(one.outcomes, other.outcomes, **tolerance)
+    assert one.covariates.keys() == other.covariates.keys()
+
+
+def vicon_and_ur(kind: str = TRANSFORM, at: str = "transform") -> Lab:
+    lab = Lab(frame="vicon_world")
+    lab.pose(VICON, kind, original().slider, at)
+    lab.pose(UR, kind, original().pusher, at)
+    assert original().wrench is not None
+    lab.wrench("/netft", original().wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    return lab
+
+
+NAMES = Topics(VICON, UR, "/netft")
+ABSENT = r"no such topic; the bag contains .*/ur5/tool0_pose \(geometry_msgs/msg/TransformStamped\)"
+
+
+@pytest.mark.parametrize(
+    ("kind", "at"),
+    [
+        ("geometry_msgs/msg/PoseStamped", "pose"),
+        (TRANSFORM, "transform"),
+        ("nav_msgs/msg/Odometry", "pose.pose"),
+        ("geometry_msgs/msg/PoseWithCovarianceStamped", "pose.pose"),
+    ],
+)
+def test_poses_of_each_type_give_the_same_windows(tmp_path: Path, kind: str, at: str) -> None:
+    found = read_recording(vicon_and_ur(kind, at).mcap(tmp_path / "lab", original().rig), topics=NAMES)
+    assert_same_windows(found)
+    assert any("'vicon_world' is treated as 'world'" in note for note in found.notes)
+
+
+def test_fields_of_a_laboratorys_own_type_give_the_same_windows(tmp_path: Path) -> None:
+    lab = Lab(TIP)
+    lab.pose("/slider", "geometry_msgs/msg/PoseStamped", original().slider, "pose")
+    volts = {"volts": np.array([1.5, 2.5], np.float32), "notes": ["a", "longer"]}
+    lab.pose("/tip", "lab_msgs/msg/Tip", original().pusher, "odom.pose.pose", "odom.pose.header", **volts)
+    topics = Topics("slider", "/tip.odom.pose.pose", covariates=("/tip.volts[1]",))
+    found = read_recording(lab.mcap(tmp_path / "lab.mcap", original().rig), topics=topics)
+    volts_found = found.scalars.pop("/tip.volts[1]")
+    assert set(volts_found.value.tolist()) == {2.5}
+    # No header surrounds the number, so its time is the log time.
+    assert volts_found.stamp.tolist() == sorted(original().pusher.stamp.tolist())
+    for name in ("stamp", "x", "y", "z"):
+        assert getattr(found.pusher, name).tolist() == getattr(original().pusher, name).tolist()
+
+
+def test_a_wrench_in_a_field_is_read(tmp_path: Path) -> None:
+    lab = Lab(TIP)
+    lab.pose("/slider", "geometry_msgs/msg/PoseStamped", original().slider, "pose")
+    lab.pose(
+        "/tip", "lab_msgs/msg/Tip", original().pusher, "odom.pose.pose", "odom.pose.header", **{"ft.force.y": -2.0}
+    )
+    path = lab.mcap(tmp_path / "lab.mcap", original().rig)
+    found = read_recording(path, topics=Topics("slider", "/tip.odom.pose.pose", "/tip.ft"))
+    assert found.wrench is not None and set(found.wrench.fy.tolist()) == {-2.0}
+
+
+# --- frames ----------------------------------------------------------------------------------------------------------
+
+
+def tf_lab(world: str = "world") -> Lab:
+    """A block below a static camera, and a robot of two moving joints and a static tool."""
+    lab, slider, pusher = Lab(), original().slider, original().pusher
+    block, tip = pose_rows(slider), pose_rows(pusher)
+    camera = normalised(np.array([[0.4, -0.2, 1.1, 0.1, 0.7, -0.2, 0.5]]))
+    base = normalised(np.array([[-0.5, 0.3, 0.02, 0.0, 0.0, 0.6, 0.8]]))
+    tool = normalised(np.array([[0.01, 0.02, 0.03, 0.5, -0.5, 0.1, 0.7]]))
+    n = len(pusher)
+    angle = np.linspace(0.0, 1.0, n)
+    arm = normalised(np.column_stack([angle, -angle, angle**2, np.sin(angle), np.zeros((n, 2)), np.cos(angle)]))
+    rows = {"camera": camera, "base": base, "tool": tool}
+    everywhere = {name: np.repeat(row, n, axis=0) for name, row in rows.items()}
+    in_arm = composed(inverted(composed(everywhere["base"], arm)), composed(tip, inverted(everywhere["tool"])))
+    first = slider.stamp[:1]
+    lab.transform("/tf_static", world, "camera", first, camera)
+    lab.transform("/tf_static", f"/{world}", "/base", first, base)
+    lab.transform("/tf_static", "wrist", "tip", first, tool)
+    seen = composed(inverted(np.repeat(camera, len(slider), axis=0)), block)
+    lab.transform("/tf", "camera", "block", slider.stamp, seen)
+    lab.transform("/tf", "base", "arm", pusher.stamp, arm)
+    lab.transform("/tf", "arm", "wrist", pusher.stamp, in_arm)
+    return lab
+
+
+@pytest.mark.parametrize("world", ["world", "map"])
+def test_frames_of_tf_give_the_same_windows(tmp_path: Path, world: str) -> None:
+    lab = tf_lab(world)
+    assert original().wrench is not None
+    lab.wrench("/netft", original().wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    path = lab.mcap(tmp_path / "lab", original().rig)
+    found = read_recording(path, topics=Topics("/tf:block", "/tf:tip", "/netft"))
+    assert_same_windows(found)
+
+
+def test_poses_are_given_in_the_chosen_frame(tmp_path: Path) -> None:
+    path = tf_lab().mcap(tmp_path / "lab")
+    found = read_recording(path, topics=Topics("/tf:block", "/tf:tip", world="base"))
+    base = normalised(np.array([[-0.5, 0.3, 0.02, 0.0, 0.0, 0.6, 0.8]]))
+    wanted = composed(inverted(np.repeat(base, len(found.slider), axis=0)), pose_rows(original().slider))
+    np.testing.assert_allclose(np.column_stack([found.slider.x, found.slider.y]), wanted[:, :2], atol=1e-12)
+
+
+def test_a_coarser_transform_is_interpolated_and_its_dropout_is_kept(tmp_path: Path) -> None:
+    """A cart that moves evenly at 20 ms carries a tip at 4 ms; the cart's transforms stop for half a second."""
+    lab, slider = Lab(), original().slider
+    lab.transform("/tf", "world", "block", slider.stamp, pose_rows(slider))
+    start = int(slider.stamp[0])
+    fine, coarse = start + 4_000_000 * np.arange(500), start + 20_000_000 * np.arange(10, 90)
+    coarse = coarse[(coarse < start + 800_000_000) | (coarse > start + 1_300_000_000)]
+
+    def along(stamp: np.ndarray) -> np.ndarray:
+        seconds = (stamp - start) * 1e-9
+        return np.column_stack(
+            [seconds, np.zeros((len(seconds), 2)), np.zeros((len(seconds), 3)), np.ones(len(seconds))]
+        )
+
+    lab.transform("/tf", "world", "cart", coarse, along(coarse))
+    lab.transform("/tf", "cart", "tip", fine, along(fine))
+    found = read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:tip"))
+    seconds = (found.pusher.stamp - start) * 1e-9
+    np.testing.assert_allclose(found.pusher.x, 2.0 * seconds, atol=1e-9)
+    assert seconds[0] == pytest.approx(0.2) and seconds[-1] == pytest.approx(1.78)
+    assert np.diff(seconds).max() == pytest.approx(0.54)
+    assert any("/tf:tip: 238 samples outside the time, or in a dropout" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("topics", "message"),
+    [
+        (Topics("/tf:blok", "/tf:tip"), r"slider_topic '/tf:blok' \(option --slider-topic\): no frame 'blok'; .*block"),
+        (Topics("/tf:block", "/tf:camera"), r"pusher_topic '/tf:camera' .*never moves in 'world'"),
+        (Topics("/tf:block", "/tf:tip", world="table"), r"no frame 'table'; the frames are arm, base"),
+        (Topics("/tf:block", "/tf"), r"pusher_topic '/tf' .*TFMessage', give a frame, as in /tf:block"),
+        (Topics("/tf:block", "/tf_static:island"), "no frame 'island'"),
+    ],
+)
+def test_an_unknown_frame_is_an_error_that_names_the_frames(tmp_path: Path, topics: Topics, message: str) -> None:
+    with pytest.raises(RecordingError, match=message):
+        read_recording(tf_lab().mcap(tmp_path / "lab"), topics=topics)
+
+
+def test_frames_that_are_not_connected_or_have_two_parents_are_an_error(tmp_path: Path) -> None:
+    lab = tf_lab()
+    rows, stamp = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * 2), original().slider.stamp[:2]
+    lab.transform("/tf", "moon", "lander", stamp, rows)
+    with pytest.raises(RecordingError, match=r"no transforms connect frame 'lander' \(root 'moon'\) with 'world'"):
+        read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:lander"))
+    lab.transform("/tf", "earth", "lander", stamp, rows)
+    with pytest.raises(RecordingError, match="frame 'lander' has the parents 'earth' and 'moon', one is accepted"):
+        read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:lander"))
+
+
+numbers = st.floats(-2.0, 2.0)
+poses = st.lists(st.tuples(*[numbers] * 7).filter(lambda row: np.linalg.norm(row[3:]) > 0.1), min_size=1, max_size=6)
+
+
+@given(poses, st.data())
+def test_composition_through_a_random_tree_is_that_of_matrices(
+    rows: list[tuple[float, ...]], data: st.DataObject
+) -> None:
+    from push_predictor.recordings.fields.transforms import Edge, TransformTree
+
+    parents = [data.draw(st.integers(0, child)) for child in range(len(rows))]
+    matrices = [np.eye(4)]
+    for parent, row in zip(parents, rows, strict=True):
+        matrices.append(matrices[parent] @ matrix(normalised(np.array([row]))[0]))
+    stamp = np.array([5], np.int64)
+    edges = {
+        f"f{child + 1}": Edge(f"f{parent}", stamp, normalised(np.array([row])), static=False)
+        for child, (parent, row) in enumerate(zip(parents, rows, strict=True))
+    }
+    one = data.draw(st.integers(1, len(rows)))
+    other = data.draw(st.integers(0, len(rows)).filter(lambda frame: frame != one))
+    found, rows_found, without = TransformTree(edges).poses(f"f{one}", f"f{other}")
+    assert found.tolist() == [5] and without == 0
+    np.testing.assert_allclose(matrix(rows_found[0]), np.linalg.inv(matrices[other]) @ matrices[one], atol=1e-9)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 1.0), st.booleans())
+def test_interpolation_turns_evenly_the_shorter_way_round(angle: float, share: float, flipped: bool) -> None:
+    first = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    second = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]])
+    second[:, 3:] *= -1.0 if flipped else 1.0
+    found = interpolated(first, second, np.array([share]))[0]
+    assert found[0] == pytest.approx(share)
+    assert 2.0 * np.arctan2(found[5], found[6]) == pytest.approx(share * angle, abs=1e-5)
+
+
+def matrix(row: np.ndarray) -> np.ndarray:
+    from push_predictor.geometry.spatial import SpatialPose
+
+    found = np.eye(4)
+    found[:3, :3], found[:3, 3] = SpatialPose(row[:3], row[3:]).rotation, row[:3]
+    return found
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("topics", "message"),
+    [
+        (replace(NAMES, slider="/vicon/blok"), rf"slider_topic '/vicon/blok' \(option --slider-topic\): {ABSENT}"),
+        (replace(NAMES, wrench="/ft"), rf"wrench_topic '/ft' \(option --wrench-topic\): {ABSENT}"),
+        (replace(NAMES, covariates=("/heat",)), rf"covariate_topics '/heat' \(option --covariate-topic\): {ABSENT}"),
+        (Topics(pusher=UR), r"no topic /slider/pose of geometry_msgs/msg/PoseStamped; .*; give --slider-topic$"),
+        (replace(NAMES, pusher="/joints"), r"'/joints' .*JointState', which has no pose; record /tf .*in /tf:tool0"),
+        (replace(NAMES, pusher="/netft"), r"WrenchStamped'; no field of it is a pose, geometry_msgs/msg/PoseStamped"),
+        (replace(NAMES, wrench=UR), r"wrench_topic .*TransformStamped'; no field of it is a wrench"),
+        (replace(NAMES, pusher=f"{UR}.pose"), r"has no pose in field 'pose', give one of .*: /ur5/tool0_pose.tr"),
+        (replace(NAMES, slider=f"{VICON}:block"), r"TransformStamped'; only tf2_msgs/msg/TFMessage has frames"),
+        (replace(NAMES, covariates=("/joints",)), r"JointState', give one of its fields: .*/joints.effort\[0\]"),
+    ],
+)  # fmt: skip
+def test_an_error_names_option_value_and_what_the_bag_contains(tmp_path: Path, topics: Topics, message: str) -> None:
+    lab = vicon_and_ur()
+    lab.add("/joints", "sensor_msgs/msg/JointState", [5], iter([{"name": ["a"], "effort": np.array([1.0])}]))
+    with pytest.raises(RecordingError, match=message):
+        read_recording(lab.mcap(tmp_path / "lab"), topics=topics)
+
+
+def test_damaged_messages_are_discarded_with_a_note(tmp_path: Path) -> None:
+    lab = vicon_and_ur()
+    damaged = [place for place, (_, topic, _) in enumerate(lab.messages) if topic == UR][5:8]
+    for place, data in zip(damaged, (b"", b"\0\1\0\0\xff\xff", b"\0\1\0\0" + b"\xff" * 40), strict=True):
+        lab.messages[place] = (*lab.messages[place][:2], data)
+    found = read_recording(lab.mcap(tmp_path / "lab"), topics=NAMES)
+    assert len(found.pusher) == len(original().pusher) - 3
+    assert any(f"{UR}: 3 messages are not readable CDR; discarded" == note for note in found.notes)
+
+
+@given(st.binary(max_size=200))
+def test_random_bytes_are_no_message_and_no_exception(data: bytes) -> None:
+    from push_predictor.recordings.fields.sources import POSE_TARGET, messages_as
+    from push_predictor.recordings.fields.transforms import read_tree
+
+    for message in (data, b"\0\1\0\0" + data):
+        messages_as(POSE_TARGET, [message], [0], "nav_msgs/msg/Odometry", "pose.pose", STANDARD)
+        read_tree([([message], "tf2_msgs/msg/TFMessage", False)])
+
+
+# --- saved topics, command line -------------------------------------------------------------------------------------
+
+
+def test_saved_topics_are_read_and_given_ones_win(tmp_path: Path) -> None:
+    path = vicon_and_ur().mcap(tmp_path / "lab", original().rig)
+    assert save_topics(path, replace(NAMES, pusher="/wrong")) == tmp_path / "lab.recording.yaml"
+    with pytest.raises(RecordingError, match="pusher_topic '/wrong'"):
+        read_recording(path)
+    assert_same_windows(read_recording(path, topics=Topics(pusher=UR)))
+
+
+@pytest.mark.parametrize("topics", [Topics(), NAMES, Topics("/tf:a", covariates=("/b.c[1]",), world="map")])
+def test_saved_topics_come_back(tmp_path: Path, topics: Topics) -> None:
+    save_topics(tmp_path / "a.b.mcap", topics)
+    assert load_topics(tmp_path / "a.b.mcap") == topics
+    assert topics_path(tmp_path / "a.b.mcap").name == "a.b.recording.yaml"
+
+
+def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
+    (tmp_path / "lab.recording.yaml").write_text("frames: {slider: block, pusher: tip, world: base}\n")
+    assert load_topics(tmp_path / "lab.mcap") == Topics("/tf:block", "/tf:tip", world="base")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("slider: /a", "key 'slider' is not accepted, give slider_topic, pusher_topic, wrench_topic, covariate_topics"),
+        ("slider_topic: 3", "slider_topic is 3, give a name"),
+        ("slider_topic: ''", "slider_topic is '', give a name"),
+        ("covariate_topics: /a", "covariate_topics is '/a', give a list of topics"),
+        ("frames: {tip: a}", "frames is {'tip': 'a'}, give a mapping with the keys slider, pusher, world"),
+        ("frames: {slider: a}\nslider_topic: /b", "gives both slider_topic and frames slider, give one of them"),
+        ("- a", r"contains \['a'\], give the keys slider_topic"),
+        ("a: [", "cannot be read"),
+    ],
+)
+def test_a_wrong_file_names_key_value_and_what_is_accepted(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "lab.recording.yaml").write_text(text)
+    with pytest.raises(RecordingError, match=rf"lab\.recording\.yaml: {message}"):
+        load_topics(tmp_path / "lab.mcap")
+
+
+def test_commands_take_topics_and_save_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(vicon_and_ur().mcap(tmp_path / "lab", original().rig))
+    names = ["--slider-topic", VICON, "--pusher-topic", UR, "--wrench-topic", "/netft"]
+    model = str(tmp_path / "lab.pushmodel")
+    assert main(["info", path]) == 1
+    assert "give --slider-topic and --pusher-topic" in capsys.readouterr().err
+    train = ["train", path, "--kind", "analytical", "--out", model]
+    assert main(train) == 1
+    assert main([*train, *names]) == 0
+    assert not (tmp_path / "lab.recording.yaml").exists()
+    assert main(["info", path, *names, "--save-topics"]) == 0
+    assert load_topics(tmp_path / "lab") == NAMES
+    for command in (["evaluate", model, path], ["validate", model, path], ["info", path]):
+        assert main(command) == 0, capsys.readouterr().err
+        assert main([*command, "--slider-topic", "/x"]) == 1
+        assert "slider_topic '/x' (option --slider-topic): no such topic" in capsys.readouterr().err
+    assert main(["info", path, "--wrench-topic", ":a"]) == 1
+    assert "--wrench-topic: ':a' is not accepted, give TOPIC" in capsys.readouterr().err
+
+
+def test_topics_are_not_saved_before_the_recording_was_read(tmp_path: Path) -> None:
+    path = str(vicon_and_ur().mcap(tmp_path / "lab", original().rig))
+    assert main(["info", path, "--slider-topic", "/x", "--save-topics"]) == 1
+    assert not (tmp_path / "lab.recording.yaml").exists()
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate", "validate", "trace", "suggest", "report", "info", "doctor"])
+def test_every_command_that_reads_recordings_has_the_options(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = capsys.readouterr().out
+    for option in ("--slider-topic", "--pusher-topic", "--wrench-topic", "--covariate-topic", "--save-topics"):
+        assert option in shown

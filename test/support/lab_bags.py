@@ -1,0 +1,152 @@
+"""Bags as laboratories record them: their own names and types, serialized by the package `rosbags`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from repository import REPOSITORY
+
+from push_predictor.geometry.frames import quaternion_of_yaw
+from push_predictor.recordings.bag.writer import BagWriter
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import RECORD_NAME, Rig
+from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
+
+Message = tuple[int, str, bytes]  # log time, topic, CDR
+SECONDS = 8.0
+
+
+def short_recording(seconds: float = SECONDS) -> Recording:
+    """The first seconds of the recording bags/square_abs_test, without scalars."""
+    whole = read_recording(REPOSITORY / "bags" / "square_abs_test")
+    end = int(whole.slider.stamp[0]) + round(seconds * 1e9)
+
+    def cut(stream: Any) -> Any:
+        kept = stream.stamp < end
+        return replace(stream, **{name: value[kept] for name, value in vars(stream).items()})
+
+    return replace(whole, slider=cut(whole.slider), pusher=cut(whole.pusher), wrench=cut(whole.wrench), scalars={})
+
+
+def store(definitions: Mapping[str, str] = {}) -> Any:
+    """The types of ROS 2 Jazzy and others with their definitions."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    types = get_typestore(Stores.ROS2_JAZZY)
+    for name, text in definitions.items():
+        types.register(get_types_from_msg(text, name))
+    return types
+
+
+class Lab:
+    """Builds messages of a laboratory; add streams, then write."""
+
+    def __init__(self, definitions: Mapping[str, str] = {}, frame: str = "world") -> None:
+        self.store, self.frame = store(definitions), frame
+        self.kinds: dict[str, str] = {}
+        self.messages: list[Message] = []
+
+    def add(self, topic: str, kind: str, stamps: Any, filled: Iterator[Mapping[str, object]]) -> None:
+        """Messages of a type: zeros, with some fields set by their dotted path."""
+        self.kinds[topic] = kind
+        for stamp, values in zip(np.asarray(stamps).tolist(), filled, strict=True):
+            message = zeros(self.store, kind)
+            for path, value in values.items():
+                assign(message, path, value)
+            self.messages.append((max(stamp, 0), topic, bytes(self.store.serialize_cdr(message, kind))))
+
+    def pose(self, topic: str, kind: str, stream: PoseStream, at: str, header: str = "header", **more: object) -> None:
+        """Poses in the field `at` of a type."""
+        names = ("translation", "rotation") if at.endswith("transform") else ("position", "orientation")
+        self.add(topic, kind, stream.stamp, (
+            {**self.header(stamp, header), **more, **pose_values(row, at, names)}
+            for stamp, row in zip(stream.stamp.tolist(), pose_rows(stream), strict=True)
+        ))  # fmt: skip
+
+    def transform(self, topic: str, parent: str, child: str, stamps: Any, rows: Any) -> None:
+        """Messages of tf with one transform each; rows (n, 7)."""
+
+        def message(stamp: int, row: Any) -> Mapping[str, object]:
+            one = zeros(self.store, "geometry_msgs/msg/TransformStamped")
+            values = {**self.header(stamp, "header"), "header.frame_id": parent, "child_frame_id": child}
+            for path, value in {**values, **pose_values(row, "transform", ("translation", "rotation"))}.items():
+                assign(one, path, value)
+            return {"transforms": [one]}
+
+        pairs = zip(np.asarray(stamps).tolist(), np.asarray(rows), strict=True)
+        self.add(topic, "tf2_msgs/msg/TFMessage", stamps, (message(stamp, row) for stamp, row in pairs))
+
+    def wrench(self, topic: str, stream: WrenchStream, kind: str, at: str) -> None:
+        """Wrenches in the field `at` of a type."""
+        columns = zip(stream.stamp.tolist(), stream.fx, stream.fy, stream.torque, strict=True)
+        self.add(topic, kind, stream.stamp, (
+            {**self.header(t), f"{at}.force.x": x, f"{at}.force.y": y, f"{at}.torque.z": turn}
+            for t, x, y, turn in columns
+        ))  # fmt: skip
+
+    def header(self, stamp: int, at: str = "header") -> dict[str, object]:
+        """The fields of a header, none if `at` is empty."""
+        if not at:
+            return {}
+        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+        return {f"{at}.stamp.sec": seconds, f"{at}.stamp.nanosec": nanoseconds, f"{at}.frame_id": self.frame}
+
+    def definition(self, kind: str) -> str:
+        """The ros2msg definition of a type."""
+        return str(self.store.generate_msgdef(kind, ros_version=2)[0])
+
+    def in_order(self) -> list[Message]:
+        """The messages in order of log time."""
+        return sorted(self.messages, key=lambda message: message[0])
+
+    def mcap(self, path: Path, rig: Rig | None = None) -> Path:
+        """Write an MCAP bag."""
+        with BagWriter(path) as writer:
+            if rig is not None:
+                writer.add_metadata(RECORD_NAME, rig.to_record())
+            for topic, kind in self.kinds.items():
+                writer.add_topic(topic, kind, self.definition(kind))
+            for stamp, topic, data in self.in_order():
+                writer.write(topic, stamp, data)
+        return path
+
+
+def pose_rows(stream: PoseStream) -> Any:
+    """Rows (n, 7) of a planar stream."""
+    z, w = quaternion_of_yaw(stream.heading)
+    none = np.zeros(len(stream))
+    return np.column_stack([stream.x, stream.y, stream.z, none, none, z, w])
+
+
+def pose_values(row: Any, at: str, names: tuple[str, str]) -> dict[str, object]:
+    """The fields of a pose, by their dotted path."""
+    paths = [f"{at}.{names[0]}.{axis}" for axis in "xyz"] + [f"{at}.{names[1]}.{axis}" for axis in "xyzw"]
+    return dict(zip(paths, row.tolist(), strict=True))
+
+
+def zeros(types: Any, kind: str) -> Any:
+    """A message with zero in every field."""
+    values: dict[str, object] = {}
+    for name, (node, description) in types.get_msgdef(kind).fields:
+        if node.name == "NAME":
+            values[name] = zeros(types, description)
+        elif node.name == "BASE":
+            values[name] = {"string": "", "bool": False}.get(description[0], 0.0 if "float" in description[0] else 0)
+        elif node.name == "ARRAY":
+            values[name] = np.zeros(description[1], description[0][1][0])
+        else:
+            inner = description[0]
+            values[name] = [] if inner[0].name == "NAME" or inner[1][0] == "string" else np.zeros(0, inner[1][0])
+    return types.types[kind](**values)
+
+
+def assign(message: Any, path: str, value: object) -> None:
+    """Set the field at a dotted path."""
+    *steps, last = path.split(".")
+    for step in steps:
+        message = getattr(message, step)
+    setattr(message, last, value)
