@@ -32,7 +32,7 @@ NEEDED = {
 EXTRAS = {
     "report": (("matplotlib", "jinja2"), "report pages"),
     "live": (("rich",), "progress bars and the live table of the demonstration"),
-    "import": (("rosbags", "h5py"), "`import` of ROS 1 bags and of the MIT push data set"),
+    "import": (("rosbags", "h5py"), "ROS 1 bags, and `import` of the MIT push data set"),
 }
 NODES = ("predict_server", "push_replay", "push_validator")
 MODULES = {"PyYAML": "yaml"}

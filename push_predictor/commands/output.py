@@ -161,11 +161,14 @@ def check_json(options: argparse.Namespace) -> None:
 
 def check_data(paths: Sequence[Path]) -> None:
     """Raise RecordingError for a path that does not exist or is neither a recording nor a push table."""
+    from push_predictor.recordings.table_file import ENDINGS, is_recording
+
     for path in paths:
         if not path.exists():
             raise RecordingError(f"{path}: no such file or folder")
-        if not (path.is_dir() or path.name.endswith((".mcap", ".csv", ".csv.gz"))):
-            raise RecordingError(f"{path}: give a recording (a folder or .mcap) or a push table (.csv or .csv.gz)")
+        if not (is_recording(path) or path.name.endswith(ENDINGS)):
+            accepted = "a recording (a folder, .mcap, .db3 or .bag) or a push table (.csv or .csv.gz)"
+            raise RecordingError(f"{path}: give {accepted}")
 
 
 def check_seed(seed: int) -> None:

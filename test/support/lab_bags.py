@@ -150,3 +150,35 @@ def assign(message: Any, path: str, value: object) -> None:
     for step in steps:
         message = getattr(message, step)
     setattr(message, last, value)
+
+
+def write_db3(lab: Lab, path: Path, *, version: int = 9) -> Path:
+    """Write the bag of a laboratory as a folder with a sqlite3 file, by `rosbags`."""
+    from rosbags.rosbag2 import Writer
+
+    with Writer(path, version=version) as writer:
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=lab.store) for topic, kind in lab.kinds.items()
+        }
+        for stamp, topic, data in lab.in_order():
+            writer.write(connections[topic], stamp, data)
+    return path
+
+
+def write_ros1(lab: Lab, path: Path) -> Path:
+    """Write the bag of a laboratory as a ROS 1 bag, with the definitions of ROS 1."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    noetic = get_typestore(Stores.ROS1_NOETIC)
+    with Writer(path) as writer:
+        connections = {}
+        for topic, kind in lab.kinds.items():
+            if kind in noetic.types:
+                definition, digest = noetic.generate_msgdef(kind, ros_version=1)
+            else:
+                definition, digest = lab.store.generate_msgdef(kind, ros_version=1)
+            connections[topic] = writer.add_connection(topic, kind, msgdef=definition, md5sum=digest)
+        for stamp, topic, data in lab.in_order():
+            writer.write(connections[topic], stamp, bytes(lab.store.cdr_to_ros1(data, lab.kinds[topic])))
+    return path

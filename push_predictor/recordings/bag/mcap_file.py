@@ -34,10 +34,6 @@ from push_predictor.recordings.bag.mcap_summary import (
 )
 
 MOST_NOTES = 50  # a file can have a million damaged records
-_FOREIGN = {
-    b"#ROSBAG": "a ROS 1 bag: convert it with `push_predictor import rosbag1`",
-    b"SQLite format 3": "a sqlite3 bag: convert it with `ros2 bag convert`",
-}
 
 
 class RawMessage(NamedTuple):
@@ -232,6 +228,6 @@ def _checked_size(path: Path, name: str) -> int:
     if not start:
         raise RecordingError(f"{name}: the file is empty, give an MCAP recording")
     if not start.startswith(MAGIC):
-        what = next((text for magic, text in _FOREIGN.items() if start.startswith(magic)), "not an MCAP file")
-        raise RecordingError(f"{name}: {what} (starts with {start[:8]!r}), MCAP recordings are accepted")
+        accepted = "MCAP, sqlite3 and ROS 1 recordings are accepted"
+        raise RecordingError(f"{name}: not an MCAP file (starts with {start[:8]!r}), {accepted}")
     return path.stat().st_size

@@ -45,7 +45,8 @@ class TopicInfo:
 def read_bag_metadata(folder: Path) -> BagMetadata:
     """Read metadata.yaml; an unreadable file becomes a note.
 
-    Raises RecordingError for a bag that is not MCAP, or has a compression that rosbag2 does not include.
+    Raises RecordingError for a storage that is neither MCAP nor sqlite3, and for a compression that rosbag2 does not
+    include.
     """
     import yaml
 
@@ -57,7 +58,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
         return BagMetadata()
     except (*_DAMAGED, yaml.YAMLError) as error:
         reason = str(error).replace("\n", " ")
-        return BagMetadata(notes=[f"{path}: cannot be read ({reason}); the .mcap files are used in order of name"])
+        return BagMetadata(notes=[f"{path}: cannot be read ({reason}); the files are used in order of name"])
     return BagMetadata(files, _records(information.get("custom_data")), _compression(information, path))
 
 
@@ -141,9 +142,9 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
 
 
 def _compression(information: Mapping[str, object], path: Path) -> str:
-    """What rosbag2 compressed in addition to MCAP: 'file', 'message' or ''. Raises RecordingError if not MCAP."""
-    if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", ""):
-        raise RecordingError(f"{path}: storage {storage!r} is not accepted, give mcap: use `ros2 bag convert`")
+    """What rosbag2 compressed: 'file', 'message' or ''. Raises RecordingError for another storage."""
+    if (storage := information.get("storage_identifier", "mcap")) not in ("mcap", "sqlite3", ""):
+        raise RecordingError(f"{path}: storage {storage!r} is not accepted, give mcap or sqlite3")
     mode = str(information.get("compression_mode") or "none").lower()
     kind = str(information.get("compression_format") or "").lower()
     if mode == "none":

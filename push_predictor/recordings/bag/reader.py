@@ -1,10 +1,10 @@
-"""A bag: one MCAP file, or a folder of them as written by rosbag2. Raw messages in file order."""
+"""A bag: one file, or a folder of files as written by rosbag2. Raw CDR messages in file order."""
 
 from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 
 from push_predictor.errors import RecordingError
@@ -16,8 +16,15 @@ from push_predictor.recordings.bag.metadata import (
     embedded_records,
     read_bag_metadata,
 )
+from push_predictor.recordings.bag.ros1_file import MAGIC as ROS1
+from push_predictor.recordings.bag.ros1_file import Ros1File
+from push_predictor.recordings.bag.sqlite_file import MAGIC as SQLITE
+from push_predictor.recordings.bag.sqlite_file import SqliteFile
 
 __all__ = ["Bag", "RawMessage", "open_bag"]
+
+BagFile = McapFile | SqliteFile | Ros1File
+ENDINGS = (".mcap", ".db3", ".bag")
 
 
 class Bag:
@@ -30,7 +37,7 @@ class Bag:
     def __init__(
         self,
         path: Path,
-        files: list[McapFile],
+        files: list[BagFile],
         described: BagMetadata,
         scratch: tempfile.TemporaryDirectory[str] | None = None,
     ) -> None:
@@ -79,24 +86,25 @@ class Bag:
 
 
 def open_bag(path: Path) -> Bag:
-    """Open a .mcap file, or a folder with .mcap files, with or without metadata.yaml.
+    """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them, with or without metadata.yaml.
 
-    Raises RecordingError without .mcap files, or if all are empty or foreign; a single such file becomes a note.
+    The first bytes of a file decide which it is. Raises RecordingError without such files, or if all are empty or
+    foreign; a single such file becomes a note.
     """
     path = Path(path)
     if not path.is_dir():
-        return Bag(path, [McapFile(path)], BagMetadata())
+        return Bag(path, [_file(path)], BagMetadata())
     described = read_bag_metadata(path)
     if not (files := _listed(path, described) or _found(path)):
-        raise RecordingError(f"{path}: contains no .mcap file, give an MCAP bag")
+        raise RecordingError(f"{path}: contains no .mcap file, and no .db3 or .bag; give a bag")
     scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
     folder = None if scratch is None else Path(scratch.name)
     return Bag(path, _opened(files, described, folder), described, scratch)
 
 
-def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[McapFile]:
+def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> list[BagFile]:
     """The readable files. Raises the error of the first file if none is readable."""
-    opened: list[McapFile] = []
+    opened: list[BagFile] = []
     refused: list[RecordingError] = []
     for file in files:
         try:
@@ -109,11 +117,23 @@ def _opened(files: list[Path], described: BagMetadata, scratch: Path | None) -> 
     return opened
 
 
-def _open(file: Path, described: BagMetadata, scratch: Path | None) -> McapFile:
+def _open(file: Path, described: BagMetadata, scratch: Path | None) -> BagFile:
     if scratch is not None:
         unpacked = unpack_file(file, scratch, described.notes)
-        return McapFile(unpacked, name=str(file) if unpacked == file else f"{file}, decompressed,")
-    return McapFile(file, unpack=unpack_message if described.compression == "message" else None)
+        return _file(unpacked, name=str(file) if unpacked == file else f"{file}, decompressed,")
+    return _file(file, unpack=unpack_message if described.compression == "message" else None)
+
+
+def _file(path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> BagFile:
+    """A file of the kind that its first bytes show."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(SQLITE))
+    except OSError:
+        start = b""  # McapFile states why
+    if start.startswith(SQLITE):
+        return SqliteFile(path, unpack=unpack, name=name)
+    return Ros1File(path) if start.startswith(ROS1) else McapFile(path, unpack=unpack, name=name)
 
 
 def _listed(folder: Path, described: BagMetadata) -> list[Path]:
@@ -126,8 +146,9 @@ def _listed(folder: Path, described: BagMetadata) -> list[Path]:
 
 
 def _found(folder: Path) -> list[Path]:
-    """The .mcap files of the folder, bag_2 before bag_10."""
-    return sorted(folder.glob("*.mcap"), key=_numbered)
+    """The files of the folder, bag_2 before bag_10; of several kinds, those of the first in ENDINGS."""
+    kinds = ([*folder.glob(f"*{ending}")] for ending in ENDINGS)
+    return sorted(next(filter(None, kinds), []), key=_numbered)
 
 
 def _numbered(file: Path) -> list[tuple[str, int]]:

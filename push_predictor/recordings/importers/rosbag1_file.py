@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import re
-import struct
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from push_predictor.errors import ImportSourceError
+from push_predictor.errors import ImportSourceError, RecordingError
+from push_predictor.recordings.bag.ros1_file import DAMAGE, lower_package, opened_ros1
 from push_predictor.recordings.importers.cleaning import Samples
-
-CAPITAL_PACKAGE = re.compile(r"\b([A-Z]\w*)/")  # allowed in ROS 1, not in ROS 2, which rosbags follows
-DAMAGE = (OSError, RuntimeError, ValueError, LookupError, AssertionError, EOFError, struct.error)
 
 
 class Stamped(NamedTuple):
@@ -43,10 +40,10 @@ def bag_messages(path: Path, topics: Collection[str]) -> dict[str, list[Stamped]
         count = 0
         try:
             for c in wanted:
-                if (name := _lower_package(c.msgtype)) not in store.types:
-                    store.register(get_types_from_msg(_lower_package(c.msgdef.data), name))
+                if (name := lower_package(c.msgtype)) not in store.types:
+                    store.register(get_types_from_msg(lower_package(c.msgdef.data), name))
             for c, time, data in reader.messages(connections=wanted):
-                found[c.topic].append(Stamped(time, store.deserialize_ros1(data, _lower_package(c.msgtype))))
+                found[c.topic].append(Stamped(time, store.deserialize_ros1(data, lower_package(c.msgtype))))
                 count += 1
         except (ReaderError, SerdeError, TypesysError, *DAMAGE) as error:
             reason = f"{type(error).__name__}: {error}"
@@ -79,33 +76,10 @@ def header_lead(messages: Sequence[Stamped]) -> tuple[float, float, float]:
     return float(np.min(lead)), float(np.median(lead)), float(np.max(lead))
 
 
-def _opened(path: Path) -> Any:
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
     try:
-        from rosbags.rosbag1 import Reader, ReaderError
-    except ImportError:
-        raise ImportSourceError(f"{path}: ROS 1 bags need the package rosbags (pip install rosbags)") from None
-    if not path.is_file():
-        raise ImportSourceError(f"{path}: is not a file, give a ROS 1 bag")
-    try:
-        reader = Reader(path)
-        reader.open()
-    except (ReaderError, *DAMAGE) as error:
-        raise ImportSourceError(f"{path}: the bag cannot be opened ({error})") from None
-    return _Closing(reader)
-
-
-class _Closing:
-    """An open reader that closes at the end of a with block."""
-
-    def __init__(self, reader: Any) -> None:
-        self.reader = reader
-
-    def __enter__(self) -> Any:
-        return self.reader
-
-    def __exit__(self, *_: object) -> None:
-        self.reader.close()
-
-
-def _lower_package(text: str) -> str:
-    return CAPITAL_PACKAGE.sub(lambda match: match[1].lower() + "/", text)
+        with opened_ros1(path) as reader:
+            yield reader
+    except RecordingError as error:
+        raise ImportSourceError(str(error)) from None

@@ -1,0 +1,105 @@
+"""One sqlite3 file of rosbag2 (.db3) as raw messages in file order; damage becomes notes.
+
+Python contains sqlite3, so that these bags need no further package.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+
+from push_predictor.errors import RecordingError
+from push_predictor.recordings.bag.mcap_file import RawMessage
+from push_predictor.recordings.bag.mcap_records import UNREADABLE
+
+MAGIC = b"SQLite format 3\0"
+_MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+
+
+class SqliteFile:
+    """The topics, metadata records and messages of one file; the attributes are those of McapFile.
+
+    Raises RecordingError for a file that is not a bag of rosbag2.
+    """
+
+    def __init__(self, path: Path, *, unpack: Callable[[bytes], bytes] | None = None, name: str = "") -> None:
+        self.path, self._name, self._unpack = path, name or str(path), unpack
+        self.notes: list[str] = []
+        self._channels: dict[int, tuple[str, str]] = {}
+        self.qos: dict[str, str] = {}
+        try:
+            with closing(self._opened()) as database:
+                self._read_topics(database)
+                self.schemas = self._read_definitions(database)
+                self.metadata = self._read_metadata(database)
+        except (sqlite3.Error, OSError) as error:
+            raise RecordingError(f"{self._name}: is not a readable sqlite3 bag of rosbag2 ({error})") from None
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """{topic: type}."""
+        return dict(self._channels.values())
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
+        """CDR messages in order of time, of all topics or of the given ones; damage becomes a note."""
+        wanted = {number: of for number, of in self._channels.items() if topics is None or of[0] in topics}
+        read = undone = 0
+        try:
+            with closing(self._opened()) as database:
+                for number, time, data in database.execute(_MESSAGES):
+                    read += 1
+                    if number not in wanted:
+                        continue
+                    try:
+                        yield RawMessage(
+                            *wanted[number], int(time), self._unpack(data) if self._unpack else bytes(data)
+                        )
+                    except (*UNREADABLE, TypeError, ValueError):
+                        undone += 1
+        except sqlite3.Error as error:
+            self._note(f"damaged after {read} messages ({error}); the rest is not read")
+        if undone:
+            self._note(f"{undone} messages cannot be read or decompressed and were skipped")
+
+    def _opened(self) -> sqlite3.Connection:
+        # A recorder that was killed leaves a write-ahead log; without one nothing is written next to the bag.
+        mode = "mode=ro" if self.path.with_name(f"{self.path.name}-wal").exists() else "mode=ro&immutable=1"
+        database = sqlite3.connect(f"{self.path.absolute().as_uri()}?{mode}", uri=True)
+        database.text_factory = lambda text: text.decode(errors="replace")
+        return database
+
+    def _read_topics(self, database: sqlite3.Connection) -> None:
+        columns = {row[1] for row in database.execute("PRAGMA table_info(topics)")}
+        qos = "offered_qos_profiles" if "offered_qos_profiles" in columns else "''"
+        for number, topic, kind, encoding, offered in database.execute(
+            f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
+        ):
+            if encoding != "cdr":
+                self._note(f"{topic} is encoded as {encoding!r}, cdr is accepted; its messages were skipped")
+                continue
+            self._channels[number] = (topic, kind)
+            self.qos[topic] = offered or ""
+
+    def _read_definitions(self, database: sqlite3.Connection) -> dict[str, str]:
+        """{type: ros2msg text}; rosbag2 records them since ROS 2 Iron."""
+        if not _has(database, "message_definitions"):
+            return {}
+        rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+        return {kind: text for kind, encoding, text in rows if encoding == "ros2msg"}
+
+    def _read_metadata(self, database: sqlite3.Connection) -> dict[str, Mapping[str, str]]:
+        """The copy of metadata.yaml that rosbag2 keeps in the file since ROS 2 Iron."""
+        if not _has(database, "metadata"):
+            return {}
+        found = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
+        return {"rosbag2": {"serialized_metadata": found[0]}} if found else {}
+
+    def _note(self, what: str) -> None:
+        if (text := f"{self._name}: {what}") not in self.notes:
+            self.notes.append(text)
+
+
+def _has(database: sqlite3.Connection, table: str) -> bool:
+    return bool(database.execute("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?", (table,)).fetchone())
