@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
-from lab_bags import Lab, pose_rows, short_recording
+from lab_bags import LATENCY, Lab, pose_rows, short_recording
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
@@ -77,6 +77,7 @@ ABSENT = r"no such topic; the bag contains .*/ur5/tool0_pose \(geometry_msgs/msg
 def test_poses_of_each_type_give_the_same_windows(tmp_path: Path, kind: str, at: str) -> None:
     found = read_recording(vicon_and_ur(kind, at).mcap(tmp_path / "lab", original().rig), topics=NAMES)
     assert_same_windows(found)
+    assert found.slider.stamp.tolist() == original().slider.stamp.tolist()
     assert any("'vicon_world' is treated as 'world'" in note for note in found.notes)
 
 
@@ -90,8 +91,8 @@ def test_fields_of_a_laboratorys_own_type_give_the_same_windows(tmp_path: Path) 
     volts_found = found.scalars.pop("/tip.volts[1]")
     assert set(volts_found.value.tolist()) == {2.5}
     # No header surrounds the number, so its time is the log time.
-    assert volts_found.stamp.tolist() == sorted(original().pusher.stamp.tolist())
-    for name in ("stamp", "x", "y", "z"):
+    assert volts_found.stamp.tolist() == sorted((original().pusher.stamp + LATENCY).tolist())
+    for name in ("stamp", "x", "y", "z"):  # the nearest header counts, not the log time
         assert getattr(found.pusher, name).tolist() == getattr(original().pusher, name).tolist()
 
 

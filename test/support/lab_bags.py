@@ -18,6 +18,7 @@ from push_predictor.recordings.streams import PoseStream, Recording, WrenchStrea
 
 Message = tuple[int, str, bytes]  # log time, topic, CDR
 SECONDS = 8.0
+LATENCY = 7_000_000  # ns from the header stamp to the log time
 
 
 def short_recording(seconds: float = SECONDS) -> Recording:
@@ -57,7 +58,7 @@ class Lab:
             message = zeros(self.store, kind)
             for path, value in values.items():
                 assign(message, path, value)
-            self.messages.append((max(stamp, 0), topic, bytes(self.store.serialize_cdr(message, kind))))
+            self.messages.append((stamp + LATENCY, topic, bytes(self.store.serialize_cdr(message, kind))))
 
     def pose(self, topic: str, kind: str, stream: PoseStream, at: str, header: str = "header", **more: object) -> None:
         """Poses in the field `at` of a type."""

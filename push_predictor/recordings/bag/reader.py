@@ -9,6 +9,7 @@ from pathlib import Path
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.compression import unpack_file, unpack_message
+from push_predictor.recordings.bag.csv_streams import CsvStreams, is_csv_recording
 from push_predictor.recordings.bag.mcap_file import McapFile, RawMessage
 from push_predictor.recordings.bag.metadata import (
     METADATA_FILE,
@@ -23,7 +24,7 @@ from push_predictor.recordings.bag.sqlite_file import SqliteFile
 
 __all__ = ["Bag", "RawMessage", "open_bag"]
 
-BagFile = McapFile | SqliteFile | Ros1File
+BagFile = McapFile | SqliteFile | Ros1File | CsvStreams
 ENDINGS = (".mcap", ".db3", ".bag")
 
 
@@ -86,7 +87,7 @@ class Bag:
 
 
 def open_bag(path: Path) -> Bag:
-    """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them, with or without metadata.yaml.
+    """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them or of CSV streams.
 
     The first bytes of a file decide which it is. Raises RecordingError without such files, or if all are empty or
     foreign; a single such file becomes a note.
@@ -96,7 +97,11 @@ def open_bag(path: Path) -> Bag:
         return Bag(path, [_file(path)], BagMetadata())
     described = read_bag_metadata(path)
     if not (files := _listed(path, described) or _found(path)):
-        raise RecordingError(f"{path}: contains no .mcap file, and no .db3 or .bag; give a bag")
+        if is_csv_recording(path):
+            return Bag(path, [CsvStreams(path)], described)
+        raise RecordingError(
+            f"{path}: contains no .mcap file, no .db3 and no .bag, and not both slider.csv and pusher.csv"
+        )
     scratch = tempfile.TemporaryDirectory(prefix="push_predictor_") if described.compression == "file" else None
     folder = None if scratch is None else Path(scratch.name)
     return Bag(path, _opened(files, described, folder), described, scratch)

@@ -1,0 +1,135 @@
+"""A folder of CSV files, one for each stream, as messages of a recording."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from push_predictor.errors import RecordingError
+from push_predictor.geometry.frames import quaternion_of_yaw
+from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
+from push_predictor.recordings.bag.definitions import POSE, SCALAR_LAYOUTS, WRENCH
+from push_predictor.recordings.bag.mcap_file import RawMessage
+from push_predictor.types import Array, IntArray
+
+QUATERNION = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
+HEADING = ("time", "x", "y", "z", "heading")
+SPATIAL = ("time", "fx", "fy", "fz", "tx", "ty", "tz")
+PLANAR = ("time", "fx", "fy", "torque")
+STREAMS = {
+    "slider.csv": ("/slider/pose", (QUATERNION, HEADING)),
+    "pusher.csv": ("/pusher/pose", (QUATERNION, HEADING)),
+    "wrench.csv": ("/pusher/wrench", (SPATIAL, PLANAR)),
+}
+SCALAR = "sensor_msgs/msg/Temperature"  # one number with a header; of another file, its further columns
+_LATEST = 2**31 * 10**9  # ns; a header has 32 bits of seconds
+
+
+class CsvStreams:
+    """The streams in slider.csv, pusher.csv, wrench.csv and further files; the attributes are those of McapFile.
+
+    time is in s; x, y, z in m; heading in rad; force in N, torque in N m. Each further column of another file is a
+    scalar named /FILE/COLUMN. Raises RecordingError that names file, line, column, value and what is accepted.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path, self.notes = folder, list[str]()
+        self.schemas: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
+        self.metadata: dict[str, Mapping[str, str]] = {}
+        self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
+        for file in sorted(folder.glob("*.csv")):
+            self._streams |= _streams(file)
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """{topic: type}."""
+        return {topic: kind for topic, (kind, _, _) in self._streams.items()}
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
+        """CDR messages, one topic after the other, of all topics or of the given ones."""
+        for topic, (kind, stamp, data) in self._streams.items():
+            if topics is None or topic in topics:
+                for time, message in zip(stamp.tolist(), data, strict=True):
+                    yield RawMessage(topic, kind, time, message)
+
+
+def is_csv_recording(folder: Path) -> bool:
+    """Whether a folder contains the two streams that a recording needs."""
+    return (folder / "slider.csv").is_file() and (folder / "pusher.csv").is_file()
+
+
+def _streams(file: Path) -> dict[str, tuple[str, IntArray, list[bytes]]]:
+    header, rows = _cells(file)
+    if file.name not in STREAMS:
+        if header[0] != "time" or len(header) < 2:
+            raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
+        stamp, values = _numbers(file, header, rows)
+        columns = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
+        layout = SCALAR_LAYOUTS[SCALAR]
+        return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in columns.items()}
+    topic, accepted = STREAMS[file.name]
+    if header not in accepted:
+        choice = " or ".join(repr(",".join(names)) for names in accepted)
+        raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give {choice}")
+    stamp, values = _numbers(file, header, rows)
+    kind, layout, spatial = _as_message(header, values)
+    return {topic: (kind, stamp, encode(stamp, spatial, layout))}
+
+
+def _as_message(header: Sequence[str], values: Array) -> tuple[str, Layout, Array]:
+    """(message type, layout, numbers (n, 6 or 7)) of a stream's columns without the time."""
+    none = np.zeros(len(values))
+    if header == HEADING:
+        z, w = quaternion_of_yaw(values[:, 3])
+        return POSE.name, POSE_STAMPED, np.column_stack([values[:, :3], none, none, z, w])
+    if header == PLANAR:
+        return WRENCH.name, WRENCH_STAMPED, np.column_stack([values[:, :2], none, none, none, values[:, 2]])
+    return (POSE.name, POSE_STAMPED, values) if header == QUATERNION else (WRENCH.name, WRENCH_STAMPED, values)
+
+
+def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
+    """The header, and the rows with their line numbers."""
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.reader(stream, strict=True)
+            found = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{file}: cannot be read as CSV ({error})") from None
+    if len(found) < 2:
+        raise RecordingError(f"{file}: contains no rows, give a header and one row for each sample")
+    header = tuple(found[0][1])
+    for line, row in found[1:]:
+        if len(row) != len(header):
+            raise RecordingError(f"{file} line {line}: {len(row)} cells, the header has {len(header)}")
+    return header, found[1:]
+
+
+def _numbers(file: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> tuple[IntArray, Array]:
+    """Stamps (n,) in ns and the other columns (n, k); an empty cell is NaN."""
+    stamp, values = np.zeros(len(rows), np.int64), np.zeros((len(rows), len(header) - 1))
+    for place, (line, row) in enumerate(rows):
+        stamp[place] = _stamp(file, line, row[0])
+        for column, cell in enumerate(row[1:]):
+            try:
+                values[place, column] = float(cell or "nan")
+            except ValueError:
+                raise RecordingError(
+                    f"{file} line {line}: column {header[column + 1]} is {cell!r}, give a number, or leave it empty"
+                ) from None
+    return stamp, values
+
+
+def _stamp(file: Path, line: int, cell: str) -> int:
+    """A time in ns. A float has no room for the nanoseconds of a date, a decimal has."""
+    try:
+        found = Decimal(cell).scaleb(9)
+    except InvalidOperation:
+        found = Decimal("nan")
+    if not found.is_finite() or not 0 <= found < _LATEST:
+        raise RecordingError(f"{file} line {line}: column time is {cell!r}, give s from 0 to {_LATEST // 10**9}")
+    return round(found)
