@@ -51,7 +51,7 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
     """Add the options that name the topics of recordings; `topics_of` reads them."""
     group = parser.add_argument_group(
         "topics of recordings",
-        "TOPIC is a name, TOPIC.FIELD a field of another type, /tf:FRAME a frame. What is not given is read from "
+        "TOPIC is a name, TOPIC.FIELD a field of another type, /tf:FRAME a frame.\nWhat is not given is read from "
         "NAME.recording.yaml next to the recording.",
     )
     for name, default in (("slider", "slider/pose"), ("pusher", "pusher/pose"), ("wrench", "pusher/wrench")):

@@ -84,9 +84,24 @@ def test_an_older_db3_has_no_definition_of_an_own_type(tmp_path: Path) -> None:
 
 def test_nothing_is_written_next_to_a_db3(tmp_path: Path) -> None:
     path = write_db3(vicon_and_ur(), tmp_path / "lab")
+    database = sqlite3.connect(next(path.glob("*.db3")))
+    database.execute("PRAGMA journal_mode = WAL")  # rosbag2's preset `resilient`
+    database.close()
     before = sorted(path.iterdir())
-    read_recording(path, topics=NAMES)
-    assert sorted(path.iterdir()) == before
+    for _ in open_bag(path).messages():
+        assert sorted(path.iterdir()) == before
+
+
+def test_messages_in_the_log_of_a_killed_recorder_are_read(tmp_path: Path) -> None:
+    path = db3_file(vicon_and_ur(), tmp_path / "lab")
+    database = sqlite3.connect(path)
+    database.execute("PRAGMA journal_mode = WAL")
+    database.execute("INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, 1, data FROM messages LIMIT 3")
+    database.commit()
+    try:
+        assert sum(1 for _ in open_bag(path).messages()) == len(vicon_and_ur().messages) + 3
+    finally:
+        database.close()
 
 
 @pytest.mark.parametrize("write", [db3_file, bag_file])
@@ -130,6 +145,18 @@ def test_a_database_that_is_no_bag_and_another_encoding_are_named(tmp_path: Path
     with pytest.raises(RecordingError, match=f"pusher_topic '{UR}' .*no such topic; the bag contains .*{VICON}"):
         read_recording(path, topics=NAMES)
     assert any(f"{UR} is encoded as 'xml', cdr is accepted" in note for note in open_bag(path).notes)
+
+
+def test_cells_of_another_type_are_skipped_with_a_note(tmp_path: Path) -> None:
+    path = db3_file(vicon_and_ur(), tmp_path / "lab")
+    with sqlite3.connect(path) as database:
+        for row, change in enumerate(("data = 7", "timestamp = -1", "data = 'text'"), start=1):
+            database.execute(f"UPDATE messages SET {change} WHERE id = {10 * row}")
+        database.execute("UPDATE topics SET type = x'ff00' WHERE name = '/netft'")
+    found = read_recording(path, topics=replace(NAMES, wrench=""))
+    lost = len(original().slider) + len(original().pusher) - len(found.slider) - len(found.pusher)
+    assert any(f"{lost} messages cannot be read or decompressed" in note for note in found.notes) and lost > 0
+    assert any("has no readable name or type; its messages were skipped" in note for note in found.notes)
 
 
 def test_a_missing_package_is_named_with_its_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

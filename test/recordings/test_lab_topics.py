@@ -16,8 +16,10 @@ from lab_bags import LATENCY, Lab, pose_rows, short_recording
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.fields.message_text import STANDARD
+from push_predictor.recordings.fields.message_text import STANDARD, parse_definitions
 from push_predictor.recordings.fields.pose_rows import composed, interpolated, inverted, normalised
+from push_predictor.recordings.fields.sources import POSE_TARGET, messages_as
+from push_predictor.recordings.fields.transforms import Edge, TransformTree, read_tree
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
@@ -202,6 +204,14 @@ def test_frames_that_are_not_connected_or_have_two_parents_are_an_error(tmp_path
         read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:lander"))
 
 
+def test_a_frame_that_is_its_own_ancestor_is_an_error(tmp_path: Path) -> None:
+    lab, rows = tf_lab(), np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    for parent, child in (("north", "south"), ("south", "north")):
+        lab.transform("/tf", parent, child, original().slider.stamp[:1], rows)
+    with pytest.raises(RecordingError, match="frame 'south' is its own ancestor: south in north in south"):
+        read_recording(lab.mcap(tmp_path / "lab"), topics=Topics("/tf:block", "/tf:south"))
+
+
 numbers = st.floats(-2.0, 2.0)
 poses = st.lists(st.tuples(*[numbers] * 7).filter(lambda row: np.linalg.norm(row[3:]) > 0.1), min_size=1, max_size=6)
 
@@ -210,8 +220,6 @@ poses = st.lists(st.tuples(*[numbers] * 7).filter(lambda row: np.linalg.norm(row
 def test_composition_through_a_random_tree_is_that_of_matrices(
     rows: list[tuple[float, ...]], data: st.DataObject
 ) -> None:
-    from push_predictor.recordings.fields.transforms import Edge, TransformTree
-
     parents = [data.draw(st.integers(0, child)) for child in range(len(rows))]
     matrices = [np.eye(4)]
     for parent, row in zip(parents, rows, strict=True):
@@ -283,12 +291,15 @@ def test_damaged_messages_are_discarded_with_a_note(tmp_path: Path) -> None:
 
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_message_and_no_exception(data: bytes) -> None:
-    from push_predictor.recordings.fields.sources import POSE_TARGET, messages_as
-    from push_predictor.recordings.fields.transforms import read_tree
-
     for message in (data, b"\0\1\0\0" + data):
         messages_as(POSE_TARGET, [message], [0], "nav_msgs/msg/Odometry", "pose.pose", STANDARD)
         read_tree([([message], "tf2_msgs/msg/TFMessage", False)])
+
+
+def test_a_type_that_contains_itself_has_no_readable_message() -> None:
+    definitions = parse_definitions("a_msgs/msg/Loop", "Loop loop\ngeometry_msgs/Pose pose\n")
+    message = [b"\0\1\0\0" + bytes(80)]
+    assert messages_as(POSE_TARGET, message, [0], "a_msgs/msg/Loop", "pose", {**definitions, **STANDARD}) == [b""]
 
 
 # --- saved topics, command line -------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ class Ros1File:
             from rosbags.typesys import Stores, get_typestore
 
             # The types of ROS 2, because their headers have no `seq`, which rosbags then leaves out.
-            self._store = get_typestore(Stores.ROS2_JAZZY)
+            self._store = get_typestore(Stores.ROS2_HUMBLE)
             self.topics = {c.topic: self._registered(c) for c in reader.connections}
             self.schemas = {kind: self._definition(kind) for kind in self.topics.values()}
 

@@ -52,12 +52,15 @@ class SqliteFile:
                     read += 1
                     if number not in wanted:
                         continue
+                    if not (isinstance(data, bytes) and isinstance(time, int) and time >= 0):
+                        undone += 1  # in a damaged file a cell may have any type
+                        continue
                     try:
-                        yield RawMessage(
-                            *wanted[number], int(time), self._unpack(data) if self._unpack else bytes(data)
-                        )
-                    except (*UNREADABLE, TypeError, ValueError):
+                        message = self._unpack(data) if self._unpack else data
+                    except UNREADABLE:
                         undone += 1
+                    else:
+                        yield RawMessage(*wanted[number], time, message)
         except sqlite3.Error as error:
             self._note(f"damaged after {read} messages ({error}); the rest is not read")
         if undone:
@@ -76,6 +79,9 @@ class SqliteFile:
         for number, topic, kind, encoding, offered in database.execute(
             f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
         ):
+            if not (isinstance(topic, str) and isinstance(kind, str)):
+                self._note(f"the topic number {number} has no readable name or type; its messages were skipped")
+                continue
             if encoding != "cdr":
                 self._note(f"{topic} is encoded as {encoding!r}, cdr is accepted; its messages were skipped")
                 continue
@@ -87,7 +93,7 @@ class SqliteFile:
         if not _has(database, "message_definitions"):
             return {}
         rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
-        return {kind: text for kind, encoding, text in rows if encoding == "ros2msg"}
+        return {kind: text for kind, encoding, text in rows if encoding == "ros2msg" and isinstance(text, str)}
 
     def _read_metadata(self, database: sqlite3.Connection) -> dict[str, Mapping[str, str]]:
         """The copy of metadata.yaml that rosbag2 keeps in the file since ROS 2 Iron."""

@@ -80,7 +80,7 @@ def blocks(
         while len(rows):
             try:
                 order, layout = _walked(data[0].tobytes(), short_name(type_name), definitions, wanted)
-            except (ValueError, LookupError):
+            except (ValueError, LookupError, RecursionError):  # also of a type that contains itself
                 rows, data = rows[1:], data[1:]
                 continue
             same = _same(data, order, layout)
