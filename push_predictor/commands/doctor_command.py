@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from push_predictor import __version__
-from push_predictor.commands.doctor_checks import (
+from push_predictor.commands.doctor.checks import (
     executables,
     model_predicts,
     python_and_packages,
     recording_reads,
     space,
 )
-from push_predictor.commands.doctor_findings import Finding
+from push_predictor.commands.doctor.findings import Finding
 from push_predictor.commands.output import add_command, progress, write_json
 from push_predictor.errors import PushPredictorError
 

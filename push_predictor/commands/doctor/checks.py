@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
-from push_predictor.commands.doctor_findings import Finding
+from push_predictor.commands.doctor.findings import Finding
 from push_predictor.errors import PushPredictorError
 
 PYTHON = ((3, 10), (3, 13))
