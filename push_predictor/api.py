@@ -122,11 +122,7 @@ def validate(
 
     Raises RecordingError or RigError that names the file.
     """
-<<<<<<< HEAD
-    return Validation(*validate_recording(model, Path(recording), _rig(rig), topics=topics))
-=======
     return Validation(*validate_recording(model, Path(recording), _rig(rig), None, topics))
->>>>>>> reading
 
 
 @one_blas_thread()

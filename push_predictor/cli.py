@@ -25,6 +25,7 @@ COMMANDS = (
     "validate",
     "trace",
     "report",
+    "check",
     "info",
     "doctor",
 )

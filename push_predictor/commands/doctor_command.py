@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor import __version__
-from push_predictor.commands.doctor_checks import (
+from push_predictor.commands.doctor.checks import (
     executables,
     model_predicts,
     python_and_packages,
     recording_reads,
     space,
 )
-from push_predictor.commands.doctor_findings import Finding
+from push_predictor.commands.doctor.findings import Finding
 from push_predictor.commands.output import add_command, add_topics, progress, save_topics_of, topics_of, write_json
 from push_predictor.errors import PushPredictorError
 

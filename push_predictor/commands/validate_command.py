@@ -16,10 +16,7 @@ from push_predictor.commands.output import (
     warn,
     write_json,
 )
-<<<<<<< HEAD
 from push_predictor.errors import RequestError
-=======
->>>>>>> reading
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

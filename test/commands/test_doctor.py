@@ -15,15 +15,16 @@ import pytest
 from ros_harness import REPOSITORY, free_domain, node_environment
 
 from push_predictor.cli import main
-from push_predictor.commands import doctor_checks, doctor_command
-from push_predictor.commands.doctor_checks import (
+from push_predictor.commands import doctor_command
+from push_predictor.commands.doctor import checks as doctor_checks
+from push_predictor.commands.doctor.checks import (
     executables,
     model_predicts,
     python_and_packages,
     recording_reads,
     space,
 )
-from push_predictor.commands.doctor_findings import Finding
+from push_predictor.commands.doctor.findings import Finding
 from push_predictor.nodes import doctor_graph
 
 OF_ROS = ["rclpy", "messages", "interfaces", "middleware", "shared memory", "security", "loop-back call"]

@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.doctor_findings import Finding
+from push_predictor.commands.doctor.findings import Finding
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""What `doctor` checks of the installation, and its findings."""

@@ -1,0 +1,4 @@
+"""Checks of recordings and push tables before anything is learnt: units, topics, frames, outline, clocks, coverage.
+
+Import `check` and `finding`; each other module finds one kind of mistake.
+"""

@@ -1,0 +1,45 @@
+"""The command `check`: its text, its JSON and its exit status."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from repository import REPOSITORY
+
+from push_predictor.cli import main
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import save_rig
+
+BAG = str(REPOSITORY / "bags" / "hexagon_delrin")
+
+
+def wrong_rig(folder: Path, size: float) -> str:
+    rig = read_recording(Path(BAG)).rig
+    assert rig is not None
+    save_rig(replace(rig, outline=Outline(size * rig.outline.vertices)), folder / "wrong.rig.yaml")
+    return str(folder / "wrong.rig.yaml")
+
+
+def test_a_sound_recording_has_no_findings(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--strict"]) == 0
+    assert capsys.readouterr().out == f"{BAG}: no findings\n"
+
+
+def test_a_warning_fails_only_with_strict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = wrong_rig(tmp_path, 1.04)
+    assert main(["check", BAG, "--rig", rig]) == 0
+    assert "warning  outline_size" in capsys.readouterr().out
+    assert main(["check", BAG, "--rig", rig, "--strict"]) == 1
+    assert capsys.readouterr().err == f"push_predictor check: {BAG}: outline_size\n"
+
+
+def test_a_refusal_fails_and_is_in_the_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--rig", wrong_rig(tmp_path, 1e3), "--json", "-"]) == 1
+    content = json.loads(capsys.readouterr().out)
+    (finding,) = content["data"][BAG]
+    assert not content["sound"]
+    assert (finding["name"], finding["severity"], finding["values"]["reach"]["unit"]) == ("units_rig", "refused", "m")

@@ -1,0 +1,185 @@
+"""Each usual mistake of a recording is made from bags/ and found; the bags as they are give no finding."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from repository import REPOSITORY
+
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+
+BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
+SMALL = "ellipse_plywood"
+ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
+
+
+@cache
+def bag(name: str) -> Recording:
+    return read_recording(REPOSITORY / "bags" / name)
+
+
+def rig_of(name: str) -> Rig:
+    rig = bag(name).rig
+    assert rig is not None
+    return rig
+
+
+def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
+    return {finding.name: finding for finding in check_recording(recording, rig)}
+
+
+def altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
+    """The rig with an outline turned, then shifted, then scaled; for polygons."""
+    vertices = size * (rotate(rig.outline.vertices, np.array(yaw)) + shift)
+    return replace(rig, outline=Outline(vertices))
+
+
+def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:
+    """The recording of a tracked frame whose origin is at `shift` in the slider's, turned by `yaw` against it."""
+    slider = recording.slider
+    move = rotate(np.array(shift), slider.heading)
+    heading = wrap_angle(slider.heading + yaw)
+    return replace(recording, slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=heading))
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_the_bags_give_no_finding(name: str) -> None:
+    assert check_recording(bag(name), rig_of(name)) == ()
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("shift", [(0.0, 0.0012), (0.0, -0.0012)])
+def test_a_shift_of_over_a_millimetre_is_found_within_four_sd(name: str, shift: tuple[float, float]) -> None:
+    shift = shift[::-1] if name == ONE_SIDE else shift  # along its side no contact shows a shift
+    finding = found(tracked(bag(name), 0.0, shift), rig_of(name))["outline_shifted"]
+    for estimate, true in zip((finding.values["x"], finding.values["y"]), shift, strict=True):
+        assert estimate.sd is not None
+        assert abs(estimate.value + true) < 4.0 * estimate.sd + 1e-4
+    assert finding.severity == "warning" and "mm" in finding.sentence
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name != "circle_pu"])
+@pytest.mark.parametrize("degrees", [2.1, -2.1, 12.0])
+def test_a_turn_of_over_two_degrees_is_found(name: str, degrees: float) -> None:
+    finding = found(tracked(bag(name), np.radians(degrees), (0.0, 0.0)), rig_of(name))["outline_turned"]
+    assert finding.values["yaw"].value == pytest.approx(-np.radians(degrees), abs=0.006)
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
+    order = rig_of(name).outline.rotational_symmetry
+    turn = 2.0 * np.pi / order if order else 0.3
+    assert not found(tracked(bag(name), turn, (0.0, 0.0)), rig_of(name))
+
+
+@pytest.mark.parametrize("name", ["hexagon_delrin", "square_abs_test", "square_abs_train"])
+def test_a_wrong_size_is_found(name: str) -> None:
+    finding = found(bag(name), altered(rig_of(name), size=1.03))["outline_size"]
+    assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
+
+
+def test_a_wrong_size_seen_from_one_side_is_reported_with_its_rival() -> None:
+    finding = found(bag(ONE_SIDE), altered(rig_of(ONE_SIDE), size=1.03))["outline_shifted"]
+    assert "Or the size is wrong" in finding.advice
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_mirrored_frame_is_named(name: str) -> None:
+    assert "frame_mirrored" in found(mirrored(bag(name), -1.0, -1.0), rig_of(name))
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name != "circle_pu"])
+def test_a_clockwise_heading_is_named(name: str) -> None:
+    assert "heading_clockwise" in found(mirrored(bag(name), 1.0, -1.0), rig_of(name))
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_exchanged_topics_are_refused(name: str) -> None:
+    assert found(swapped(bag(name)), rig_of(name))["topics_swapped"].severity == "refused"
+
+
+def test_another_body_is_refused() -> None:
+    slider = replace(bag(SMALL).slider, heading=np.linspace(0.0, 30.0, len(bag(SMALL).slider)))
+    far = replace(bag(SMALL), slider=replace(slider, x=slider.x + 0.5))
+    assert found(far, rig_of(SMALL))["another_body"].severity == "refused"
+
+
+def test_a_slider_that_never_moves_is_refused() -> None:
+    slider = bag(SMALL).slider
+    still = replace(bag(SMALL), slider=replace(slider, x=slider.x * 0.0, y=slider.y * 0.0, heading=0.0 * slider.x))
+    assert found(still, rig_of(SMALL))["no_contact"].severity == "refused"
+
+
+@pytest.mark.parametrize("lag", [0.05, -0.05])
+@pytest.mark.parametrize("name", ["square_abs_test", "square_abs_train"])
+def test_clocks_apart_are_found_with_the_lag(name: str, lag: float) -> None:
+    slider = bag(name).slider
+    late = replace(bag(name), slider=replace(slider, stamp=slider.stamp + int(lag * 1e9)))
+    assert found(late, rig_of(name))["clocks_apart"].values["lag"].value == pytest.approx(lag, abs=0.015)
+
+
+@pytest.mark.parametrize("stream", ["slider", "pusher"])
+def test_millimetres_are_refused_by_name(stream: str) -> None:
+    poses = getattr(bag(SMALL), stream)
+    wrong = replace(bag(SMALL), **{stream: replace(poses, x=1e3 * poses.x, y=1e3 * poses.y)})
+    finding = found(wrong, rig_of(SMALL))[f"units_length_{stream}"]
+    assert finding.severity == "refused" and "mm" in finding.sentence
+
+
+def test_a_rig_in_millimetres_is_refused() -> None:
+    assert "units_rig" in found(bag(SMALL), altered(rig_of(SMALL), size=1e3))
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e3])
+def test_stamps_in_a_wrong_unit_are_refused(factor: float) -> None:
+    slider = bag(SMALL).slider
+    stamp = ((slider.stamp - slider.stamp[0]) * factor).astype(np.int64)
+    assert "units_time_slider" in found(replace(bag(SMALL), slider=replace(slider, stamp=stamp)), rig_of(SMALL))
+
+
+def test_a_quaternion_with_w_first_is_refused() -> None:
+    slider = bag(SMALL).slider
+    assert "quaternion_order" in found(
+        replace(bag(SMALL), slider=replace(slider, heading=0.0 * slider.x)), rig_of(SMALL)
+    )
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_wrench_of_the_wrong_sign_is_named(name: str) -> None:
+    wrench = bag(name).wrench
+    assert wrench is not None
+    wrong = replace(bag(name), wrench=replace(wrench, fx=-wrench.fx, fy=-wrench.fy))
+    assert list(found(wrong, rig_of(name))) == ["wrench_sign"]
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_wrench_along_other_axes_is_named(name: str) -> None:
+    wrench = bag(name).wrench
+    assert wrench is not None
+    wrong = replace(bag(name), wrench=replace(wrench, fx=-wrench.fy, fy=wrench.fx))
+    assert list(found(wrong, rig_of(name))) == ["wrench_frame"]
+
+
+@pytest.mark.parametrize(
+    ("column", "factor"), [("velocity", 1e3), ("duration", 1e3), ("dtheta", 180.0 / np.pi), ("dx", 1e3)]
+)
+def test_wrong_units_of_a_table_are_refused_by_column(column: str, factor: float) -> None:
+    n, ones = 40, np.ones((40, 3))
+    inputs, outcomes, duration = ones * [0.02, 0.1, 0.0], ones * [0.003, 0.0, 0.1], np.full(n, 0.2)
+    assert check_table(PushTable(inputs, duration, outcomes, np.arange(n).astype(str))) == ()
+    inputs = inputs * [factor if column == "velocity" else 1.0, 1.0, 1.0]
+    outcomes = outcomes * [factor if column == "dx" else 1.0, 1.0, factor if column == "dtheta" else 1.0]
+    duration = duration * (factor if column == "duration" else 1.0)
+    findings = check_table(PushTable(inputs, duration, outcomes, np.arange(n).astype(str)))
+    assert [(finding.name, finding.severity) for finding in findings] == [(f"units_{column}", "refused")]
