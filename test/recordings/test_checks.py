@@ -115,6 +115,16 @@ def test_another_body_is_refused() -> None:
     assert found(far, rig_of(SMALL))["another_body"].severity == "refused"
 
 
+def test_few_pushes_give_no_estimate_of_the_outline() -> None:
+    """Measured recordings of one long push gave a shift of 10 mm with an sd of 0.01 mm."""
+    slider = bag(SMALL).slider
+    cut = slice(0, len(slider) // 3)
+    short = replace(slider, stamp=slider.stamp[cut], x=slider.x[cut], y=slider.y[cut], z=slider.z[cut])
+    short = replace(short, heading=slider.heading[cut])
+    findings = found(tracked(replace(bag(SMALL), slider=short), 0.0, (0.003, 0.0)), rig_of(SMALL))
+    assert {name: each.severity for name, each in findings.items()} == {"outline_unchecked": "note"}
+
+
 def test_a_slider_that_never_moves_is_refused() -> None:
     slider = bag(SMALL).slider
     still = replace(bag(SMALL), slider=replace(slider, x=slider.x * 0.0, y=slider.y * 0.0, heading=0.0 * slider.x))

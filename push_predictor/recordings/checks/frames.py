@@ -19,6 +19,7 @@ from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.windows.push_window import WindowOptions
 
 FEWEST_CONTACTS = 20  # samples
+FEWEST_PUSHES = 8  # for five parameters: with fewer, the spread between pushes gives no standard deviation
 DOUBT = 4.0  # standard deviations that an estimate must exceed, in addition to its allowance
 LENGTH_ALLOWANCE, ANGLE_ALLOWANCE, LAG_ALLOWANCE = 0.0005, np.radians(1.0), 0.01  # m, rad, s: marker and clock accuracy
 LARGE_GAP = 0.0005  # m; the outline explains the contacts if the median gap is smaller
@@ -144,6 +145,8 @@ def _unexplained(gap: float) -> Finding:
 
 
 def _outline_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
+    if fit.pushes < FEWEST_PUSHES:
+        return [_unchecked(fit.pushes)]
     yaw, x, y, growth, _ = fit.estimate.tolist()
     yaw_sd, x_sd, y_sd, growth_sd, _ = fit.sd.tolist()
     half = float(np.sqrt(rig.outline.area / np.pi))
@@ -158,6 +161,12 @@ def _outline_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
     if resized:
         found.append(_resized(Value(1.0 + growth, "1", growth_sd), half))
     return found
+
+
+def _unchecked(pushes: int) -> Finding:
+    sentence = f"Only {pushes} pushes were recorded: yaw, shift and size of the outline cannot be estimated."
+    advice = f"Record at least {FEWEST_PUSHES} pushes, on all sides."
+    return Finding("outline_unchecked", "note", sentence, advice, {"pushes": Value(pushes, "1")})
 
 
 def _turned(yaw: Value) -> Finding:
@@ -188,7 +197,7 @@ def _resized(scale: Value, half: float) -> Finding:
 
 def _clock_findings(fit: OutlineFit) -> list[Finding]:
     lag, sd = float(fit.estimate[4]), float(fit.sd[4])
-    if abs(lag) <= DOUBT * sd + LAG_ALLOWANCE:
+    if fit.pushes < FEWEST_PUSHES or abs(lag) <= DOUBT * sd + LAG_ALLOWANCE:
         return []
     side = "late" if lag > 0.0 else "early"
     sentence = f"The slider's stamps are {1e3 * abs(lag):.0f} ms {side} (sd {1e3 * sd:.0f} ms) against the pusher's."
