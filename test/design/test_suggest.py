@@ -142,7 +142,7 @@ class TestSuggestedPushes:
         np.testing.assert_array_equal(found[CHOSEN_OF_PRIOR:], expected[CHOSEN_OF_PRIOR:8])
         assert not np.array_equal(found[:CHOSEN_OF_PRIOR], expected[:CHOSEN_OF_PRIOR])
         many = train_model(noisy_pushes(260, windows_per_push=1), square_rig(), "prior", name="many")
-        assert _spread_evenly(many, 2) == [4, 5]  # the sequence begins anew after its last candidate
+        assert _spread_evenly(many, 2) == [4, 5]  # after its last candidate the sequence starts again
 
     def test_are_where_the_model_was_not_trained(self) -> None:
         known = train_model(one_side(noisy_pushes(200)), square_rig(), "gp", name="one side")

@@ -205,7 +205,7 @@ class TestTrials:
             np.testing.assert_allclose([one[name][0] for one in settings], ends)
 
     def test_what_the_pushes_made_have_shown_is_not_asked_again(self, evidence: Evidence) -> None:
-        """Each of two cases has 150 candidates that tell as much about it; the first case is settled already."""
+        """Each of two cases has 150 equally informative candidates; the first case is settled already."""
         rows = np.arange(ROWS)
         tried = np.zeros((2, 2 * ROWS, 3, 2))
         tried[0, :ROWS, 0, 0] = tried[1, ROWS:, 0, 0] = 1.0

@@ -23,7 +23,7 @@ _NUMBERS = 9  # of a transform: two of its stamp, three of its translation, four
 class Edge:
     """The pose of a frame in its parent over time: stamps (n,) in ns in file order, rows (n, 7) as in pose_rows.
 
-    static: from /tf_static, so that the last row holds for all times.
+    static: from /tf_static, so that the last row is valid at all times.
     """
 
     parent: str
