@@ -61,7 +61,7 @@ def separating_pushes(
 ) -> Experiment:
     """Pushes that would separate the first rival from each other one, within the range of the training inputs.
 
-    The inputs of each push are in the evidence; its covariates are set, as far as they can be, where rivals differ most.
+    The inputs of each push are in the evidence; its covariates are set, if they can be, where the rivals differ most.
     inside (n,): windows among the inputs of training, all if None. No pushes without rivals.
     """
     usable = _within(evidence.table, training) & (True if inside is None else inside)
