@@ -21,13 +21,14 @@ SECONDS = 8.0
 LATENCY = 7_000_000  # ns from the header stamp to the log time
 
 
-def short_recording(seconds: float = SECONDS) -> Recording:
-    """The first seconds of the recording bags/square_abs_test, without scalars."""
+def short_recording(seconds: float = SECONDS, after: float = 0.0) -> Recording:
+    """Some seconds of the recording bags/square_abs_test, without scalars."""
     whole = read_recording(REPOSITORY / "bags" / "square_abs_test")
-    end = int(whole.slider.stamp[0]) + round(seconds * 1e9)
+    begin = int(whole.slider.stamp[0]) + round(after * 1e9)
+    end = begin + round(seconds * 1e9)
 
     def cut(stream: Any) -> Any:
-        kept = stream.stamp < end
+        kept = (stream.stamp >= begin) & (stream.stamp < end)
         return replace(stream, **{name: value[kept] for name, value in vars(stream).items()})
 
     return replace(whole, slider=cut(whole.slider), pusher=cut(whole.pusher), wrench=cut(whole.wrench), scalars={})

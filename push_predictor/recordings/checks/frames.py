@@ -149,7 +149,7 @@ def _outline_findings(fit: OutlineFit, rig: Rig) -> list[Finding]:
         return [_unchecked(fit.pushes)]
     yaw, x, y, growth, _ = fit.estimate.tolist()
     yaw_sd, x_sd, y_sd, growth_sd, _ = fit.sd.tolist()
-    half = float(np.sqrt(rig.outline.area / np.pi))
+    half = 2.0 * rig.outline.area / rig.outline.perimeter  # from the centre to a side, of a regular outline
     turned = abs(yaw) > DOUBT * yaw_sd + ANGLE_ALLOWANCE
     shifted = any(abs(s) > DOUBT * sd + LENGTH_ALLOWANCE for s, sd in ((x, x_sd), (y, y_sd)))
     resized = abs(growth) * half > DOUBT * growth_sd * half + LENGTH_ALLOWANCE
@@ -189,7 +189,7 @@ def _shifted(x: Value, y: Value, one_side: bool) -> Finding:
 
 def _resized(scale: Value, half: float) -> Finding:
     more = 1e3 * (scale.value - 1.0) * half
-    sd = f"sd {scale.sd or 0.0:.4f}"
+    sd = f"sd {scale.sd or 0.0:.1g}"
     sentence = f"The slider is {scale.value:.3f} times as large as its outline ({sd}), {more:.1f} mm a side."
     advice = f"Multiply the outline by {scale.value:.3f}, or correct the tip radius by {more:.1f} mm."
     return Finding("outline_size", "warning", sentence, advice, {"scale": scale})

@@ -1,0 +1,65 @@
+"""From a laboratory's own recording to a validated model, by the commands that README shows."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from repository import REPOSITORY
+
+pytest.importorskip("rosbags")
+from lab_bags import Lab, pose_rows, short_recording, write_db3
+
+from push_predictor.cli import main
+from push_predictor.recordings.rig import save_rig
+from push_predictor.recordings.streams import Recording
+
+pytestmark = pytest.mark.slow
+
+BASE = [0.4, -0.3, 0.1, 0.0, 0.0, 0.0, 1.0]  # the robot's base in the world
+TURN = "geometry_msgs/msg/TransformStamped"
+
+
+def laboratory(recording: Recording) -> Lab:
+    """A Vicon that tracks the slider, a robot in tf and a force sensor."""
+    lab = Lab()
+    lab.pose("/vicon/block/block", TURN, recording.slider, "transform", child_frame_id="block")
+    lab.transform("/tf_static", "world", "base", recording.pusher.stamp[:1], [BASE])
+    tip = pose_rows(recording.pusher) - np.array([*BASE[:3], 0.0, 0.0, 0.0, 0.0])
+    lab.transform("/tf", "base", "tool0", recording.pusher.stamp, tip)
+    assert recording.wrench is not None
+    lab.wrench("/netft", recording.wrench, "geometry_msgs/msg/WrenchStamped", "wrench")
+    return lab
+
+
+def commands() -> list[list[str]]:
+    """The commands of README for a recording of one's own."""
+    text = (REPOSITORY / "README.md").read_text()
+    block = text[text.index("A recording of your own laboratory") :]
+    return [shlex.split(line)[1:] for line in re.findall(r"^    (push_predictor .*)$", block, re.MULTILINE)[:4]]
+
+
+def test_the_commands_of_the_readme_validate_a_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monday, tuesday = short_recording(70.0), short_recording(60.0, after=75.0)
+    write_db3(laboratory(monday), tmp_path / "monday")
+    laboratory(tuesday).mcap(tmp_path / "tuesday")
+    assert monday.rig is not None
+    save_rig(monday.rig, tmp_path / "rig.yaml")
+    monkeypatch.chdir(tmp_path)
+    check, info, train, validate = commands()
+
+    assert main(info) == 1  # the topics have other names; the error shows them
+    assert "/vicon/block/block (geometry_msgs/msg/TransformStamped)" in capsys.readouterr().err
+    assert main(check) == 0
+    assert capsys.readouterr().out == "monday: no findings\ntuesday: no findings\n"
+    assert main(info) == 0
+    assert "slider: 6995 samples" in capsys.readouterr().out
+    assert main(train) == 0 and (tmp_path / "monday.pushmodel").is_file()
+    capsys.readouterr()
+    assert main(validate) == 0
+    assert capsys.readouterr().out.startswith("The model fits: 95 % intervals cover ")
