@@ -60,6 +60,7 @@ def no_node(stop: Stop) -> Any:
         (["--version"], 0, "out", f"push_predictor {__version__}"),
         (["--help", "--ros-args", "-p", "rate:=2.0"], 0, "out", "usage: push_replay"),
         (["recordng:=bags/square_abs_test"], 2, "err", "unrecognized arguments: recordng:=bags/square_abs_test"),
+        (["--ros-args", "-r", "__ns:=/cell", "--", "--typo"], 2, "err", "unrecognized arguments: --typo"),
         (["--rate", "3", "--ros-args", "-r", "__ns:=/cell"], 2, "err", "unrecognized arguments: --rate 3"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -37,6 +38,12 @@ def rig_of(name: str) -> Rig:
 
 def found(recording: Recording, rig: Rig) -> dict[str, Finding]:
     return {finding.name: finding for finding in check_recording(recording, rig)}
+
+
+def bag_apothem(name: str) -> float:
+    """Distance (m) from the centre of a regular polygon to its sides."""
+    corners = rig_of(name).outline.vertices
+    return float(np.linalg.norm(0.5 * (corners[0] + corners[1])))
 
 
 def altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
@@ -87,6 +94,9 @@ def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
 def test_a_wrong_size_is_found(name: str) -> None:
     finding = found(bag(name), altered(rig_of(name), size=1.03))["outline_size"]
     assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
+    half = 45.0 if name.startswith("square") else 1e3 * bag_apothem(name)
+    stated = re.search(r", (-\d+\.\d) mm a side", finding.sentence)
+    assert stated and float(stated[1]) == pytest.approx(half * 1.03 * (1 / 1.03 - 1.0), abs=0.15)
 
 
 def test_a_wrong_size_seen_from_one_side_is_reported_with_its_rival() -> None:
