@@ -50,9 +50,10 @@ $(VENV)/.docs: $(VENV)/.python setup.py
 	$(BIN)/pip install -qq '.[docs]'
 	touch $@
 
-# Building the message package takes most of the time: only when it changes.
-$(VENV)/.interfaces: $(VENV)/.python $(INTERFACES)
+# Building the message packages takes most of the time: only when they change. tf2_msgs is not on PyPI.
+$(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) scripts/install_tf2_msgs.sh
 	$(BIN)/pip install -qq 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces
+	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/install_tf2_msgs.sh
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.interfaces $(SOURCES)

@@ -6,7 +6,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "push_predictor"
-NODES = ("predict_server", "push_replay", "push_validator")
+NODES = ("predict_server", "push_recorder", "push_replay", "push_validator")
 
 setup(
     name=NAME,
@@ -50,6 +50,8 @@ setup(
     extras_require={
         "report": ["matplotlib>=3.8", "jinja2>=3.1", "rich>=13"],
         "live": ["rich>=13"],
+        "completion": ["argcomplete>=3"],
+        "parquet": ["pyarrow>=14"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "foreign": ["mujoco>=3.2", "mcap-ros2-support>=0.5", "rosbags>=0.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
@@ -62,6 +64,8 @@ setup(
             "scikit-learn>=1.4",
             "mcap-ros2-support>=0.5",
             "dask[distributed]>=2024.5",
+            "argcomplete>=3",
+            "pyarrow>=14",
         ],
     },
     entry_points={

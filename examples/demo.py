@@ -74,7 +74,7 @@ def _trained(kind: str) -> Path:
     if path.exists() and path.stat().st_mtime > max(part.stat().st_mtime for part in TRAINING.iterdir()):
         print(f"   {kind}: using {path.relative_to(ROOT)} of an earlier run")
         return path
-    command = ["train", str(TRAINING), "--kind", kind, "--out", str(path)]
+    command = ["train", str(TRAINING), "--kind", kind, "--out", str(path), "--force"]
     subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
     return path
 
@@ -117,7 +117,8 @@ def _report(models: Sequence[PushModel], agreement: str) -> Path:
     windows = results[0][0]
     readme_picture(OUT / "overview.png", models[0], windows_to_table(windows))
     facts = {"online and offline": agreement, "replay rate": f"{RATE:g}"}
-    return report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts)
+    alarm = json.loads((OUT / "online" / "validation.json").read_text())["alarm"]
+    return report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts, alarm)
 
 
 def _print_summary(comparisons: Sequence[Comparison]) -> None:

@@ -107,7 +107,17 @@ def run_split(split: Split, out: Path, rates: tuple[float, float]) -> Outcome:
     for name, recording in recordings.items():
         write_recording(folder / name, recording)
     model = folder / f"{BASE}.pushmodel"
-    command = ["train", str(folder / "training"), "--kind", "analytical", "--name", BASE, "--out", str(model)]
+    command = [
+        "train",
+        str(folder / "training"),
+        "--kind",
+        "analytical",
+        "--name",
+        BASE,
+        "--out",
+        str(model),
+        "--force",
+    ]
     subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
     closed = run_loop(model, BASE, folder / "traced", folder / "whole", folder, rates)
     outcome = _outcome(split, closed, model, folder)

@@ -29,6 +29,11 @@ ARGUMENTS = (
     ("rate", "", "Recorded seconds per second. Empty: 1, or the value in params_file."),
     ("output", "", "Folder for the validator's results. Empty: nothing is written."),
     ("rig", "", "push_rig YAML file, for a recording without a push_rig record."),
+    ("slider_topic", "", "The slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. Empty: slider/pose."),
+    ("pusher_topic", "", "The pose of the pusher's tip, in the same manner. Empty: pusher/pose."),
+    ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
+    ("wrench_frame", "", "Axes of the wrench: world, or tip for those of the tip's pose. Empty: world."),
+    ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
     ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
 )
@@ -66,7 +71,9 @@ def _server(given: dict[str, str]) -> dict[str, Any]:
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
-    return {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
+    topics = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "world_frame")
+    paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
+    return {**paths, **{name: given[name] for name in topics if given[name]}}
 
 
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.error_codes import ErrorCode
+from push_predictor.errors import CovariateError, PushPredictorError, RequestError
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.request import PushRequest
 from push_predictor.types import Array
@@ -88,7 +89,7 @@ def query_from_batch_request(request: Any) -> PushQuery:
         if (length := len(getattr(request, name))) != count:
             raise RequestError(f"{name} length", length, f"{count} values, as many as velocity has")
     inputs = np.array([request.velocity, request.contact, request.angle], dtype=np.float64).T
-    return PushQuery(request.model, inputs, request.duration, _covariates(request, count))
+    return PushQuery(request.model, inputs, request.duration, covariates_of_pushes(request, count))
 
 
 def fill_response(response: PredictPush.Response, prediction: Prediction) -> None:
@@ -108,9 +109,9 @@ def extend_batch_response(response: PredictPushBatch.Response, prediction: Predi
     response.in_domain.extend(prediction.in_domain.tolist())
 
 
-def refuse(response: Any, reason: str) -> Any:
-    """A new response of the same kind without numbers: success false, and the reason."""
-    return type(response)(success=False, message=reason)
+def refuse(response: Any, reason: str, code: ErrorCode) -> Any:
+    """A new response of the same kind without numbers: success false, the reason and its code."""
+    return type(response)(success=False, message=reason, error_code=int(code))
 
 
 def prediction_from_response(response: Any) -> Prediction:
@@ -131,18 +132,18 @@ def prediction_from_response(response: Any) -> Prediction:
 
 def covariates_of_push(request: Any) -> dict[str, float]:
     """The covariates of a request for one push. Raises RequestError if values and names do not match."""
-    return {name: float(values[0]) for name, values in _covariates(request, 1).items()}
+    return {name: float(values[0]) for name, values in covariates_of_pushes(request, 1).items()}
 
 
-def _covariates(request: Any, count: int) -> dict[str, Array]:
+def covariates_of_pushes(request: Any, count: int) -> dict[str, Array]:
     """The covariates (count,) of each push by name. Raises RequestError if values and names do not match."""
     names: Sequence[str] = request.covariate_names
     if not names and not len(request.covariate_values):
         return {}
     if (found := len(request.covariate_values)) != count * len(names):
-        raise RequestError("covariate_values length", found, f"{count * len(names)}, one per name and push")
+        raise CovariateError("covariate_values length", found, f"{count * len(names)}, one per name and push")
     if repeated := {name for name in names if names.count(name) > 1}:
-        raise RequestError("covariate_names", sorted(repeated), "each name once")
+        raise CovariateError("covariate_names", sorted(repeated), "each name once")
     values = np.array(request.covariate_values, dtype=np.float64).reshape(count, len(names))
     return dict(zip(names, values.T, strict=True))
 

@@ -17,4 +17,5 @@ float64[3] predicted
 float64[9] covariance
 float64[3] observed
 float64[3] standardised
+bool in_domain
 {HEADER_DEFINITION}"""

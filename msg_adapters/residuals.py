@@ -18,7 +18,7 @@ class ValidatedWindow:
 
     stamp_ns: end of the window, ns. window: number within the push. inputs (3,): velocity m/s, contact, angle rad;
     duration s. predicted and observed (3,): dx m, dy m, dtheta rad in the push frame; covariance (3, 3) of an
-    observed outcome.
+    observed outcome. in_domain: whether the push is in the domain of the model's training data.
     """
 
     stamp_ns: int
@@ -30,6 +30,7 @@ class ValidatedWindow:
     predicted: Array
     covariance: Array
     observed: Array
+    in_domain: bool
 
     @property
     def standardised(self) -> Array:
@@ -49,6 +50,7 @@ def residual_to_message(window: ValidatedWindow, frame_id: str = "world") -> Pus
     message.duration = float(window.duration)
     message.predicted, message.observed = _flat(window.predicted), _flat(window.observed)
     message.covariance, message.standardised = _flat(window.covariance), _flat(window.standardised)
+    message.in_domain = window.in_domain
     return message
 
 

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseWithCovariance
 
+from msg_adapters.predictions import covariates_of_push, covariates_of_pushes
 from msg_adapters.slider_poses import FLAT, PLANAR, pose_of_message
-from push_predictor.errors import RequestError
+from push_predictor.errors import RequestError, TooLargeError
 from push_predictor.geometry.frames import yaw_of_quaternion
 from push_predictor.geometry.spatial import SpatialPose
+from push_predictor.models.domain_remark import OUT_OF_DOMAIN
 from push_predictor.planning.rollout import A_COVARIANCE, FARTHEST, MOST_PARTICLES, Rollout, is_covariance
 from push_predictor.types import Array
 
@@ -20,7 +22,8 @@ from push_predictor.types import Array
 class RolloutQuery:
     """A request in its own frame. model: a name, empty for the default one.
 
-    slider with covariance (6, 6); steps (k, 4): velocity m/s, contact, angle rad, duration s; number of samples; seed.
+    slider with covariance (6, 6); steps (k, 4): velocity m/s, contact, angle rad, duration s; number of samples; seed;
+    covariates (k,) by name, of each step.
     """
 
     model: str
@@ -29,6 +32,7 @@ class RolloutQuery:
     steps: Array
     samples: int
     seed: int
+    covariates: dict[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +47,11 @@ class WorldSlider:
 def query_from_rollout_request(request: Any) -> RolloutQuery:
     """The query of a RolloutPushes request; the rollout checks its steps.
 
-    Raises RequestError for a pose that is not finite, a quaternion not of unit length, and too many particles.
+    Raises RequestError for a pose that is not finite, a quaternion not of unit length, too many particles, and
+    covariates whose values do not match their names.
     """
     if request.particles > MOST_PARTICLES:
-        raise RequestError("particles", request.particles, f"at most {MOST_PARTICLES}")
+        raise TooLargeError("particles", request.particles, f"at most {MOST_PARTICLES}")
     steps = [(step.velocity, step.contact, step.angle, step.duration) for step in request.steps]
     return RolloutQuery(
         request.model,
@@ -55,7 +60,15 @@ def query_from_rollout_request(request: Any) -> RolloutQuery:
         np.reshape(np.array(steps, dtype=np.float64), (-1, 4)),
         request.particles,
         request.seed,
+        _covariates(request, len(steps)),
     )
+
+
+def _covariates(request: Any, count: int) -> dict[str, Array]:
+    """The covariates (count,) of each step by name; one value per name applies to all steps. Raises CovariateError."""
+    if len(request.covariate_values) == len(request.covariate_names):
+        return {name: np.full(count, value) for name, value in covariates_of_push(request).items()}
+    return covariates_of_pushes(request, count)
 
 
 def world_slider(query: RolloutQuery, frame: SpatialPose) -> WorldSlider:
@@ -119,7 +132,8 @@ def remarks(rolled: Rollout) -> str:
     if outside := [k for k, share in enumerate(rolled.in_domain) if share < 1.0]:
         percent = 100.0 * (1.0 - rolled.in_domain[-1])
         found.append(
-            f"{percent:.3g} % of the samples leave the domain of the training data, from steps[{outside[0]}] on"
+            f"{OUT_OF_DOMAIN}: {percent:.3g} % of the samples leave the domain of the training data, "
+            f"from steps[{outside[0]}] on"
         )
     for k, share in enumerate(rolled.in_contact):
         if share < 1.0:

@@ -92,7 +92,7 @@ def fill_slider_response(
     _fill_pose(answer, to_request @ moved.turned(float(after.pose[2] - push.slider[2])))
     spread = to_request.covariance(covariance)
     answer.pose.covariance = (0.5 * (spread + spread.T)).reshape(36)  # exactly symmetric, in spite of rounding
-    response.in_domain = after.in_domain
+    response.in_domain, response.message = after.in_domain, after.remark
     response.success = True
 
 

@@ -23,7 +23,6 @@ from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_learnt import MeanChoice
-from push_predictor.models.watch import Watch
 from push_predictor.planning import choose
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.model_repertoire import model_repertoire
@@ -36,6 +35,7 @@ from push_predictor.recordings.table import empty_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows import finder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
+from push_predictor.watch import Watch
 
 if TYPE_CHECKING:
     from push_predictor.residuals.outcome import Trace

@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """The command line `push_predictor`. Each sub-command is a module in push_predictor.commands.
 
 Exit status 0: done; 1: the work failed, and one line on stderr states why; 2: the call was wrong.
@@ -12,11 +13,13 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from push_predictor import __version__
-from push_predictor.commands.output import check_json
+from push_predictor.commands.common.old_spellings import current_spelling
+from push_predictor.commands.common.output import check_json, warn
 from push_predictor.errors import PushPredictorError
 
 COMMANDS = (
     "import",
+    "record",
     "simulate",
     "train",
     "predict",
@@ -25,6 +28,7 @@ COMMANDS = (
     "validate",
     "trace",
     "report",
+    "rig",
     "check",
     "info",
     "doctor",
@@ -35,7 +39,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command and return its exit status."""
     # With a thousand rows a second thread gains little, and it is ten times slower if another process needs the core.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    options = build_parser().parse_args(arguments)
+    words, warnings = current_spelling(sys.argv[1:] if arguments is None else arguments)
+    parser = build_parser()
+    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion only: argcomplete takes longer than the parser
+        _complete(parser)
+    options = parser.parse_args(words)
+    for warning in warnings:
+        warn(warning)
     try:
         check_json(options)
         options.run(options)
@@ -56,12 +66,22 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="push_predictor",
         description="Learn models of planar pushing from recordings, check them, and explain their errors.",
+        allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
         import_module(f"push_predictor.commands.{name}_command").add_parser(commands)
     return parser
+
+
+def _complete(parser: argparse.ArgumentParser) -> None:
+    """Print the completions of the shell's line and end, if argcomplete is installed."""
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    argcomplete.autocomplete(parser)
 
 
 def _one_line(error: Exception) -> str:

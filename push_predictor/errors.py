@@ -43,4 +43,44 @@ class RequestError(PushPredictorError):
 
     def within(self, place: str) -> RequestError:
         """The same error for a nested field: `angle` within `steps[2]` becomes `steps[2].angle`."""
-        return RequestError(f"{place}.{self.field}", self.value, self.accepted)
+        return type(self)(f"{place}.{self.field}", self.value, self.accepted)
+
+
+class UnknownModelError(RequestError):
+    """A request names a model that is not loaded."""
+
+
+class CovariateError(RequestError):
+    """A covariate of a request is missing, repeated, not finite, or contradicts the poses."""
+
+
+class FrameError(RequestError):
+    """The frame of a request is empty or unknown."""
+
+
+class ContactError(RequestError):
+    """The pusher of a request does not push the slider."""
+
+
+class TooLargeError(RequestError):
+    """A request needs more work than is accepted at once."""
+
+
+class PredictionError(PushPredictorError):
+    """A model has no finite prediction for a push that passed the checks."""
+
+
+class InactiveError(PushPredictorError):
+    """A node received a request that it answers only while it is active."""
+
+
+class BusyError(PushPredictorError):
+    """The same work is under way for another request."""
+
+
+class NotPausedError(PushPredictorError):
+    """A request that needs a paused replay arrived while it plays."""
+
+
+class NothingLeftError(PushPredictorError):
+    """A recording has no further message."""

@@ -3,4 +3,4 @@
 set -eu
 cd "$(dirname "$0")/.."
 PYTHONPATH=. exec "${PYTHON:-.venv/bin/python}" -m push_predictor.cli train bags/square_abs_train --kind vhgp --mean zero \
-  --out resource/simulated_square_abs.pushmodel
+  --out resource/simulated_square_abs.pushmodel --force

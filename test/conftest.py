@@ -5,7 +5,9 @@ from __future__ import annotations
 import gc
 import os
 import re
+import shutil
 import sys
+import tempfile
 from collections.abc import Collection, Generator, Mapping
 from pathlib import Path
 
@@ -35,6 +37,18 @@ LONGEST = {  # files that take half a minute or more
     "test_node_push_alarm", "test_faults_kill", "test_faults_load", "test_faults_network_security",
     "test_extended_model", "test_prior_model", "test_paper_report", "test_trace_verdicts", "test_trace_report",
 }  # fmt: skip
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """One folder of kept tables for the whole run, empty at its start: the servers of a run share their tables."""
+    if not hasattr(config, "workerinput"):  # workers inherit the variable
+        os.environ["PUSH_PREDICTOR_CACHE"] = tempfile.mkdtemp(prefix="push_predictor-tables-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the folder."""
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(os.environ["PUSH_PREDICTOR_CACHE"], ignore_errors=True)
 
 
 @pytest.hookimpl(wrapper=True)

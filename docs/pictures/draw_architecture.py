@@ -24,7 +24,7 @@ ROWS = (
     ),
     (
         ("api, commands", "Python interface, command line", LIBRARY, 2),
-        ("nodes", "predict_server, push_replay, push_validator", ROS, 2.6),
+        ("nodes", "predict_server, push_replay,\npush_recorder, push_validator", ROS, 2.6),
         ("msg_adapters", "ROS messages ↔ arrays", ROS, 1.6),
     ),
     (

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.options import (
     add_command,
     add_rig,
+    add_strict,
     add_topics,
-    check_data,
-    progress,
     save_topics_of,
     topics_of,
-    write_json,
 )
+from push_predictor.commands.common.output import check_data, check_output, write_json
+from push_predictor.commands.common.progress import progress
+from push_predictor.commands.common.rig_out import check_rig_out, write_corrected_rig
 from push_predictor.errors import RecordingError
-
-if TYPE_CHECKING:
-    from push_predictor.recordings.checks.finding import Finding
-    from push_predictor.recordings.topics import Topics
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,11 +25,19 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         commands,
         "check",
         "Find mistakes in recordings and push tables before training. Checks units, topics, frames, the outline, "
-        "clocks and the wrench. Estimates the correction with its standard deviation.",
+        "clocks and the wrench, and which sides, speeds and angles were pushed. Estimates each correction with its "
+        "standard deviation.",
         "push_predictor check bags/square_abs_train",
     )
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
-    parser.add_argument("--strict", action="store_true", help="exit with status 1 after a warning too")
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage")
+    add_strict(parser)
+    parser.add_argument(
+        "--rig-out",
+        type=Path,
+        metavar="FILE.yaml",
+        help="write the rig with outline and tip corrected; for one recording",
+    )
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
@@ -41,31 +45,36 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> None:
     """Check the data and print the findings. Raises RecordingError that names what is refused."""
+    from push_predictor.evaluation.check_page.page import check_json, write_check_page
+    from push_predictor.recordings.checks.checked import checked_data
+    from push_predictor.recordings.rig import load_rig
+    from push_predictor.reporting import html
+
     check_data(options.data)
+    check_output("--page", options.page, force=options.force)
+    check_rig_out(options)
+    if options.page is not None:
+        html.check_installed("--page")
+    rig = load_rig(options.rig) if options.rig else None
     with progress("check"):
-        found = {str(path): _findings(path, options.rig, topics_of(options)) for path in options.data}
+        checked = {str(path): checked_data(path, rig, topics_of(options)) for path in options.data}
         save_topics_of(options, options.data)
+        if options.page is not None:
+            write_check_page(options.page, checked)
     failing = ("refused", "warning") if options.strict else ("refused",)
-    wrong = [f"{path}: {each.name}" for path, all_of in found.items() for each in all_of if each.severity in failing]
-    content = {"sound": not wrong, "data": {path: [each.record() for each in all_of] for path, all_of in found.items()}}
+    wrong = [f"{path}: {each.name}" for path, of in checked.items() for each in of.findings if each.severity in failing]
+    content = {
+        "sound": not wrong,
+        "data": {path: [each.record() for each in of.findings] for path, of in checked.items()},
+        "about": {path: check_json(of) for path, of in checked.items()},
+    }
     if not write_json(options, content):
-        for path, findings in found.items():
-            print(f"{path}: {len(findings) or 'no'} finding{'' if len(findings) == 1 else 's'}")
-            for finding in findings:
+        for path, of in checked.items():
+            print(f"{path}: {len(of.findings) or 'no'} finding{'' if len(of.findings) == 1 else 's'}")
+            for finding in of.findings:
                 print("\n".join(finding.lines))
+        if options.page is not None:
+            print(f"page: {options.page}")
+    write_corrected_rig(options, {path: of.findings for path, of in checked.items()})
     if wrong:
         raise RecordingError(", ".join(wrong))
-
-
-def _findings(path: Path, rig_file: Path | None, topics: Topics) -> tuple[Finding, ...]:
-    from push_predictor.recordings.checks.check import check_recording, check_table
-    from push_predictor.recordings.load import known_rig
-    from push_predictor.recordings.read import read_recording, require_rig
-    from push_predictor.recordings.rig import load_rig
-    from push_predictor.recordings.table_file import is_recording, read_table
-
-    given = load_rig(rig_file) if rig_file else None
-    if not is_recording(path):
-        return check_table(read_table(path), given or known_rig(path))
-    recording = read_recording(path, rig=given, topics=topics)
-    return check_recording(recording, require_rig(recording))

@@ -13,6 +13,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor import __version__
+from push_predictor.commands.common.options import (
+    add_command,
+    add_model,
+    add_recording,
+    add_topics,
+    save_topics_of,
+    topics_of,
+)
+from push_predictor.commands.common.output import write_json
+from push_predictor.commands.common.progress import progress
 from push_predictor.commands.doctor.checks import (
     executables,
     model_predicts,
@@ -21,7 +31,6 @@ from push_predictor.commands.doctor.checks import (
     space,
 )
 from push_predictor.commands.doctor.findings import Finding
-from push_predictor.commands.output import add_command, add_topics, progress, save_topics_of, topics_of, write_json
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
@@ -40,10 +49,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "how to fix it.",
         "push_predictor doctor --recording bags/square_abs_test",
     )
-    parser.add_argument("--model", type=Path, metavar="MODEL", help="check this model file (default: the shipped one)")
-    parser.add_argument(
-        "--recording", type=Path, metavar="RECORDING", help="check this recording (default: a simulated one)"
-    )
+    add_model(parser, "?", note=" to predict with (default: the shipped one)")
+    add_recording(parser, "default: a simulated one")
     add_topics(parser)
     parser.set_defaults(run=run)
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.options import (
     add_command,
+    add_model,
     add_rig,
     add_topics,
-    check_data,
-    progress,
     save_topics_of,
     topics_of,
-    warn,
-    write_json,
 )
+from push_predictor.commands.common.output import check_data, warn, write_json
+from push_predictor.commands.common.progress import progress
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,7 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "Score a model on data it was not trained on. Prints NMSE, NLPD and coverage with 95 % intervals.",
         "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
     )
-    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    add_model(parser)
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     add_rig(parser)
     add_topics(parser)

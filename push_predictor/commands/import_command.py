@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import add_command, add_rig, check_output, progress, write_json
+from push_predictor.commands.common.options import add_command, add_out, add_rig
+from push_predictor.commands.common.output import check_folder, write_json
+from push_predictor.commands.common.progress import progress
 
 KINDS = ("mit", "mit-square", "mlab", "mcube", "rosbag1")
 
@@ -20,7 +22,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("kind", choices=KINDS, metavar="KIND", help=f"format of the sources: {', '.join(KINDS)}")
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="files or folders to convert")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
+    add_out(parser, "a folder")
     add_rig(parser)
     parser.set_defaults(run=run)
 
@@ -30,9 +32,11 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.importers import import_source
     from push_predictor.recordings.rig import load_rig
 
-    check_output("--out", options.out, folder=True)
+    check_folder("--out", options.out, force=options.force)
     rig = load_rig(options.rig) if options.rig else None
-    with progress(f"import {options.kind}"):
-        report = import_source(options.kind, options.sources, options.out, rig=rig)
+    with progress(f"import {options.kind}") as watch:
+        report = import_source(
+            options.kind, options.sources, options.out, rig=rig, overwrite=options.force, watch=watch
+        )
     if not write_json(options, report.to_json()):
         print(report)

@@ -7,13 +7,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, add_topics, save_topics_of, topics_of, write_json
+from push_predictor.commands.common.options import add_command, add_rig, add_topics, save_topics_of, topics_of
+from push_predictor.commands.common.output import write_json
 
 if TYPE_CHECKING:
     from push_predictor.types import Array
 
 
 UNITS = {"velocity_range": "m/s", "angle_range": "rad"}
+BIAS_UNITS = {
+    **dict.fromkeys(("force", "force_sd", "weight", "weight_sd"), "N"),
+    **dict.fromkeys(("torque", "torque_sd", "lever"), "N m"),
+    "seconds": "s",
+}
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,23 +31,29 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "push_predictor info bags/square_abs_test",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
+    add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Describe the file and print the description."""
+    from push_predictor.errors import RecordingError
+    from push_predictor.recordings.bag.csv_streams import PARQUET
     from push_predictor.recordings.describe import describe_recording, describe_table
+    from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.table_file import is_recording
 
     path: Path = options.file
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
     if is_recording(path):
-        found = describe_recording(path, topics_of(options))
+        found = describe_recording(path, topics_of(options), load_rig(options.rig) if options.rig else None)
         save_topics_of(options, [path])
     elif path.name.endswith((".csv", ".csv.gz")):
         found = describe_table(path)
+    elif path.suffix == ".parquet":
+        raise RecordingError(f"{path}: {PARQUET}")
     else:
         found = _describe_model(path)
     if not write_json(options, found):
@@ -80,7 +92,9 @@ def _print(found: Mapping[str, object]) -> None:
         if isinstance(value, (list, tuple)):
             value = _listed(value)
         if isinstance(value, dict):
-            value = "".join(f"\n  {name}: {_entry(entry)}" for name, entry in value.items()) or "none"
+            units = BIAS_UNITS if key == "wrench_bias" else {}
+            lines = (f"\n  {name}: {_entry(entry)} {units.get(name, '')}".rstrip(" ") for name, entry in value.items())
+            value = "".join(lines) or "none"
         if value is None:
             value = "none"
         unit = f" {UNITS[key]}" if key in UNITS and value != "none" else ""
@@ -92,4 +106,4 @@ def _listed(values: Sequence[object]) -> str:
 
 
 def _entry(entry: object) -> object:
-    return _listed(entry) if isinstance(entry, (list, tuple)) else entry
+    return _listed(entry if isinstance(entry, (list, tuple)) else [entry])

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import add_command, add_covariate, covariates_of, write_json
+from push_predictor.commands.common.options import add_command, add_covariate, add_model, covariates_of
+from push_predictor.commands.common.output import write_json
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--json gives the covariance in m and rad.",
         "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
     )
-    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    add_model(parser)
     parser.add_argument("--velocity", required=True, type=float, metavar="V", help="speed of the pusher in m/s")
     parser.add_argument(
         "--contact",

@@ -3,100 +3,104 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.options import (
     add_command,
+    add_model,
+    add_out,
+    add_recording,
     add_rig,
     add_topics,
-    check_output,
-    progress,
     save_topics_of,
     topics_of,
-    write_json,
-    write_text,
 )
+from push_predictor.commands.common.output import check_folder, write_json, write_text
+from push_predictor.commands.common.progress import JobProgress, progress
 from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.watch import Watch, part_of, watched
 
 if TYPE_CHECKING:
     from push_predictor.models.push_model import PushModel
 
 KINDS = ("vhgp", "gp", "analytical")
 SPEEDS = (0.01, 0.02, 0.05)  # m/s
+VALIDATION_EXAMPLE = (
+    "push_predictor report validation square_abs.pushmodel --recording bags/square_abs_test --out report"
+)
 PAPER_IS_MISSING = (
     "`report paper` needs the package push_predictor_paper: pip install ./push_predictor_paper in the repository"
 )
-OPTIONS_OF_KIND = {"paper": ("data", "recordings", "jobs", "cluster"), "validation": ("model", "recording")}
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `report`."""
-    parser = add_command(
-        commands,
+    """Add the sub-command `report` with a parser for each kind."""
+    summary = "Write an HTML page with tables and figures. Both kinds take --quick, --out PATH, --force, --json FILE|-."
+    parser = commands.add_parser(
         "report",
-        "Write an HTML page with tables and figures. `report validation` compares models with a recording. Without "
-        "--model and --recording it simulates a square on ABS and trains on that. `report paper` checks the claims of "
-        "Bauza and Rodriguez (2017) on simulated pushes, with --data also on measured ones. An interrupted report "
-        "continues from its results in DIR/work.",
-        "push_predictor report validation --model square_abs.pushmodel --recording bags/square_abs_test --out report",
+        help=summary.partition(". ")[0],
+        description=summary,
+        epilog=f"example:\n  {VALIDATION_EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
-    parser.add_argument("kind", choices=tuple(OPTIONS_OF_KIND), metavar="KIND", help="paper or validation")
-    parser.add_argument("--quick", action="store_true", help="use few pushes, to test that it runs")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="output folder")
-    _add_paper_options(parser.add_argument_group("report paper"))
-    _add_validation_options(parser.add_argument_group("report validation"))
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
+    _add_validation(kinds)
+    _add_paper(kinds)
+
+
+def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = add_command(
+        kinds,
+        "validation",
+        "Compare models with a recording. Without MODEL and --recording it simulates a square on ABS and trains on "
+        "that.",
+        VALIDATION_EXAMPLE,
+    )
+    add_model(parser, "*", note="; the report compares the others with the first")
+    add_recording(parser, "give one that was not used for training")
+    _add_common(parser)
     add_rig(parser)
     add_topics(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=_validation)
 
 
-def _add_paper_options(paper: argparse._ArgumentGroup) -> None:
-    paper.add_argument(
+def _add_paper(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = add_command(
+        kinds,
+        "paper",
+        "Check the claims of Bauza and Rodriguez (2017). Uses simulated pushes, with --data also measured ones. An "
+        "interrupted report continues from its results in the folder work of --out.",
+        "push_predictor report paper --quick --out paper",
+    )
+    parser.add_argument(
         "--data",
         type=Path,
         metavar="FOLDER",
         help="folder of measured pushes: mit_square, or files of the MIT push data set",
     )
-    paper.add_argument(
+    parser.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"
     )
-    paper.add_argument("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)")
-    paper.add_argument(
+    parser.add_argument("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)")
+    parser.add_argument(
         "--cluster", metavar="ADDRESS", help="address of a dask scheduler whose machines all see --out and --data"
     )
+    _add_common(parser)
+    parser.set_defaults(run=_paper)
 
 
-def _add_validation_options(validation: argparse._ArgumentGroup) -> None:
-    validation.add_argument(
-        "--model",
-        type=Path,
-        nargs="+",
-        metavar="MODEL",
-        help="model files; the report compares the others with the first",
-    )
-    validation.add_argument(
-        "--recording", type=Path, metavar="RECORDING", help="a recording that was not used for training"
-    )
-
-
-def run(options: argparse.Namespace) -> None:
-    """Compute the results and write the page."""
-    for kind, names in OPTIONS_OF_KIND.items():
-        for name in names:
-            if kind != options.kind and getattr(options, name) is not None:
-                raise RequestError(f"report {options.kind}", f"--{name}", f"it with `report {kind}` only")
-    check_output("--out", options.out, folder=True)
-    options.out.mkdir(parents=True, exist_ok=True)
-    if options.kind == "paper":
-        _paper(options)
-    else:
-        _validation(options)
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quick", action="store_true", help="use few pushes, to test that it runs")
+    add_out(parser, "a folder")
 
 
 def _paper(options: argparse.Namespace) -> None:
+    """Check the claims of the paper and write the page."""
+    _make_folder(options, ("paper.html", "paper.json"))
     try:
         from push_predictor_paper.plan import FULL, QUICK
         from push_predictor_paper.report import report_paper
@@ -106,14 +110,13 @@ def _paper(options: argparse.Namespace) -> None:
         if package != "push_predictor_paper":
             raise PushPredictorError(f"`report paper` needs {package}; pip install ./push_predictor_paper") from None
         raise PushPredictorError(PAPER_IS_MISSING) from None
-    from push_predictor.commands.progress_bar import ProgressBar
-
     if options.jobs is not None and options.jobs < 1:
         raise RequestError("--jobs", options.jobs, "an integer of at least 1")
     if options.data is not None and not options.data.is_dir():
         raise RequestError("--data", str(options.data), "a folder that exists")
     plan = QUICK if options.quick else FULL
-    with _parallel(options.cluster), ProgressBar() as bar:
+    with _parallel(options.cluster), progress("report paper") as watch:
+        bar = JobProgress(watch)
         work = Work(options.out.resolve() / "work", options.jobs or -1, bar)
         keep = None if options.recordings is None else options.recordings.resolve()
         page, content = report_paper(plan, work, options.out, options.data, keep, bar)
@@ -137,29 +140,38 @@ def _parallel(cluster: str | None) -> Iterator[None]:
 
 
 def _validation(options: argparse.Namespace) -> None:
+    """Compare models with a recording and write the page."""
     import json
 
     from push_predictor.evaluation.offline import report_recording
     from push_predictor.models.store.model_file import load_model
     from push_predictor.recordings.rig import load_rig
 
-    if (options.model is None) != (options.recording is None):
-        missing = "--model" if options.model is None else "--recording"
-        raise RequestError(missing, "missing", "both --model and --recording, or neither")
+    if bool(options.model) != (options.recording is not None):
+        missing = "--recording" if options.model else "MODEL"
+        raise RequestError(missing, "missing", "both MODEL and --recording, or neither")
+    simulated = () if options.model else ("train", "test")
+    _make_folder(options, ("report.html", "report.json", "validation.json", *simulated))
     rig = load_rig(options.rig) if options.rig else None
-    with progress("report"):
-        if options.model is None:
-            models, recording = _simulated(options.out, 60 if options.quick else 300)
+    with progress("report") as watch:
+        if not options.model:
+            models, recording = _simulated(options.out, 60 if options.quick else 300, part_of(watch, 0.0, 0.5))
+            watch = part_of(watch, 0.5, 1.0)
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
-        page, metrics = report_recording(models, recording, options.out, rig, topics_of(options))
+        page, metrics = report_recording(models, recording, options.out, rig, topics_of(options), watch)
         save_topics_of(options, [recording])
     write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):
         print(page)
 
 
-def _simulated(out: Path, pushes: int) -> tuple[list[PushModel], Path]:
+def _make_folder(options: argparse.Namespace, outputs: Sequence[str]) -> None:
+    check_folder("--out", options.out, outputs, force=options.force)
+    options.out.mkdir(parents=True, exist_ok=True)
+
+
+def _simulated(out: Path, pushes: int, watch: Watch) -> tuple[list[PushModel], Path]:
     """Models trained on one simulated recording, and a second recording to test them on."""
     import numpy as np
 
@@ -169,10 +181,14 @@ def _simulated(out: Path, pushes: int) -> tuple[list[PushModel], Path]:
     from push_predictor.simulation.pushes import random_pushes
     from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 
-    for name, seed, count in (("train", 1, pushes), ("test", 2, max(20, pushes // 5))):
+    recordings = (("train", 1, pushes), ("test", 2, max(20, pushes // 5)))
+    for name, seed, count in watched(recordings, part_of(watch, 0.0, 0.3), "simulated recording"):
         plan = random_pushes(count, SPEEDS, 0.02, np.random.default_rng([seed, 0]))
         write_recording(out / name, simulate(SimulationSpec("rect1", "abs", plan, seed=seed, name=name)))
     train = [out / "train"]
     table, rig = load_data(train), load_rig_for(train)
-    models = [train_model(table, rig, kind, name=kind, sources=["simulated train"]) for kind in KINDS]
+    models = [
+        train_model(table, rig, kind, name=kind, sources=["simulated train"])
+        for kind in watched(KINDS, part_of(watch, 0.3, 1.0), "trained model")
+    ]
     return models, out / "test"

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from push_predictor.commands.output import add_command, check_output, check_seed, progress, write_json
+from push_predictor.commands.common.options import add_command, add_out, add_seed, add_travel
+from push_predictor.commands.common.output import check_output, check_seed, write_json
+from push_predictor.commands.common.progress import progress
+from push_predictor.watch import part_of
+
+BEFORE_WRITING = 0.6  # share of the time
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,16 +23,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--shape", required=True, help="slider: rect1 (square), ellip1 (circle), ellip2, ellip3 (ellipses) or hex"
     )
-    parser.add_argument("--surface", required=True, help="table: plywood, delrin, pu or abs")
+    parser.add_argument(
+        "--surface", required=True, metavar="NAME", help="name of the surface: plywood, delrin, pu or abs"
+    )
     parser.add_argument("--pushes", required=True, type=int, metavar="N", help="number of pushes")
     parser.add_argument("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds in m/s")
-    parser.add_argument(
-        "--travel", type=float, default=0.03, metavar="D", help="length of each push in m (default %(default)s)"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="K", help="random seed: the same seed gives the same recording"
-    )
-    parser.add_argument("--out", required=True, type=Path, metavar="RECORDING", help="output: a folder, or FILE.mcap")
+    add_travel(parser)
+    add_seed(parser, "pushes, surface and sensors")
+    add_out(parser, "the recording, a folder or FILE.mcap")
     parser.set_defaults(run=run)
 
 
@@ -44,12 +46,14 @@ def run(options: argparse.Namespace) -> None:
     if options.pushes < 1:
         raise RequestError("--pushes", options.pushes, "an integer of at least 1")
     check_seed(options.seed)
-    check_output("--out", options.out, folder=options.out.suffix != ".mcap")
+    check_output("--out", options.out, force=options.force, folder=options.out.suffix != ".mcap")
     rng = np.random.default_rng([options.seed, 0])
     plan = random_pushes(options.pushes, options.speed, options.travel, rng)
     name = options.out.name.removesuffix(".mcap")
-    with progress("simulate"):
-        recording = simulate(SimulationSpec(options.shape, options.surface, plan, seed=options.seed, name=name))
+    with progress("simulate") as watch:
+        spec = SimulationSpec(options.shape, options.surface, plan, seed=options.seed, name=name)
+        recording = simulate(spec, part_of(watch, 0.0, BEFORE_WRITING))
+        watch("write", BEFORE_WRITING)
         write_recording(options.out, recording)
     seconds = float(recording.slider.stamp[-1] - recording.slider.stamp[0]) * 1e-9
     if not write_json(options, {"recording": str(options.out), "pushes": options.pushes, "seconds": seconds}):

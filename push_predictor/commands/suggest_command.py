@@ -6,21 +6,21 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.options import (
     add_command,
     add_covariate,
+    add_model,
+    add_out,
     add_rig,
+    add_seed,
     add_topics,
-    check_data,
-    check_output,
-    check_seed,
+    add_travel,
     covariates_of,
-    progress,
     save_topics_of,
     topics_of,
-    write_json,
-    write_text,
 )
+from push_predictor.commands.common.output import check_data, check_output, check_seed, write_json, write_text
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -41,16 +41,18 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "log predictive density. Without a model, --rig gives a slider that nobody has pushed yet.",
         "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
     )
-    parser.add_argument("model", type=Path, nargs="?", metavar="MODEL", help="a model file")
+    add_model(parser, "?", note="; give it or --rig")
     parser.add_argument("--count", type=int, default=20, metavar="N", help="number of pushes (default %(default)s)")
     two, of_training = ("LOW", "HIGH"), "default: those of the training pushes"
-    parser.add_argument("--speed", type=float, nargs=2, metavar=two, help=f"pusher speeds in m/s ({of_training})")
+    parser.add_argument("--speed-range", type=float, nargs=2, metavar=two, help=f"pusher speeds in m/s ({of_training})")
     parser.add_argument(
-        "--angle", type=float, nargs=2, metavar=two, help="push angles in rad (default: ±1, or those of training)"
+        "--angle-range",
+        type=float,
+        nargs=2,
+        metavar=two,
+        help="push angles in rad (default: ±1, or those of training)",
     )
-    parser.add_argument(
-        "--travel", type=float, default=0.03, metavar="D", help="length of each push in m (default %(default)s)"
-    )
+    add_travel(parser)
     parser.add_argument(
         "--exclude",
         type=float,
@@ -73,8 +75,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="recording or table of the pushes that matter (default: all possible)",
     )
     add_covariate(parser)
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="random seed of the candidates (default 0)")
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE.csv", help="output: the pushes, in order")
+    add_seed(parser, "the candidates")
+    add_out(parser, "the pushes in order, FILE.csv")
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
@@ -87,12 +89,18 @@ def run(options: argparse.Namespace) -> None:
     if (options.model is None) == (options.rig is None):
         options.call_is_wrong("give either MODEL or --rig FILE.yaml")
     check_seed(options.seed)
-    check_output("--out", options.out)
+    check_output("--out", options.out, force=options.force)
     limits, model = _limits(options), _model(options)
     matter = None if options.matter is None else _matter(options, model)
-    with progress("suggest"):
+    with progress("suggest") as watch:
         found = suggest_pushes(
-            model, options.count, limits, matter=matter, covariates=covariates_of(options), seed=options.seed
+            model,
+            options.count,
+            limits,
+            matter=matter,
+            covariates=covariates_of(options),
+            seed=options.seed,
+            watch=watch,
         )
     rows = _rows(found)
     lines = [",".join(COLUMNS), *(",".join(f"{value:.6g}" for value in row) for row in rows)]
@@ -107,7 +115,7 @@ def _limits(options: argparse.Namespace) -> Limits:
     """The robot's limits."""
     from push_predictor.design.limits import Limits
 
-    speed, angle = (None if pair is None else (pair[0], pair[1]) for pair in (options.speed, options.angle))
+    speed, angle = (None if pair is None else (pair[0], pair[1]) for pair in (options.speed_range, options.angle_range))
     excluded = tuple((begin, end) for begin, end in options.exclude)
     return Limits(speed, angle, options.travel, excluded, options.transfer_speed)
 

@@ -7,19 +7,19 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.data_checks import DataChecks
+from push_predictor.commands.common.options import (
     add_command,
+    add_model,
     add_rig,
+    add_seed,
+    add_strict,
     add_topics,
-    check_data,
-    check_output,
-    check_seed,
-    progress,
     save_topics_of,
     topics_of,
-    warn,
-    write_json,
 )
+from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -33,8 +33,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "trace",
         "Find what a model fails to explain on new pushes and trace it to an effect. Add the effect to the model and "
         "compare before and after on held-out pushes.",
-        "push_predictor trace bags/new --model abs.pushmodel --report trace.html --save-model extended.pushmodel",
+        "push_predictor trace abs.pushmodel bags/new --report trace.html --save-model extended.pushmodel",
     )
+    add_model(parser)
     parser.add_argument("data", nargs="+", type=Path, metavar="DATA", help="recordings or push tables")
     parser.add_argument(
         "--and",
@@ -46,14 +47,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="recording of the pushes that an earlier trace of the same data proposed; may be repeated. They are "
         "analysed and never held out",
     )
-    parser.add_argument("--model", required=True, type=Path, metavar="MODEL", help="the deployed model")
     parser.add_argument(
         "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
     )
     parser.add_argument(
         "--alpha", type=float, default=0.01, help="family-wise significance level (default %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="seed of the bootstrap (default %(default)s)")
+    add_seed(parser, "the bootstrap")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="write an HTML page with figures")
     parser.add_argument(
         "--save-model",
@@ -61,6 +61,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="EXTENDED",
         help="write the extended model to this file, if it improves the log density of held-out pushes",
     )
+    add_strict(parser)
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
@@ -74,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
     _check(options)
     names = None if options.covariates is None else _names(options.covariates)
     rig = load_rig(options.rig) if options.rig else None
-    with progress("trace"):
+    with progress("trace") as watch:
         found = trace_data(
             options.data,
             options.model,
@@ -84,6 +85,8 @@ def run(options: argparse.Namespace) -> None:
             seed=options.seed,
             experiment=options.experiment,
             topics=topics_of(options),
+            watch=watch,
+            inspect=DataChecks(options.strict),
         )
     save_topics_of(options, [*options.data, *options.experiment])
     saved = False
@@ -102,8 +105,8 @@ def _check(options: argparse.Namespace) -> None:
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
     check_seed(options.seed)
-    check_output("--report", options.report)
-    check_output("--save-model", options.save_model)
+    check_output("--report", options.report, force=options.force)
+    check_output("--save-model", options.save_model, force=options.force)
     if options.report is not None:
         html.check_installed("--report")
     check_data([*options.data, *options.experiment])

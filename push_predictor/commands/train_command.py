@@ -9,20 +9,27 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.data_checks import DataChecks
+from push_predictor.commands.common.options import (
     add_command,
+    add_out,
     add_rig,
+    add_seed,
+    add_strict,
     add_topics,
-    check_data,
-    check_output,
-    check_seed,
-    progress,
     save_topics_of,
     topics_of,
+)
+from push_predictor.commands.common.output import (
+    check_data,
+    check_folder,
+    check_output,
+    check_seed,
     warn,
     write_json,
     write_text,
 )
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
 
 if TYPE_CHECKING:
@@ -50,9 +57,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "data", nargs="*", type=Path, metavar="DATA", help="recordings or push tables; --kind prior needs only --rig"
     )
-    kind = parser.add_mutually_exclusive_group(required=True)
-    kind.add_argument("--kind", choices=KINDS, help="kind of model")
-    kind.add_argument("--model", dest="old_kind", choices=KINDS, help="old name of --kind")
+    parser.add_argument("--kind", required=True, choices=KINDS, help="kind of model")
     parser.add_argument(
         "--n-train",
         type=int,
@@ -71,13 +76,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero). auto, the "
         "default, takes the one that predicts held-out training pushes better",
     )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=0,
-        metavar="K",
-        help="random seed of --n-train and of the draws of a prior model (default 0)",
-    )
+    add_seed(parser, "--n-train and of the draws of a prior model")
     parser.add_argument(
         "--fit",
         action="store_true",
@@ -86,8 +85,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"
     )
-    parser.add_argument("--name", help="name of the model in the services (default: the name of the file)")
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE.pushmodel", help="output: the model file")
+    parser.add_argument("--name", help="name: of the model in the services (default: the name of the file)")
+    add_out(parser, "the model, FILE.pushmodel")
+    add_strict(parser)
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run, call_is_wrong=parser.error)
@@ -96,13 +96,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
+    from push_predictor.models.store.table_cache import keep_table
     from push_predictor.recordings.load import different_supports, load_data, load_rig_for
     from push_predictor.recordings.table import empty_table
     from push_predictor.recordings.windows.push_window import WindowOptions
 
-    if options.old_kind is not None:
-        warn("`train --model KIND` is now `train --kind KIND`. The old name still works.")
-    kind = options.kind or options.old_kind
+    kind = options.kind
     if not options.data and kind != "prior":
         options.call_is_wrong("the following arguments are required: DATA (only --kind prior needs none)")
     _check(options, kind)
@@ -111,12 +110,21 @@ def run(options: argparse.Namespace) -> None:
     windows = WindowOptions(stride=options.stride)
     with progress("read"):
         numbered, topics = bool(supports), topics_of(options)
+        checks = DataChecks(options.strict)
         table = (
-            load_data(options.data, rig, windows, numbered=numbered, topics=topics) if options.data else empty_table()
+            load_data(options.data, rig, windows, numbered=numbered, topics=topics, inspect=checks)
+            if options.data
+            else empty_table()
         )
+        if kind in LEARNT and options.strict:  # an error comes before the work, a warning with its result
+            checks.coverage(options.data, table, rig)
         save_topics_of(options, options.data)
     model, ladder = _trained(options, kind, table, rig, supports)
     save_model(model, options.out)
+    with progress("table for predict_server"):
+        keep_table(model, options.out)
+    if kind in LEARNT:
+        checks.coverage(options.data, table, rig)
     lines = _saved_ladder(model, ladder, options.out)
     result = {
         "model": str(options.out),
@@ -146,7 +154,11 @@ def _check(options: argparse.Namespace, kind: str) -> None:
     """Raise RecordingError or RequestError for options that cannot work, before any data are read."""
     check_data(options.data)
     check_seed(options.seed)
-    check_output("--out", options.out)
+    check_output("--out", options.out, force=options.force)
+    if options.fit:
+        check_folder(
+            "--out", options.out.parent, [path.name for path in _ladder_files(options.out)], force=options.force
+        )
     if options.fit and kind != "analytical":
         raise RequestError("--kind", kind, "analytical with --fit (the other kinds have no such choice)")
     if options.mean is not None and kind not in LEARNT:
@@ -176,8 +188,13 @@ def _trained(
         mean=options.mean or "auto",
     )
     name, sources = options.name or options.out.stem, [path.name for path in options.data]
-    with progress(f"train {kind}"):
-        return train_with_ladder(table, rig, kind, name=name, sources=sources, options=choices)
+    with progress(f"train {kind}") as watch:
+        return train_with_ladder(table, rig, kind, name=name, sources=sources, options=choices, watch=watch)
+
+
+def _ladder_files(out: Path) -> tuple[Path, Path]:
+    """JSON and page of the ladder, next to the model."""
+    return out.parent / f"{out.stem}.ladder.json", out.parent / f"{out.stem}.ladder.html"
 
 
 def _saved_ladder(model: PushModel, ladder: list[Rung], out: Path) -> list[str]:
@@ -189,7 +206,7 @@ def _saved_ladder(model: PushModel, ladder: list[Rung], out: Path) -> list[str]:
     from push_predictor.evaluation.ladder.scored_ladder import score_ladder
 
     scored = score_ladder(model, ladder)
-    numbers, page = (out.parent / f"{out.stem}.ladder.{suffix}" for suffix in ("json", "html"))
+    numbers, page = _ladder_files(out)
     write_text(numbers, json.dumps(ladder_json(scored), indent=1, allow_nan=False) + "\n")
     try:
         write_ladder_page(page, scored)

@@ -5,18 +5,22 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.output import (
+from push_predictor.commands.common.data_checks import DataChecks
+from push_predictor.commands.common.options import (
     add_command,
+    add_model,
     add_rig,
+    add_strict,
     add_topics,
-    check_output,
-    progress,
     save_topics_of,
     topics_of,
-    warn,
-    write_json,
 )
+from push_predictor.commands.common.output import check_output, warn, write_json
+from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
+from push_predictor.watch import part_of
+
+BEFORE_ALARM = 0.2  # share of the time for windows and predictions
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -28,7 +32,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "and the alarm with its evidence.",
         "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
     )
-    parser.add_argument("model", type=Path, metavar="MODEL", help="a model file")
+    add_model(parser)
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a rosbag2 folder or an .mcap file")
     parser.add_argument(
         "--false-alarm-rate",
@@ -40,6 +44,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
     )
+    add_strict(parser)
     add_rig(parser)
     add_topics(parser)
     parser.set_defaults(run=run)
@@ -52,22 +57,25 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.evaluation.judgement import judgement
     from push_predictor.evaluation.metrics_text import metrics_lines
     from push_predictor.evaluation.offline import recording_rig, rig_difference, training_overlap, validate_recording
-    from push_predictor.evaluation.validation import metrics_json
+    from push_predictor.evaluation.report.summary import opening_sentences
+    from push_predictor.evaluation.validation import metrics_json, trained_on
     from push_predictor.models.store.model_file import load_model
     from push_predictor.online.files.window_log import write_window_log
     from push_predictor.recordings.rig import load_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 
-    check_output("--windows", options.windows)
+    check_output("--windows", options.windows, force=options.force)
     _check_recording(options.recording)
     model = load_model(options.model)
     rig = load_rig(options.rig) if options.rig else recording_rig(options.recording)
-    with progress("validate"):
-        windows, comparison = validate_recording(model, options.recording, rig, warn, topics_of(options))
+    with progress("validate") as watch:
+        watch("windows and predictions", 0.0)
+        checks = DataChecks(options.strict)
+        windows, comparison = validate_recording(model, options.recording, rig, warn, topics_of(options), checks)
         save_topics_of(options, [options.recording])
         table = windows_to_table(windows)
-        alarm = recording_alarm(model, table, comparison, options.false_alarm_rate)
-        metrics = {**metrics_json(comparison), "alarm": alarm}
+        alarm = recording_alarm(model, table, comparison, options.false_alarm_rate, part_of(watch, BEFORE_ALARM, 1.0))
+        metrics = {**metrics_json(comparison), "n_training_pushes": len(trained_on(model, table)), "alarm": alarm}
         metrics["judgement"] = judgement(metrics)
     if difference := rig_difference(model, rig):
         warn(difference)
@@ -76,7 +84,7 @@ def run(options: argparse.Namespace) -> None:
     if options.windows:
         write_window_log(options.windows, windows, comparison)
     if not write_json(options, metrics):
-        print(metrics["judgement"])
+        print("\n".join(opening_sentences(metrics)))
         print("\n".join(metrics_lines(metrics)))
         print(alarm_sentence(alarm))
 

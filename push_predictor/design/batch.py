@@ -28,8 +28,10 @@ from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_requests
 from push_predictor.planning.persistence import Persistence, persistence_of
 from push_predictor.types import Array
+from push_predictor.watch import Watch, no_watch, part_of
 
 CANDIDATES, MATTER = 256, 128  # pushes
+BEFORE_CHOICE = 0.6  # share of the time, for 20 pushes
 MOST_PUSHES = 200  # half a minute; later pushes should wait for the outcomes of the first
 FIRST = 10  # pushes of a learnt model that are spread evenly; docs/results/suggest.md compares this start with others
 CHOSEN_OF_PRIOR = 5  # pushes; the same page has those of a prior model
@@ -62,6 +64,7 @@ def suggest_pushes(
     covariates: Mapping[str, float] | None = None,
     seed: int = 0,
     check_cancelled: Callable[[], None] | None = None,
+    watch: Watch = no_watch,
 ) -> Suggested:
     """The pushes that a model would learn most from: those that most reduce what its uncertain mean function costs.
 
@@ -69,7 +72,8 @@ def suggest_pushes(
     over the pushes that matter: `matter`, or by default all that the robot can make, evenly. Then the first ten pushes
     of a learnt model without mechanics and all but the first five of a prior model, those that it was trained on
     included, are spread evenly. covariates: of all pushes, as an extended model needs them. seed: of the candidates.
-    check_cancelled is called before each push and may raise. Raises RequestError that names the field.
+    check_cancelled is called before each push and may raise. watch: called with the share of the work done.
+    Raises RequestError that names the field.
     """
     if not 1 <= count <= MOST_PUSHES:
         raise RequestError("count", count, f"an integer from 1 to {MOST_PUSHES}")
@@ -77,11 +81,14 @@ def suggest_pushes(
         check_cancelled()
     inputs = candidate_pushes(model, limits, CANDIDATES, seed)
     relevant = _matter(model, limits, seed) if matter is None else Push(matter.inputs, matter.duration, {})
+    watch("candidates", 0.0)
     tried = courses(model, inputs, limits.travel)
     found = information_of(model, tried, relevant, covariates or {})
     before = found.variance
     evenly = _spread_evenly(model, count) if matter is None else [None] * count
-    order, variances = greedy(found, count, evenly, _per_second(model, inputs, limits), check_cancelled)
+    order, variances = greedy(
+        found, count, evenly, _per_second(model, inputs, limits), check_cancelled, part_of(watch, BEFORE_CHOICE, 1.0)
+    )
     return Suggested(inputs[order], limits.travel / inputs[order, 0], variances / before)
 
 

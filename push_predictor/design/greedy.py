@@ -8,6 +8,7 @@ import numpy as np
 
 from push_predictor.design.information import Information
 from push_predictor.types import Array, IntArray
+from push_predictor.watch import Watch, no_watch, watched
 
 
 def greedy(
@@ -16,16 +17,17 @@ def greedy(
     given: Sequence[int | None] = (),
     factor: Callable[[Sequence[int]], Array] | None = None,
     check_cancelled: Callable[[], None] | None = None,
+    watch: Watch = no_watch,
 ) -> tuple[IntArray, Array]:
     """Candidates (count,) in the order chosen, and the mean variance (count,) of what matters after each.
 
     given: candidates that are taken in their place, None where one is chosen; those after its end are chosen. factor:
     by how much the gain of each candidate (c,) counts after those chosen so far, 1 without it. check_cancelled is
-    called before each choice and may raise.
+    called before each choice and may raise, watch with the share of the choices made.
     """
     order: list[int] = []
     variances = np.empty(count)
-    for k in range(count):
+    for k in watched(range(count), watch, "push"):
         if check_cancelled is not None:
             check_cancelled()
         fixed = given[k] if k < len(given) else None

@@ -1,8 +1,12 @@
-"""Whether a model fits a recording, in one sentence: what the alarm says, and how many outcomes the intervals cover."""
+"""Whether a model fits a recording: a sentence, a label of few words, and what to do.
+
+The evidence is the alarm, and the share of the outcomes that the predicted intervals contain.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,26 +15,62 @@ from push_predictor.recordings.table import OUTPUTS
 
 LEVEL = 0.95  # of the intervals that are judged
 CLEARLY = 3.0  # standard errors: a share of outcomes by which intervals count as too narrow or too wide
+FEWEST = 10  # pushes; with fewer a good score proves little, while a bad one may still be clear
+TRACE = "Find the cause with `push_predictor trace`"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """label: the judgement in few words; sentence: with its evidence; action: what to do."""
+
+    label: str
+    sentence: str
+    action: str
 
 
 def judgement(metrics: Mapping[str, Any]) -> str:
     """The sentence for the JSON of `validate`, which has the alarm."""
+    return judged(metrics).sentence
+
+
+def judged(metrics: Mapping[str, Any]) -> Judgement:
+    """Judge a model by the JSON of `validate`, which has the alarm, of at least one push.
+
+    n_training_pushes, if it is there: how many of the pushes were used for training.
+    """
     alarm, share, pushes = metrics["alarm"], covered(metrics), int(metrics["n_pushes"])
-    covers = f"95 % intervals cover {100.0 * share:.0f} % of the outcomes of {pushes} pushes"
+    outcomes = f"the outcomes of {count_pushes(pushes)}"
+    covers = f"95 % intervals cover {100.0 * share:.0f} % of {outcomes}"
+    evidence = f"{covers}; {'no alarm' if 'off' not in alarm else 'no alarm was computed'}"
     if alarm["fired"]:
-        return f"The model no longer fits: the alarm fired; {covers}."
+        action = f"{TRACE}, and do not rely on the predictions until then."
+        return Judgement("no longer fits", f"The model no longer fits: the alarm fired; {covers}.", action)
     # Windows of one push resemble each other: the pushes count, not the windows.
     error = CLEARLY * np.sqrt(LEVEL * (1.0 - LEVEL) / pushes)
-    also = "no alarm" if "off" not in alarm else "no alarm was computed"
     if share < LEVEL - error:
-        return f"The model is too sure: {covers}; {also}."
+        action = f"Do not rely on its intervals. {TRACE}, or train the model on such pushes."
+        return Judgement("too sure", f"The model is too sure: {evidence}.", action)
     if metrics["nmse"]["total"] is not None and metrics["nmse"]["total"] >= len(OUTPUTS):
-        return f"The model predicts no better than the mean of its training outcomes; {covers}; {also}."
+        sentence = f"The model predicts no better than the training mean; {evidence}."
+        action = "Check slider, frames and units with `push_predictor check`, or train the model on such pushes."
+        return Judgement("no better than the mean", sentence, action)
+    if pushes < FEWEST:
+        action = f"Record at least {FEWEST} pushes, then validate again."
+        return Judgement("too few pushes", f"Too few pushes to judge the model: {evidence}.", action)
+    if 2 * int(metrics.get("n_training_pushes", 0)) >= pushes:
+        action = "Validate it with a recording that was not used for training."
+        return Judgement("fits its training", f"The model fits its own training pushes: {evidence}.", action)
     if "off" in alarm:
-        return f"Nothing speaks against the model: {covers}; {also}."
-    return f"The model fits: {covers}; {also}."
+        action = "Use the model, but watch its errors: without the alarm a slow change stays unseen."
+        return Judgement("no objection", f"Nothing speaks against the model: {evidence}.", action)
+    return Judgement("fits", f"The model fits: {evidence}.", "Use the model for pushes like these.")
 
 
 def covered(metrics: Mapping[str, Any]) -> float:
     """Share of the outcomes inside their intervals of LEVEL, the mean over the outputs."""
     return float(np.mean([metrics["coverage"][str(LEVEL)][name] for name in OUTPUTS]))
+
+
+def count_pushes(count: int) -> str:
+    """A number of pushes in words."""
+    return "1 push" if count == 1 else f"{count} pushes"

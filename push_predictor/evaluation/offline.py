@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError, RigError
+from push_predictor.evaluation.alarm.scores import recording_alarm
 from push_predictor.evaluation.validation import Comparison, compare, comparison_of, metrics_json, trained_on
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import check_table
 from push_predictor.models.supports import on_supports
 from push_predictor.models.tabulated.tabulated_model import as_served
 from push_predictor.recordings.bag.reader import open_bag
+from push_predictor.recordings.load import Inspect, no_inspection
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig
 from push_predictor.recordings.table import PushTable
@@ -21,6 +23,7 @@ from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import WindowFinder
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
 from push_predictor.recordings.windows.stream_faults import describe_recording_faults
+from push_predictor.watch import Watch, no_watch, part_of, watched
 
 
 def recorded_windows(
@@ -29,12 +32,14 @@ def recorded_windows(
     rig: Rig | None = None,
     report: Callable[[str], None] | None = None,
     topics: Topics = Topics(),
+    inspect: Inspect = no_inspection,
 ) -> tuple[list[PushWindow], PushTable]:
     """Find the windows of a recording, with the model's duration. Raises RecordingError if there is none.
 
-    report receives a sentence for each fault of the streams.
+    report receives a sentence for each fault of the streams. inspect: called with path, recording and rig.
     """
     recording = read_recording(path, rig=rig, topics=topics)
+    inspect(path, recording, require_rig(recording))
     finder = WindowFinder(require_rig(recording), window_options(model))
     windows = finder.find(recording)
     if report is not None:
@@ -63,6 +68,8 @@ def rig_difference(model: PushModel, rig: Rig) -> str:
     """A sentence on how a rig differs from that of the model's training, empty if it does not."""
     trained = model.rig
     if not _same(trained.outline.vertices, rig.outline.vertices) or trained.outline.semi_axes != rig.outline.semi_axes:
+        if trained.shape == rig.shape:
+            return f"model {model.name!r} was trained with another outline of {rig.shape!r} (pose or size)"
         return f"model {model.name!r} was trained with the outline of {trained.shape!r}, the rig is {rig.shape!r}"
     if not _same(trained.pusher_radius, rig.pusher_radius):
         radii = f"{trained.pusher_radius:g} m, the rig's is {rig.pusher_radius:g} m"
@@ -82,9 +89,10 @@ def validate_recording(
     rig: Rig | None = None,
     report: Callable[[str], None] | None = None,
     topics: Topics = Topics(),
+    inspect: Inspect = no_inspection,
 ) -> tuple[list[PushWindow], Comparison]:
-    """Predict every window of a recording, as predict_server does; report as for `recorded_windows`."""
-    windows, table = recorded_windows(model, path, rig, report, topics)
+    """Predict every window of a recording, as predict_server does; report and inspect as for `recorded_windows`."""
+    windows, table = recorded_windows(model, path, rig, report, topics, inspect)
     model = on_supports(model, rig or recording_rig(path), {})
     check_table(model, table)
     prediction = as_served(model).predict_rows(table.inputs, table.duration, table.covariates)
@@ -92,15 +100,26 @@ def validate_recording(
 
 
 def report_recording(
-    models: Sequence[PushModel], path: Path, out: Path, rig: Rig | None = None, topics: Topics = Topics()
+    models: Sequence[PushModel],
+    path: Path,
+    out: Path,
+    rig: Rig | None = None,
+    topics: Topics = Topics(),
+    watch: Watch = no_watch,
 ) -> tuple[Path, list[dict[str, object]]]:
-    """Write the HTML report of models on a recording, the main model first; return page and metrics."""
+    """Write the HTML report of models on a recording, the main model first; return page and metrics.
+
+    watch: called with the share of the work done.
+    """
+    watch("windows", 0.0)
     windows, table = recorded_windows(models[0], path, rig, topics=topics)
     models = [on_supports(model, rig or recording_rig(path), {}) for model in models]
     for model in models:
         check_table(model, table)
-    comparisons = [compare(model, table) for model in models]
-    page = report_windows(models, windows, comparisons, out, path.name)
+    comparisons = [compare(model, table) for model in watched(models, part_of(watch, 0.1, 0.5), "model")]
+    alarm = recording_alarm(models[0], table, comparisons[0])
+    watch("figures", 0.5)
+    page = report_windows(models, windows, comparisons, out, path.name, alarm=alarm)
     return page, [metrics_json(comparison) for comparison in comparisons]
 
 
@@ -117,12 +136,13 @@ def report_windows(
     out: Path,
     name: str,
     more: Mapping[str, str] | None = None,
+    alarm: Mapping[str, object] | None = None,
 ) -> Path:
-    """Write the report for windows with given predictions; more: further facts for the page."""
+    """Write the report for windows with given predictions; more: further facts for the page; alarm: of the first."""
     from push_predictor.evaluation.report.page import (
         write_validation_report,  # imports matplotlib
     )
 
     table = windows_to_table(windows)
     facts = {"recording": name, **(more or {})}
-    return write_validation_report(out, f"Validation on {name}", table, windows, models, comparisons, facts, ())
+    return write_validation_report(out, f"Validation on {name}", table, windows, models, comparisons, facts, (), alarm)

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from push_predictor.geometry.outline import NEWTON_STEPS, PARAMETER_TOLERANCE, Outline
+from push_predictor.geometry.outline import CENTRED, NEWTON_STEPS, PARAMETER_TOLERANCE, Outline
 
 # From x, y in m to: x, y of the nearest point, x, y of its outward normal, signed distance in m (negative inside).
 Nearest: TypeAlias = Callable[[float, float], tuple[float, float, float, float, float]]
@@ -22,7 +22,22 @@ ContactAt: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 
 def nearest_on(outline: Outline) -> Nearest:
     """The nearest-point function of an outline, in the body frame."""
-    return _on_polygon(outline) if outline.semi_axes is None else _on_ellipse(*outline.semi_axes)
+    if outline.semi_axes is None:
+        return _on_polygon(outline)
+    centred = _on_ellipse(*outline.semi_axes)
+    return centred if outline.pose == CENTRED else _placed(centred, *outline.pose)
+
+
+def _placed(centred: Nearest, x0: float, y0: float, turn: float) -> Nearest:
+    """The function for an ellipse whose axes have another pose."""
+    c, s = cos(turn), sin(turn)
+
+    def nearest(x: float, y: float) -> tuple[float, float, float, float, float]:
+        x, y = x - x0, y - y0
+        px, py, nx, ny, distance = centred(c * x + s * y, c * y - s * x)
+        return x0 + c * px - s * py, y0 + s * px + c * py, c * nx - s * ny, s * nx + c * ny, distance
+
+    return nearest
 
 
 def _on_polygon(outline: Outline) -> Nearest:
@@ -104,6 +119,8 @@ def contact_on(outline: Outline) -> ContactAt:
 def _contact_on_ellipse(outline: Outline, a: float, b: float) -> ContactAt:
     lengths, parameters = outline.curve_table
     arc, table, perimeter = lengths.tolist(), parameters.tolist(), outline.perimeter
+    (x0, y0, turn), centred = outline.pose, outline.pose == CENTRED
+    cos_turn, sin_turn = cos(turn), sin(turn)
 
     def at(contact: float) -> tuple[float, float, float, float]:
         place = min(max(contact * perimeter, 0.0), arc[-1])
@@ -111,6 +128,14 @@ def _contact_on_ellipse(outline: Outline, a: float, b: float) -> ContactAt:
         t = table[k] + (place - arc[k]) * (table[k + 1] - table[k]) / (arc[k + 1] - arc[k])
         c, s = cos(t), sin(t)
         size = hypot(b * c, a * s)
-        return a * c, b * s, -b * c / size, -a * s / size
+        x, y, nx, ny = a * c, b * s, -b * c / size, -a * s / size
+        if centred:
+            return x, y, nx, ny
+        return (
+            x0 + cos_turn * x - sin_turn * y,
+            y0 + sin_turn * x + cos_turn * y,
+            cos_turn * nx - sin_turn * ny,
+            sin_turn * nx + cos_turn * ny,
+        )
 
     return at

@@ -13,12 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from push_predictor.errors import RigError
+from push_predictor.geometry.frames import rotate, to_body, to_world
 from push_predictor.types import Array, BoolArray, IntArray
 
 SMOOTH_TABLE = 8192  # chords that approximate the arc length of an ellipse: relative error 1e-8
 NEWTON_STEPS = 60  # enough for bisection alone
 PARAMETER_TOLERANCE = 1e-14  # rad
 SAME_LENGTH = 1e-6  # m; tolerance of vertices and their images under a symmetry
+CENTRED = (0.0, 0.0, 0.0)  # pose of axes that are those of the body frame
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,14 @@ class Projection:
 class Outline:
     """A closed outline in the body frame.
 
-    vertices: (V, 2) in m, counter-clockwise. semi_axes: (a, b) in m along body x and y for a circle or an ellipse,
-    else None. Raises RigError if the vertices do not make a counter-clockwise polygon.
+    vertices: (V, 2) in m, counter-clockwise. semi_axes: (a, b) in m for a circle or an ellipse, else None; pose: x, y
+    (m) and angle (rad) of these axes in the body frame. Raises RigError if the vertices do not make a counter-clockwise
+    polygon.
     """
 
     vertices: Array
     semi_axes: tuple[float, float] | None = None
+    pose: tuple[float, float, float] = CENTRED
 
     def __post_init__(self) -> None:
         vertices = np.array(self.vertices, dtype=np.float64)
@@ -58,9 +62,9 @@ class Outline:
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
 
-    def __reduce__(self) -> tuple[type[Outline], tuple[Array, tuple[float, float] | None]]:
+    def __reduce__(self) -> tuple[type[Outline], tuple[object, ...]]:
         """Pickle the fields alone: copies and keys of caches do not depend on what was computed before."""
-        return Outline, (self.vertices, self.semi_axes)
+        return Outline, (self.vertices, self.semi_axes, *([] if self.pose == CENTRED else [self.pose]))
 
     @cached_property
     def perimeter(self) -> float:
@@ -77,6 +81,8 @@ class Outline:
     @cached_property
     def centroid(self) -> Array:
         """Area centroid (2,), m: zero in the body frame of docs/reference/push.md."""
+        if self.semi_axes is not None:
+            return np.array(self.pose[:2])
         x, y = self.vertices.T
         xn, yn = np.roll(x, -1), np.roll(y, -1)
         cross = x * yn - xn * y
@@ -98,6 +104,8 @@ class Outline:
     def rotational_symmetry(self) -> int:
         """Order of the rotational symmetry about the origin: square 4, ellipse 2, 1 for none, 0 for a circle."""
         if self.semi_axes is not None:
+            if np.hypot(*self.pose[:2]) > SAME_LENGTH:
+                return 1
             return 0 if np.isclose(*self.semi_axes, rtol=0.0, atol=SAME_LENGTH) else 2
         count = len(self.vertices)
         orders = (k for k in range(count, 1, -1) if count % k == 0 and self._unchanged_by_turn(k))
@@ -204,7 +212,8 @@ class Outline:
     @cached_property
     def _table(self) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        first = np.arctan2(self.vertices[0, 1] / b, self.vertices[0, 0] / a)
+        x, y = self._in_axes(self.vertices[:1])[0]
+        first = np.arctan2(y / b, x / a)
         return np.asarray(first + np.linspace(0.0, 2.0 * np.pi, SMOOTH_TABLE + 1))
 
     @property
@@ -214,18 +223,24 @@ class Outline:
 
     def _curve(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
-        return np.stack([a * np.cos(parameter), b * np.sin(parameter)], axis=-1)
+        points = np.stack([a * np.cos(parameter), b * np.sin(parameter)], axis=-1)
+        return points if self.pose == CENTRED else to_world(points, np.array(self.pose))
 
     def _curve_normal(self, parameter: Array) -> Array:
         a, b = self.semi_axes or (1.0, 1.0)
         normal = np.stack([b * np.cos(parameter), a * np.sin(parameter)], axis=-1)
-        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        return np.asarray(normal if self.pose == CENTRED else rotate(normal, np.array(self.pose[2])))
+
+    def _in_axes(self, points: Array) -> Array:
+        """Points (n, 2) of the body frame along the semi-axes."""
+        return points if self.pose == CENTRED else to_body(points, np.array(self.pose))
 
     def _curve_parameter(self, contact: Array) -> Array:
         return np.asarray(np.interp(np.asarray(contact) * self.perimeter, self._arc, self._table))
 
     def _project_smooth(self, points: Array) -> Projection:
-        parameter = self._nearest_parameter(points)
+        parameter = self._nearest_parameter(self._in_axes(points))
         nearest, normal = self._curve(parameter), self._curve_normal(parameter)
         distance = np.einsum("nj,nj->n", points - nearest, normal)
         turned = self._table[0] + (parameter - self._table[0]) % (2.0 * np.pi)

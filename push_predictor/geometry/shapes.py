@@ -1,11 +1,13 @@
-"""Outlines of the MIT push data set by name (dimensions: docs/reference/push.md)."""
+"""Outlines of common shapes, and of the MIT push data set by name (dimensions: docs/reference/push.md)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.frames import rotate
+from push_predictor.geometry.outline import SAME_LENGTH, Outline
+from push_predictor.types import Array
 
 SMOOTH_VERTICES = 128
 ELLIPSES = {"ellip1": (0.0525, 0.0525), "ellip2": (0.065445, 0.0525), "ellip3": (0.0785, 0.0525)}  # semi-axes, m
@@ -28,11 +30,55 @@ def shape_outline(name: str) -> Outline:
 
 def square(side: float) -> Outline:
     """A square whose first edge faces -x, so that its inward normal is the body's +x."""
-    half = side / 2.0
-    return Outline(np.array([[-half, half], [-half, -half], [half, -half], [half, half]]))
+    return rectangle(side, side)
+
+
+def rectangle(width: float, height: float) -> Outline:
+    """A rectangle, width along x and height along y, m. Its first edge faces -x, so that its inward normal is +x."""
+    x, y = width / 2.0, height / 2.0
+    return Outline(np.array([[-x, y], [-x, -y], [x, -y], [x, y]]))
 
 
 def ellipse(a: float, b: float) -> Outline:
     """An ellipse with semi-axes a along x and b along y, m; its first vertex lies on +x."""
     angles = np.arange(SMOOTH_VERTICES) * 2.0 * np.pi / SMOOTH_VERTICES
     return Outline(np.stack([a * np.cos(angles), b * np.sin(angles)], axis=1), (a, b))
+
+
+def transformed(
+    outline: Outline, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0
+) -> Outline:
+    """The outline scaled and turned (rad, counter-clockwise) about its centroid, then shifted (m)."""
+    vertices = transformed_points(outline, outline.vertices, yaw, shift, size)
+    if outline.semi_axes is None:
+        return Outline(vertices)
+    a, b = outline.semi_axes
+    x, y, turn = outline.pose
+    return Outline(vertices, (size * a, size * b), (x + shift[0], y + shift[1], turn + yaw))
+
+
+def transformed_points(outline: Outline, points: Array, yaw: float, shift: tuple[float, float], size: float) -> Array:
+    """Points (n, 2) of the slider that `transformed` moves with the outline."""
+    centre = outline.centroid
+    return np.asarray(centre + rotate(size * (points - centre), np.array(yaw)) + shift)
+
+
+def mirror_image(outline: Outline) -> Outline:
+    """The outline with its y axis reversed. The first vertex stays the first."""
+    vertices = outline.vertices * [1.0, -1.0]
+    x, y, yaw = outline.pose
+    return Outline(np.concatenate([vertices[:1], vertices[:0:-1]]), outline.semi_axes, (x, -y, -yaw))
+
+
+def has_mirror_symmetry(outline: Outline) -> bool:
+    """Whether a turn and a shift map the mirror image onto the outline."""
+    if outline.semi_axes is not None:
+        return True
+    apart, image = _distances(outline.vertices), _distances(mirror_image(outline).vertices)
+    turns = (np.roll(image, (k, k), axis=(0, 1)) for k in range(len(image)))
+    return any(np.allclose(apart, turned, rtol=0.0, atol=SAME_LENGTH) for turned in turns)
+
+
+def _distances(vertices: Array) -> Array:
+    """Distances (V, V) between vertices, m."""
+    return np.asarray(np.linalg.norm(vertices[:, None] - vertices, axis=2))

@@ -14,7 +14,7 @@ from push_predictor.models.effects.covariate_range import CovariateRange, range_
 from push_predictor.models.features import push_features
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
-from push_predictor.models.predictors import Moments, Predictor
+from push_predictor.models.predictors import InputLimits, Moments, Predictor
 from push_predictor.models.pushes import Pushes
 from push_predictor.models.request import check_pushes
 from push_predictor.recordings.rig import Rig
@@ -125,8 +125,8 @@ class PushModel:
         The domain of a prior model are all pushes for which its priors are meant. For covariates see
         `covariates_seen`.
         """
-        if (own := self.predictor.in_own_domain(inputs)) is not None:
-            return own
+        if (own := self.predictor.own_limits) is not None:
+            return own.contain(inputs)
         low, high = self._feature_range
         features = push_features(self.rig.outline, inputs)
         margin = DOMAIN_MARGIN + 1e-6 * np.abs(high)
@@ -143,6 +143,14 @@ class PushModel:
             for name, known in self.covariate_ranges.items():
                 seen &= known.contains(covariates[name])
         return seen
+
+    @cached_property
+    def input_limits(self) -> InputLimits:
+        """Velocities and angles of the domain; inside them a contact may be outside, see `in_domain`."""
+        if (own := self.predictor.own_limits) is not None:
+            return own
+        low, high = self.training.inputs.min(axis=0).tolist(), self.training.inputs.max(axis=0).tolist()
+        return InputLimits((low[0], high[0]), (low[2], high[2]))
 
     @cached_property
     def covariate_ranges(self) -> dict[str, CovariateRange]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from push_predictor.errors import RequestError
+from push_predictor.errors import CovariateError, RequestError
 from push_predictor.models.pushes import Pushes
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, BoolArray
@@ -54,6 +54,11 @@ class PushRequest:
         """The arguments of PushModel.predict_rows: inputs (1, 3), duration (1,), covariates (1,) by name."""
         columns = {name: np.array([value]) for name, value in self.covariates.items()}
         return np.array([[self.velocity, self.contact, self.angle]]), np.array([self.duration]), columns
+
+
+def own_window(model: PushModel, duration: float) -> float:
+    """The duration (s) that a request means: 0 stands for the model's own window."""
+    return model.usual_duration if duration == 0.0 else duration
 
 
 def check_request(model: PushModel, push: PushRequest) -> None:
@@ -103,10 +108,11 @@ def _check(
     _require("contact", contact, (contact >= 0.0) & (contact < 1.0), "a fraction of the perimeter in [0, 1)")
     _require("angle", angle, (angle > -pi / 2.0) & (angle < pi / 2.0), "an angle in (-pi/2, pi/2), in rad")
     for name, values in covariates.items():
-        _require(f"covariate {name}", values, (values > -inf) & (values < inf), _finite_number(name))
+        finite = (values > -inf) & (values < inf)
+        _require(f"covariate {name}", values, finite, _finite_number(name), error=CovariateError)
     for name in model.needs:
         if name not in covariates:
-            raise RequestError(f"covariate {name}", "missing", f"{_finite_number(name)}: {model.name} needs it")
+            raise CovariateError(f"covariate {name}", "missing", f"{_finite_number(name)}: {model.name} needs it")
     _require("duration", duration, (duration > 0.0) & (duration < inf), "a finite number above 0, in s")
     low, high = model.duration_range
     near = "{:.3g} to {:.3g} s, close to the training durations of {}"
@@ -117,19 +123,26 @@ def _check(
         _require("velocity", velocity, within, most, FARTHEST / duration, duration, FARTHEST)
 
 
-def _require(name: str, values: Numbers, accepted: bool | BoolArray, meaning: str, *details: object) -> None:
-    """Raise RequestError for the first value that is not accepted; for a column the name gets its index.
+def _require(
+    name: str,
+    values: Numbers,
+    accepted: bool | BoolArray,
+    meaning: str,
+    *details: object,
+    error: type[RequestError] = RequestError,
+) -> None:
+    """Raise `error` for the first value that is not accepted; for a column the name gets its index.
 
     meaning: a format string that states what is accepted. details: its numbers, each one for all pushes or a column.
     The string is filled only for an error.
     """
     if not isinstance(accepted, np.ndarray):
         if not accepted:
-            raise RequestError(name, float(values), meaning.format(*details))
+            raise error(name, float(values), meaning.format(*details))
     elif not accepted.all():
         index = int(np.argmin(accepted))
         filled = meaning.format(*(_at(detail, index) for detail in details))
-        raise RequestError(f"{name}[{index}]", _at(values, index), filled)
+        raise error(f"{name}[{index}]", _at(values, index), filled)
 
 
 def _at(values: object, index: int) -> object:

@@ -28,10 +28,10 @@ from push_predictor.models.push_model import KINDS, Provenance, PushModel
 from push_predictor.models.train_learnt import MEANS, LearntOptions, MeanChoice, train_about, train_learnt
 from push_predictor.models.train_mechanics import predictor_about, train_mechanics
 from push_predictor.models.train_prior import prior_predictor, sharpened
-from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array, IntArray
+from push_predictor.watch import Watch, no_watch
 
 DEFAULT_ROWS = 1000
 MOST_FITTED_ROWS = 4000  # of fitted mechanics, unless n_train is given

@@ -26,10 +26,10 @@ from push_predictor.models.predictors import GaussianProcessPredictor, Mechanics
 from push_predictor.models.predictors.correlation_fit import MOST_BLOCKS, fit_correlation
 from push_predictor.models.predictors.tails_fit import fit_tails
 from push_predictor.models.train_mechanics import fit_rows
-from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
+from push_predictor.watch import Watch, no_watch, part_of
 
 MeanChoice = Literal["mechanics", "zero", "auto"]
 MEANS: tuple[MeanChoice, ...] = ("mechanics", "zero", "auto")
@@ -74,14 +74,14 @@ def train_learnt(
             return _completed(better, rows, options, watch)
         about = None if better.predictor.mean is None else about
     begin = 0.4 if options.mean == "auto" else 0.1
-    trained = _trained(rows, rig, options, about, _part_of(watch, begin, 0.9))
+    trained = _trained(rows, rig, options, about, part_of(watch, begin, 0.9))
     return _completed(trained, rows, options, watch)
 
 
 def _better(about: FittedMean | None, rows: PushTable, rig: Rig, options: LearntOptions, watch: Watch) -> _Trained:
     """The predictor with or without the mean, trained on the rows that it was fitted to: by their held-out pushes."""
-    plain = _trained(rows, rig, options, None, _part_of(watch, 0.1, 0.25), scored=True)
-    informed = _trained(rows, rig, options, about, _part_of(watch, 0.25, 0.4), scored=True)
+    plain = _trained(rows, rig, options, None, part_of(watch, 0.1, 0.25), scored=True)
+    informed = _trained(rows, rig, options, about, part_of(watch, 0.25, 0.4), scored=True)
     return max(plain, informed, key=lambda trained: trained.score)
 
 
@@ -105,11 +105,6 @@ def _completed(trained: _Trained, rows: PushTable, options: LearntOptions, watch
     counts = [regression.parameters.count for regression in predictor.regressions]
     tails = fit_tails(trained.observed - residual.mean, residual.covariance, rows.push_id, counts)
     return replace(predictor, tails=tails)
-
-
-def _part_of(watch: Watch, begin: float, end: float) -> Watch:
-    """A watch for a part of the work, between these shares of the whole."""
-    return lambda stage, done: watch(stage, begin + (end - begin) * done)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.ladder import Rung, climb
 from push_predictor.models.predictors import MechanicsPredictor
-from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.table import PushTable
+from push_predictor.watch import Watch, no_watch
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.service import Service
@@ -33,11 +33,19 @@ class PolledGroup(CallbackGroup):
         """See CallbackGroup."""
 
 
-def take_all(subscription: Subscription) -> Iterator[tuple[Any, int, int]]:
-    """The messages that the middleware holds for a subscription, at a tenth of the cost of an executor's turn.
+class Taken(NamedTuple):
+    """A message, its number (counted by the publisher), and when it was sent and received (ns)."""
 
-    Each comes with its number, counted by the publisher, and the time at which it was sent (ns, publisher's clock).
-    """
+    message: Any
+    number: int
+    sent: int
+    received: int
+
+
+def take_all(subscription: Subscription) -> Iterator[Taken]:
+    """The messages that the middleware holds for a subscription, at a tenth of the cost of an executor's turn."""
     with subscription.handle:
         while (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)) is not None:
-            yield taken[0], taken[1]["publication_sequence_number"], taken[1]["source_timestamp"]
+            message, info = taken
+            number, sent = info["publication_sequence_number"], info["source_timestamp"]
+            yield Taken(message, number, sent, info["received_timestamp"])

@@ -20,7 +20,8 @@ from rclpy.service import Service
 
 from msg_adapters.diagnostics import diagnostic_array
 from msg_adapters.predictions import refuse
-from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.errors import InactiveError, PushPredictorError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_registry import SHIPPED, ModelRegistry
 from push_predictor.nodes.parameters import declare, values_of
@@ -50,10 +51,6 @@ from push_predictor_interfaces.srv import (
 SERVICE_QOS = QoSProfile(depth=1000)  # the default, 10, loses requests of a client with more in flight
 SIMULATED = "the default model was trained on a simulated square on ABS: set the parameter 'models' to one of your rig"
 Handler: TypeAlias = Callable[[ModelRegistry, Any, Any], None]  # fills the response, or raises
-
-
-class InactiveError(PushPredictorError):
-    """The node received a request that it answers only while it is active."""
 
 
 class PredictServer(LifecycleNode):
@@ -210,8 +207,7 @@ class PredictServer(LifecycleNode):
         return self._prediction(partial(handle_suggest_pushes, self._check_cancelled), request, response)
 
     def _on_list(self, request: ListModels.Request, response: ListModels.Response) -> ListModels.Response:
-        handle_list_models(self._registry, response)
-        return response
+        return self._guarded(handle_list_models, request, response)
 
     def _on_load(self, request: LoadModel.Request, response: LoadModel.Response) -> LoadModel.Response:
         was_empty = not self._registry.names
@@ -254,12 +250,12 @@ class PredictServer(LifecycleNode):
             handler(self._registry, request, response)
             return response
         except PushPredictorError as error:
-            reason = str(error)
+            reason, code = str(error), error_code(error)
             self.get_logger().warning(f"refused: {reason}", throttle_duration_sec=1.0)
         except Exception as error:
-            reason = f"internal error, see the log of the node: {error!r}"
+            reason, code = f"internal error, see the log of the node: {error!r}", ErrorCode.INTERNAL_ERROR
             self.get_logger().error(traceback.format_exc())
-        return refuse(response, reason)
+        return refuse(response, reason, code)
 
     # --- parameters and diagnostics -------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock as RosClock
@@ -26,6 +27,7 @@ from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
 from push_predictor.nodes.replay.topics import ReplayTopics
 from push_predictor.nodes.runtime import Stop, run
+from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
@@ -37,6 +39,7 @@ from push_predictor.replay.restamper import Restamper
 from push_predictor.replay.source import BagSource
 from push_predictor.resources import share_path
 
+LARGEST_CHECKED = 300_000_000  # bytes: a check reads the whole recording into memory
 _PUSH_TOPICS = ("slider/pose", "pusher/pose", "pusher/wrench")
 
 
@@ -57,8 +60,10 @@ class PushReplay(Node):
         self._rig = self.create_publisher(String, "rig", LATCHED)
         self._rig_warning = self._publish_rig(bag)
         self._acknowledged: bool | None = None
+        self._checks = CheckProcess(options.strict)
         self._player = self._make_player(options)
         self._controls = ReplayControls(self, self._player, restamps=options.restamp)
+        self._check(bag)
         self._start_reporting()
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
@@ -68,6 +73,7 @@ class PushReplay(Node):
         """Stop the playback and publish the last report."""
         self._ending.set()
         self._player.close()
+        self._checks.stop()
         for thread in self._threads:
             thread.join()
         report = self._report()
@@ -96,6 +102,25 @@ class PushReplay(Node):
                 return str(error)
         self._rig.publish(String(data=json.dumps(record)))
         return ""
+
+    def _check(self, bag: Bag) -> None:
+        """Begin the check of the recording, in a process of its own; one with other topics is not checked."""
+        names = {topic.strip("/") for topic in bag.topics}
+        if self._rig_warning or not {"slider/pose", "pusher/pose"} <= names:
+            self._checks.result = "not checked: no rig, slider/pose or pusher/pose"
+        elif (size := _size(bag.path)) > LARGEST_CHECKED:
+            self._checks.result = f"not checked: {size / 1e6:.0f} MB. Run `push_predictor check`."
+        else:
+            rig = None if self._options.rig is None else load_rig(self._options.rig)
+            self._checks.start(self._options.recording, rig)
+
+    def _report_regularly(self) -> None:
+        before = self._checks.findings
+        self._checks.work()
+        if self._checks.findings is not before:
+            for problem in self._checks.problems:
+                self.get_logger().warning(problem)
+        self._publish_report(self._report())
 
     def _make_player(self, options: ReplayOptions) -> ReplayPlayer:
         wall = SystemClock()
@@ -174,7 +199,7 @@ class PushReplay(Node):
     def _start_reporting(self) -> None:
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = RosClock(clock_type=ClockType.STEADY_TIME)  # wall time, even with use_sim_time
-        self.create_timer(1.0, lambda: self._publish_report(self._report()), clock=steady)
+        self.create_timer(1.0, self._report_regularly, clock=steady)
 
     def _report(self) -> ReplayReport:
         lateness = self._player.lateness
@@ -193,11 +218,13 @@ class PushReplay(Node):
             unstamped=self._topics.unstamped,
             damage=self._source.damage,
             rig=self._rig_warning,
+            problems=self._checks.problems,
+            check=self._checks.result,
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
         name = f"{self.get_fully_qualified_name().lstrip('/')}: replay"
-        level = Level.WARN if report.warnings else Level.OK
+        level = Level.ERROR if self._checks.failed else Level.WARN if report.warnings else Level.OK
         message = "; ".join(report.warnings) or report.state
         status = diagnostic_status(name, level, message, report.values, self._options.recording.name)
         self._diagnostics.publish(diagnostic_array(time.time_ns(), status))
@@ -208,6 +235,11 @@ def main() -> int:
     # By default Fast DDS asks subscribers only every 3 s what they lack; a fast replay overwrites it in that time.
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(share_path("config", "fastdds_replay.xml")))
     return run("push_replay", PushReplay)
+
+
+def _size(path: Path) -> int:
+    """Bytes of a recording."""
+    return sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]))
 
 
 def _text(value: object) -> str:

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from push_predictor.errors import PushPredictorError
-from push_predictor.evaluation.alarm.evidence import checked_rate
+from push_predictor.evaluation.alarm.evidence import AlarmState, checked_rate
 from push_predictor.nodes.parameters import declare, values_of
 from push_predictor.nodes.qos import LATCHED
 from push_predictor.nodes.runtime import Stop, run
@@ -28,6 +28,8 @@ from push_predictor.nodes.validator.status import StatusPublisher
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import Session, State
+from push_predictor.recordings.select import STREAMS
+from push_predictor.recordings.topics import Topics
 
 PERIOD = 0.02  # s between two looks at what has arrived
 
@@ -43,17 +45,20 @@ class PushValidator(Node):
         declare(self, PARAMETERS)
         values = values_of(self, PARAMETERS)
         self._stop, self._closing, self._closed = stop, threading.Event(), threading.Event()
-        self._results = ResultPublishers(self, values["frame_id"])
-        self._alarm = AlarmProcess(checked_rate(values["false_alarm_rate"]), self._results.alarm)
+        self._results = ResultPublishers(self, lambda: self._sensors.world)
+        self._alarm = AlarmProcess(checked_rate(values["false_alarm_rate"]), self._on_alarm)
         self._models = ModelSource(self, [values["model"], *values["compare"]])
         self._rigs = RigSource(self, values["rig"])
         self._writer = ResultWriter(values["output"], self.get_logger())
-        self._sensors = SensorSubscriber(self, values["frame_id"], values["scalar_topics"])
+        given = {name: values[f"{name}_topic"] for name in STREAMS}
+        topics = Topics(**given, world=values["world_frame"], wrench_frame=values["wrench_frame"])
+        self._sensors = SensorSubscriber(self, topics, values["frame_id"], values["scalar_topics"])
         self._client = PredictionClient(self, values["request_timeout"])
         self._session = Session(values["last_answers"], values["report"])
         self._status = StatusPublisher(
             self, self._session, self._models, self._rigs, self._sensors, self._client, self._writer
         )
+        self._strict: bool = values["strict"]
         self._run: ValidationRun | None = None  # the present one, or the last
         self.create_subscription(String, "replay_status", self._on_replay_status, LATCHED)
         self._finish = FinishService(self, self._session, self._models, self._rigs, self._writer)
@@ -68,6 +73,8 @@ class PushValidator(Node):
             pass
         self._writer.report.stop()
         self._alarm.stop()
+        if self._run is not None:
+            self._run.checks.check.stop()
         self._sensors.close()
         if self._session.failure:
             raise PushPredictorError(self._session.failure)
@@ -75,6 +82,11 @@ class PushValidator(Node):
     def _on_replay_status(self, message: String) -> None:
         self._sensors.drain()
         self._session.replay(message.data, samples_waiting=len(self._sensors) > 0)
+
+    def _on_alarm(self, state: AlarmState, end: int) -> None:
+        """Publish an alarm about the main model of the present run."""
+        if self._run is not None:
+            self._results.alarm(self._run.validation.names[0], state, end)
 
     def _work(self) -> None:
         if self._closed.is_set():
@@ -90,6 +102,8 @@ class PushValidator(Node):
         self._alarm.work()
         self._rigs.work()  # before the samples that came after it
         self._advance()
+        if self._run is not None:
+            self._run.checks.work()
         self._finish.answer()
         if self._session.over:
             self._status.publish(self._run)
@@ -104,6 +118,7 @@ class PushValidator(Node):
             if not other_rig:
                 self._feed(self._run)
             if self._session.drain_if_due(monotonic(), self._finish.requested, other_rig):
+                self._finish.ending()
                 self._run.finish({} if other_rig else self._sensors.last_scalars())
         self._client.work()
         if self._session.state is State.DRAINING and self._run is not None:
@@ -117,7 +132,10 @@ class PushValidator(Node):
         # A recording gives the finder every stream from its beginning, so a run begins with all of them.
         if complete or self._closing.is_set() or self._finish.requested:
             output, scalars = self._writer.folder, self._sensors.scalar_names
-            self._run = ValidationRun(rig, models, self._client, self._results.publish, self._alarm, output, scalars)
+            if self._run is not None:
+                self._run.checks.check.stop()
+            publish, strict = self._results.publish, self._strict
+            self._run = ValidationRun(rig, models, self._client, publish, self._alarm, output, scalars, strict)
             self._session.open(monotonic())
 
     def _feed(self, current: ValidationRun) -> None:

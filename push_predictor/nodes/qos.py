@@ -1,8 +1,8 @@
-"""QoS of replayed topics: reliable with bounded history, plus overrides from a file in rosbag2's format."""
+"""QoS of replayed topics and of subscriptions that follow their publishers; overrides in rosbag2's format."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,20 @@ def replay_profile(recorded: str, kept: bool = False) -> QoSProfile:
     """
     durability = DurabilityPolicy.TRANSIENT_LOCAL if kept or _was_latched(recorded) else DurabilityPolicy.VOLATILE
     return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+
+
+def common_profile(publishers: Sequence[QoSProfile], depth: int = DEPTH, earlier: bool = True) -> QoSProfile:
+    """The QoS that all publishers offer, reliable and volatile without any.
+
+    earlier: ask for messages that were sent before, if all publishers keep them.
+    """
+    kept = earlier and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
+    return QoSProfile(
+        depth=depth,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if kept and publishers else DurabilityPolicy.VOLATILE,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+    )
 
 
 def read_overrides(path: Path | None) -> dict[str, dict[str, Any]]:

@@ -95,6 +95,7 @@ def _parse(name: str, args: Sequence[str] | None) -> None:
         prog=name,
         description=f"The node {name}. docs/reference/{name}.md has its parameters, topics and services.",
         epilog=f"example: {name} --ros-args --params-file PARAMS.yaml -r __ns:=/cell",
+        allow_abbrev=False,
     )
     parser.add_argument("--ros-args", metavar="...", help="names, remappings and parameters, as ROS 2 has them")
     parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")

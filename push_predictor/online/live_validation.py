@@ -7,6 +7,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +20,22 @@ from push_predictor.online.files.window_rows import WindowRows
 from push_predictor.online.running_score import RunningScore
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
-from push_predictor.types import Array, IntArray
+from push_predictor.types import Array, BoolArray, IntArray
 
 MAIN_RESULT = "validation.json"
-_ANSWER = struct.Struct("<q12d")  # number of the window, mean, covariance
+_ANSWER = struct.Struct("<q12d?")  # number of the window, mean, covariance, whether in the domain
+_ROW = np.dtype([("number", "<i8"), ("values", "<f8", 12), ("in_domain", "?")])  # the same
 _NUMBER = struct.Struct("<q")
+
+
+class Residual(NamedTuple):
+    """A predicted window: model name, window, mean (3,), covariance (3, 3), whether in the model's domain."""
+
+    model: str
+    window: PushWindow
+    mean: Array
+    covariance: Array
+    in_domain: bool
 
 
 class LiveValidation:
@@ -48,7 +60,7 @@ class LiveValidation:
     def record(self, model: int, number: int, prediction: Prediction) -> None:
         """Record a model's prediction (n = 1) of a window; once for each."""
         window, mean, covariance = self.windows[number], prediction.mean[0], prediction.covariance[0]
-        self._answers[model].add(number, mean, covariance)
+        self._answers[model].add(number, mean, covariance, bool(prediction.in_domain[0]))
         self.scores[model].add(window.push_id, mean, covariance, window.displacement)
 
     def refuse(self, model: int, number: int, reason: str) -> None:
@@ -70,16 +82,16 @@ class LiveValidation:
 
     def comparison(self, model: int = 0) -> Comparison:
         """Predicted and observed outcomes of the windows that a model has predicted."""
-        numbers, mean, covariance = self._answers[model].sorted()
+        numbers, mean, covariance, _ = self._answers[model].sorted()
         table = windows_to_table(self.windows.take(numbers))
         return comparison_of(self.models[model], table, mean, covariance)
 
-    def residuals(self) -> Iterator[tuple[str, PushWindow, Array, Array]]:
-        """Model name, window, mean (3,) and covariance (3, 3) of every prediction, in the order of the windows."""
+    def residuals(self) -> Iterator[Residual]:
+        """Every prediction, in the order of the windows."""
         answers = [zip(*stored.sorted(), strict=True) for stored in self._answers]
-        rows = [(number, k, mean, covariance) for k, each in enumerate(answers) for number, mean, covariance in each]
-        for number, k, mean, covariance in sorted(rows, key=lambda row: row[:2]):
-            yield self.names[k], self.windows[number], mean, covariance
+        rows = [(number, k, *rest) for k, each in enumerate(answers) for number, *rest in each]
+        for number, k, mean, covariance, in_domain in sorted(rows, key=lambda row: row[:2]):
+            yield Residual(self.names[k], self.windows[number], mean, covariance, bool(in_domain))
 
     def write(self, folder: Path) -> list[Path]:
         """Write validation.json of the main model, validation_NAME.json of the others, and their windows one by one.
@@ -99,7 +111,7 @@ class LiveValidation:
 
 
 class _Answers:
-    """Means and covariances by number of window, packed."""
+    """Means, covariances and whether in the domain, by number of window, packed."""
 
     def __init__(self) -> None:
         self._rows = RowFile()
@@ -107,15 +119,16 @@ class _Answers:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def add(self, number: int, mean: Array, covariance: Array) -> None:
-        self._rows.append(_ANSWER.pack(number, *mean.tolist(), *covariance.ravel().tolist()))
+    def add(self, number: int, mean: Array, covariance: Array, in_domain: bool) -> None:
+        self._rows.append(_ANSWER.pack(number, *mean.tolist(), *covariance.ravel().tolist(), in_domain))
 
-    def sorted(self) -> tuple[IntArray, Array, Array]:
-        """Numbers (n,), means (n, 3), covariances (n, 3, 3), by number."""
-        data = np.frombuffer(b"".join(self._rows), dtype=[("number", "<i8"), ("values", "<f8", 12)])
+    def sorted(self) -> tuple[IntArray, Array, Array, BoolArray]:
+        """Numbers (n,), means (n, 3), covariances (n, 3, 3), whether in the domain (n,), by number."""
+        data = np.frombuffer(b"".join(self._rows), dtype=_ROW)
         data = data[np.argsort(data["number"])]
         values = data["values"]
-        return data["number"].copy(), values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
+        mean, covariance = values[:, :3].copy(), values[:, 3:].reshape(-1, 3, 3).copy()
+        return data["number"].copy(), mean, covariance, data["in_domain"].copy()
 
 
 def _file_name(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import sys
+from collections.abc import Mapping
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -34,8 +35,11 @@ class ReportWriter:
         """Whether the last report failed."""
         return self._process is not None and self._process.exitcode not in (None, 0)
 
-    def start(self, validation: LiveValidation, folder: Path) -> None:
-        """Write FOLDER/report.html about the models that have predicted the same windows as the main one."""
+    def start(self, validation: LiveValidation, folder: Path, alarm: Mapping[str, object] | None = None) -> None:
+        """Write FOLDER/report.html about the models that have predicted the same windows as the main one.
+
+        alarm: of the main model, as in validation.json.
+        """
         self.stop()
         comparisons = [validation.comparison(k) for k in range(len(validation.models))]
         whole = [k for k, c in enumerate(comparisons) if np.array_equal(c.observed, comparisons[0].observed)]
@@ -43,7 +47,7 @@ class ReportWriter:
         # spawned: a fork would inherit the threads' locks of the middleware
         context = multiprocessing.get_context("spawn")
         self._process = context.Process(
-            target=_write, args=(models, validation.predicted(), shown, folder), daemon=True
+            target=_write, args=(models, validation.predicted(), shown, folder, alarm), daemon=True
         )
         self._process.start()
 
@@ -54,10 +58,16 @@ class ReportWriter:
             self._process.join()
 
 
-def _write(models: list[PushModel], windows: WindowRows, comparisons: list[Comparison], folder: Path) -> None:
+def _write(
+    models: list[PushModel],
+    windows: WindowRows,
+    comparisons: list[Comparison],
+    folder: Path,
+    alarm: Mapping[str, object] | None,
+) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that unfinished files are removed
     try:
-        report_windows(models, windows, comparisons, folder, "online validation")
+        report_windows(models, windows, comparisons, folder, "online validation", alarm=alarm)
     except (PushPredictorError, OSError) as error:
         sys.exit(f"report: {' '.join(str(error).split())}")

@@ -17,6 +17,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.online.files.window_table import TABLE
 from push_predictor.recordings.atomic import write_whole
@@ -64,9 +65,10 @@ class Traced:
 
 @dataclass(frozen=True)
 class Failed:
-    """The reason why there is no verdict."""
+    """The reason why there is no verdict, and its error code."""
 
     reason: str
+    code: ErrorCode
 
 
 def start_trace(task: TraceTask) -> tuple[BaseProcess, Connection]:
@@ -105,7 +107,7 @@ def _run(connection: Connection, task: TraceTask) -> None:
     except (BrokenPipeError, ConnectionResetError):
         shutil.rmtree(task.folder, ignore_errors=True)  # the node has died and cannot do it
     except (PushPredictorError, OSError) as error:
-        connection.send(Failed(_reason(error, task)))
+        connection.send(Failed(_reason(error, task), error_code(error)))
 
 
 def _reason(error: Exception, task: TraceTask) -> str:

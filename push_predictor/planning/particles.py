@@ -6,12 +6,12 @@ the contact follows from the positions of the pusher and of the sample.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.errors import RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import displaced
 from push_predictor.models.push_model import PushModel
@@ -46,11 +46,13 @@ def push_particles(
     persistence: Persistence,
     rng: np.random.Generator,
     check_cancelled: Callable[[], None] | None = None,
+    covariates: Mapping[str, float] = MappingProxyType({}),
 ) -> PushedSamples:
     """Push sliders (p, 3), each by inputs (p, 3: velocity m/s, contact, angle rad) of its own, for duration s.
 
-    check_cancelled is called before every window and may raise. Raises RequestError for a duration that the model
-    cannot answer for; the caller has checked everything else.
+    check_cancelled is called before every window and may raise. covariates: by name, those that the model needs and the
+    poses do not give, the same in all windows. Raises RequestError for a duration that the model cannot answer for; the
+    caller has checked everything else.
     """
     model = model_of(predictor)
     windows, rig = windows_of(model, duration), model.rig
@@ -62,7 +64,7 @@ def push_particles(
             check_cancelled()
         if window:
             contact = drive.contact_at(sliders, contact, window * windows.duration, windows.duration)
-        moved, known = _displacements(predictor, sliders, contact, windows, deviations.next())
+        moved, known = _displacements(predictor, sliders, contact, windows, deviations.next(), covariates)
         sliders, in_domain = displaced(sliders, contact.touch.heading, moved), in_domain & known
     return PushedSamples(sliders, contact.in_contact, in_domain)
 
@@ -72,24 +74,21 @@ def model_of(predictor: PushModel | TabulatedModel) -> PushModel:
     return predictor.model if isinstance(predictor, TabulatedModel) else predictor
 
 
-def check_covariates(model: PushModel) -> None:
-    """Raise RequestError if the model needs a covariate that the pose of the slider does not give."""
-    if foreign := [name for name in model.needs if name not in POSE_COVARIATES]:
-        accepted = (
-            f"a model that needs no covariates but {', '.join(POSE_COVARIATES)}: this one needs {', '.join(foreign)}"
-        )
-        raise RequestError("model", model.name, accepted)
-
-
 def _displacements(
-    predictor: PushModel | TabulatedModel, sliders: Array, contact: TipContact, windows: PushWindows, deviation: Array
+    predictor: PushModel | TabulatedModel,
+    sliders: Array,
+    contact: TipContact,
+    windows: PushWindows,
+    deviation: Array,
+    given: Mapping[str, float],
 ) -> tuple[Array, BoolArray]:
     """Displacements (p, 3) in the push frame for standard deviates (p, 3), and which are in the domain."""
     moved, known = np.zeros((len(sliders), 3)), np.ones(len(sliders), dtype=np.bool_)
     in_contact = np.flatnonzero(contact.in_contact)
     if not len(in_contact):
         return moved, known
-    covariates = {name: column[in_contact] for name, column in _covariates(sliders, contact.touch.heading).items()}
+    of_poses = {name: column[in_contact] for name, column in _covariates(sliders, contact.touch.heading).items()}
+    covariates = {**{name: np.full(len(in_contact), value) for name, value in given.items()}, **of_poses}
     asked = np.full(len(in_contact), windows.asked)
     prediction = predictor.predict_rows(contact.touch.inputs[in_contact], asked, covariates)
     root = root_of(prediction.covariance)

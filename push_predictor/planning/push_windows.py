@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_predictor.errors import RequestError
+from push_predictor.errors import RequestError, TooLargeError
 from push_predictor.models.push_model import PushModel
 
 MOST_WINDOWS = 10_000
@@ -36,7 +36,7 @@ def windows_of(model: PushModel, duration: float) -> PushWindows:
         raise RequestError("duration", duration, "a finite number above 0, in s")
     usual = model.usual_duration
     if duration > MOST_WINDOWS * usual:
-        raise RequestError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
+        raise TooLargeError("duration", duration, f"at most {MOST_WINDOWS * usual:g} s, {MOST_WINDOWS} windows")
     if not model.predictor.learnt:
         count = max(1, round(duration / usual))
         return PushWindows(count, duration / count, duration / count, 1.0)

@@ -7,17 +7,18 @@ has rotated further is touched elsewhere, so steps with one mode each may lead t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from push_predictor.errors import RequestError
+from push_predictor.errors import CovariateError, RequestError, TooLargeError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest, check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.planning.particles import POSE_COVARIATES, check_covariates, model_of, push_particles
+from push_predictor.planning.particles import POSE_COVARIATES, model_of, push_particles
 from push_predictor.planning.persistence import Persistence, persistence_of, root_of
 from push_predictor.planning.push_windows import windows_of
 from push_predictor.types import Array
@@ -56,24 +57,25 @@ def rollout(
     seed: int = 0,
     persistence: Persistence | None = None,
     check_cancelled: Callable[[], None] | None = None,
+    covariates: Mapping[str, Array] = MappingProxyType({}),
 ) -> Rollout:
     """Roll out steps (k, 4: velocity m/s, contact, angle rad, duration s) from a slider at slider_mean (3,) with
     slider_covariance (3, 3).
 
     persistence: correlation of the residuals within a step, None for that of the model's training pushes; steps are
     independent of each other. The same seed gives the same samples. check_cancelled is called before every window and
-    may raise. Raises RequestError.
+    may raise. covariates (k,) by name: of each step, for all of its windows; those that a pose gives must not be among
+    them. Raises RequestError.
     """
     model, steps = model_of(predictor), np.asarray(steps, dtype=np.float64).reshape(-1, 4)
-    _check(predictor, slider_mean, slider_covariance, steps, particles)
+    _check(predictor, slider_mean, slider_covariance, steps, particles, covariates)
     persistence = persistence_of(model) if persistence is None else persistence
     rng = np.random.default_rng(seed)
     sliders = sample_poses(slider_mean, slider_covariance, particles, rng)
     known, rows = np.ones(particles, dtype=np.bool_), []
-    for *inputs, duration in steps.tolist():
-        pushed = push_particles(
-            predictor, sliders, np.tile(inputs, (particles, 1)), duration, persistence, rng, check_cancelled
-        )
+    for k, (*inputs, duration) in enumerate(steps.tolist()):
+        every, given = np.tile(inputs, (particles, 1)), _of_step(covariates, k)
+        pushed = push_particles(predictor, sliders, every, duration, persistence, rng, check_cancelled, given)
         sliders, known = pushed.sliders, known & pushed.in_domain
         rows.append((*pose_moments(sliders), pushed.in_contact.mean(), known.mean()))
     mean, covariance, in_contact, in_domain = zip(*rows, strict=True) if rows else ((), (), (), ())
@@ -105,9 +107,22 @@ def _wrapped(poses: Array) -> Array:
     return np.column_stack([poses[:, :2], wrap_angle(poses[:, 2])])
 
 
-def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array, steps: Array, particles: int) -> None:
+def _of_step(covariates: Mapping[str, Array], index: int) -> dict[str, float]:
+    return {name: float(column[index]) for name, column in covariates.items()}
+
+
+def _check(
+    predictor: PushModel | TabulatedModel,
+    mean: Array,
+    covariance: Array,
+    steps: Array,
+    particles: int,
+    covariates: Mapping[str, Array],
+) -> None:
     model = model_of(predictor)
-    check_covariates(model)
+    for name in POSE_COVARIATES:
+        if name in covariates:
+            raise CovariateError("covariate_names", name, "covariates that do not follow from the poses")
     if not np.all(np.abs(mean) <= FARTHEST):
         accepted = f"numbers up to {FARTHEST:g}: x, y in m, heading in rad"
         raise RequestError("slider_mean", np.asarray(mean).tolist(), accepted)
@@ -115,19 +130,20 @@ def _check(predictor: PushModel | TabulatedModel, mean: Array, covariance: Array
         raise RequestError("slider_covariance", np.asarray(covariance).tolist(), A_COVARIANCE)
     if not 0 < particles <= MOST_PARTICLES:
         raise RequestError("particles", particles, f"a number from 1 to {MOST_PARTICLES}")
-    windows = sum(_checked_windows(model, k, step) for k, step in enumerate(steps.tolist()))
+    windows = sum(_checked_windows(model, k, step, _of_step(covariates, k)) for k, step in enumerate(steps.tolist()))
     tabulated = isinstance(predictor, TabulatedModel) and predictor.tabulated
     if windows * particles > (work := MOST_WORK if tabulated else MOST_EXACT_WORK):
         most = work // particles
         accepted = f"at most {most} windows in total with {particles} particles"
-        raise RequestError("steps", f"{windows} windows", accepted)
+        raise TooLargeError("steps", f"{windows} windows", accepted)
 
 
-def _checked_windows(model: PushModel, index: int, step: list[float]) -> int:
+def _checked_windows(model: PushModel, index: int, step: list[float], covariates: Mapping[str, float]) -> int:
     velocity, contact, angle, duration = step
     try:
         windows = windows_of(model, duration)
-        push = PushRequest(velocity, contact, angle, windows.asked, dict.fromkeys(POSE_COVARIATES, 0.0))
+        complete = {**dict.fromkeys(POSE_COVARIATES, 0.0), **covariates}
+        push = PushRequest(velocity, contact, angle, windows.asked, complete)
         check_request(model, push)
     except RequestError as error:
         raise error.within(f"steps[{index}]") from None

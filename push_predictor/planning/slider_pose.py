@@ -8,10 +8,12 @@ from math import isfinite, remainder, tau
 
 import numpy as np
 
-from push_predictor.errors import RequestError
+from push_predictor.errors import ContactError, CovariateError, RequestError
 from push_predictor.geometry.frames import wrap_angle
 from push_predictor.geometry.touch import Touch, covariance_in_world, displaced, touches
+from push_predictor.models.domain_remark import domain_remark
 from push_predictor.models.effects.covariate_range import HEADINGS
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.request import PushRequest, check_request
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
@@ -45,12 +47,14 @@ class WorldPush:
 class SliderAfter:
     """The predicted slider after a push, in the world.
 
-    pose (3,): m, m, rad (unwrapped), with covariance (3, 3); in_domain: whether the push is in the model's domain.
+    pose (3,): m, m, rad (unwrapped), with covariance (3, 3); in_domain: whether the push is in the model's domain;
+    remark: in words, why it is not, else empty.
     """
 
     pose: Array
     covariance: Array
     in_domain: bool
+    remark: str = ""
 
 
 def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> SliderAfter:
@@ -66,10 +70,12 @@ def slider_after(predictor: PushModel | TabulatedModel, push: WorldPush) -> Slid
     request = PushRequest(velocity, contact, angle, push.duration, covariates)
     check_request(model, request)
     prediction = predictor.predict_rows(*request.arrays)
+    remark = domain_remark(model, Push(*request.arrays), prediction.in_domain)
     return SliderAfter(
         displaced(push.slider[None], touch.heading, prediction.mean)[0],
         covariance_in_world(prediction.covariance, touch.heading)[0],
         bool(prediction.in_domain[0]),
+        remark,
     )
 
 
@@ -100,7 +106,7 @@ def completed_covariates(push: WorldPush, touch: Touch, rig: Rig) -> dict[str, f
         if name in HEADINGS and isfinite(apart):
             apart = remainder(apart, tau)
         if not abs(apart) <= AGREEMENT:
-            raise RequestError(f"covariate {name}", given, f"{value:.6g}, which follows from the poses, or omit it")
+            raise CovariateError(f"covariate {name}", given, f"{value:.6g}, which follows from the poses, or omit it")
     return {**push.covariates, **known}
 
 
@@ -125,13 +131,13 @@ def _check_contact(push: WorldPush, distance: float, radius: float) -> None:
         wrong = f"tip in contact: the gap to the outline is {gap:.3g} m, at most {MAX_GAP:g} m is contact"
     else:
         return
-    raise RequestError("pusher", _shown(push.pusher), f"a {wrong}")
+    raise ContactError("pusher", _shown(push.pusher), f"a {wrong}")
 
 
 def _check_direction(push: WorldPush, angle: float) -> None:
     if abs(angle) >= np.pi / 2.0:
         accepted = f"a direction within 90 degrees of the inward normal: it is {np.degrees(angle):.1f} degrees from it"
-        raise RequestError("pusher_velocity", _shown(push.velocity), accepted)
+        raise ContactError("pusher_velocity", _shown(push.velocity), accepted)
 
 
 def _shown(values: Array) -> tuple[float, ...]:

@@ -1,5 +1,6 @@
 """Recorded pushes: streams, rigs and push tables, read and written.
 
 Import `read`, `write`, `load`, `streams`, `samples`, `rig` and `table`. The folders are `bag` (files), `fields`
-(messages of any type), `windows` (push windows) and `importers` (other formats).
+(messages of any type), `windows` (push windows), `checks` (mistakes), `rigs` (new rig files) and
+`importers` (other formats).
 """

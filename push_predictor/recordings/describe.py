@@ -6,17 +6,24 @@ from pathlib import Path
 
 import numpy as np
 
+from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, ScalarStream, WrenchStream
 from push_predictor.recordings.table_file import read_table, rig_of_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 
 
-def describe_recording(path: Path, topics: Topics = Topics()) -> dict[str, object]:
-    """Streams, rig, pushes and windows of a recording. Raises RecordingError for an unreadable file."""
-    recording = read_recording(path, topics=topics)
+def describe_recording(path: Path, topics: Topics = Topics(), rig: Rig | None = None) -> dict[str, object]:
+    """Streams, rig, pushes and windows of a recording. Raises RecordingError for an unreadable file.
+
+    rig: instead of the recorded one.
+    """
+    recording = read_recording(path, rig=rig, topics=topics)
     found: dict[str, object] = {"recording": recording.name, "rig": _rig(recording), "streams": _streams(recording)}
+    if recording.wrench_bias is not None:
+        found["wrench_bias"] = _bias(recording.wrench_bias)
     if recording.rig is not None:
         windows = find_windows(recording, recording.rig)
         found |= {"pushes": len({w.push_id for w in windows}), "windows": len(windows)}
@@ -47,6 +54,15 @@ def _rig(recording: Recording) -> str:
     if rig is None:
         return "none: give it to the commands that need it, with --rig"
     return f"{rig.shape} on {rig.surface}, {rig.object_mass:g} kg"
+
+
+def _bias(bias: WrenchBias) -> dict[str, object]:
+    found = {
+        key: value.tolist() if isinstance(value, np.ndarray) else value
+        for key, value in vars(bias).items()
+        if value is not None
+    }
+    return {"axes": "of the sensor", **found}
 
 
 def _streams(recording: Recording) -> dict[str, str]:

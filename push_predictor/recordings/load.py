@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,12 +13,19 @@ from push_predictor.errors import RecordingError, RigError
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.read import read_recording, recorded_rig, require_rig
 from push_predictor.recordings.rig import HOW_TO_GIVE, RECORD_NAME, Rig, load_rig
+from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.table_file import is_recording, read_table, rig_of_table, rig_path
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import WindowOptions, windows_to_table
 from push_predictor.types import Array
+
+Inspect: TypeAlias = Callable[[Path, "Recording | PushTable", "Rig | None"], None]
+
+
+def no_inspection(path: Path, data: Recording | PushTable, rig: Rig | None) -> None:
+    """Accept the data of a path as they were read; in place of it, a caller may check them."""
 
 
 def load_data(
@@ -27,15 +35,16 @@ def load_data(
     *,
     numbered: bool = False,
     topics: Topics = Topics(),
+    inspect: Inspect = no_inspection,
 ) -> PushTable:
     """The windows of all recordings and the rows of all tables, in the order given.
 
-    rig replaces the recorded one; topics: of all recordings. numbered: add the covariate `recording`, the number of
-    the path from 0. A covariate is kept if all data have it. If two paths use the same push_id for different rows, the
-    name of the path is prefixed to it; the same rows twice remain one push. Raises RecordingError (also if no recording
-    has a window), TableError or RigError.
+    rig replaces the recorded one; topics: of all recordings. inspect: called with each path, its data and its rig.
+    numbered: add the covariate `recording`, the number of the path from 0. A covariate is kept if all data have it. If
+    two paths use the same push_id for different rows, the name of the path is prefixed to it; the same rows twice
+    remain one push. Raises RecordingError (also if no recording has a window), TableError or RigError.
     """
-    tables = [_load(Path(path), rig, options, topics) for path in paths]
+    tables = [_load(Path(path), rig, options, topics, inspect) for path in paths]
     if numbered:
         tables = [_numbered(number, table) for number, table in enumerate(tables)]
     if paths and not any(map(len, tables)):
@@ -82,10 +91,13 @@ def distinct_pushes(names: Sequence[str], tables: Sequence[PushTable]) -> list[P
     return list(tables)
 
 
-def _load(path: Path, rig: Rig | None, options: WindowOptions, topics: Topics) -> PushTable:
+def _load(path: Path, rig: Rig | None, options: WindowOptions, topics: Topics, inspect: Inspect) -> PushTable:
     if not is_recording(path):
-        return read_table(path)
+        table = read_table(path)
+        inspect(path, table, rig)
+        return table
     recording = read_recording(path, rig=rig, topics=topics)
+    inspect(path, recording, require_rig(recording))
     return windows_to_table(find_windows(recording, require_rig(recording), options))
 
 

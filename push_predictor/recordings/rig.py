@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RigError
-from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.frames import to_body
+from push_predictor.geometry.outline import CENTRED, Outline
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.types import Array
 
 RECORD_NAME = "push_rig"
 REQUIRED = ("shape", "outline", "pusher_radius", "surface", "object_mass")
+POSE = ("x", "y", "yaw")  # keys of shape_parameters: m, m, rad; a missing one is 0
 HOW_TO_GIVE = "give it with --rig FILE.yaml or the node parameter 'rig'"
 
 
@@ -46,7 +48,7 @@ class Rig:
             "object_mass": repr(float(self.object_mass)),
         }
         if self.outline.semi_axes is not None:
-            record["shape_parameters"] = json.dumps(_shape_parameters(self.outline.semi_axes))
+            record["shape_parameters"] = json.dumps(_shape_parameters(self.outline))
         if self.support_points is not None:
             record["support_points"] = json.dumps(np.asarray(self.support_points).tolist())
         for key in ("contact_friction", "surface_friction"):
@@ -106,28 +108,36 @@ def save_rig(rig: Rig, path: Path) -> None:
     write_whole(path, yaml.safe_dump(rig.to_record(), sort_keys=False).encode())
 
 
-def _shape_parameters(semi_axes: tuple[float, float]) -> dict[str, object]:
-    a, b = semi_axes
-    return {"type": "circle", "radius": a} if a == b else {"type": "ellipse", "a": a, "b": b}
+def _shape_parameters(outline: Outline) -> dict[str, object]:
+    a, b = outline.semi_axes or (0.0, 0.0)
+    size = {"type": "circle", "radius": a} if a == b else {"type": "ellipse", "a": a, "b": b}
+    return size if outline.pose == CENTRED else size | dict(zip(POSE, outline.pose, strict=True))
 
 
 def _outline(record: Mapping[str, object], source: str) -> Outline:
     vertices = _numbers(record, "outline", 2, source)
     try:
-        return Outline(vertices, _semi_axes(record, vertices, source))
+        return Outline(vertices, *_smooth(record, vertices, source))
     except RigError as error:
         raise RigError(f"{source}: push_rig {error}") from None
 
 
-def _semi_axes(record: Mapping[str, object], vertices: Array, source: str) -> tuple[float, float] | None:
+def _smooth(
+    record: Mapping[str, object], vertices: Array, source: str
+) -> tuple[tuple[float, float] | None, tuple[float, float, float]]:
+    """Semi-axes of a circle or an ellipse, m, None for a polygon, and the pose of the axes, m, rad."""
     parameters = _parsed(record, "shape_parameters", source)
     if not isinstance(parameters, dict):
-        return None
+        return None, CENTRED
     try:
+        x, y, yaw = (float(parameters.get(key, 0.0)) for key in POSE)
+        if not np.all(np.isfinite([x, y, yaw])):
+            raise ValueError("x, y or yaw is not finite")
+        own = to_body(vertices, np.array([x, y, yaw]))
         if parameters["type"] == "circle":
-            return float(parameters["radius"]), float(parameters["radius"])
+            return (float(parameters["radius"]), float(parameters["radius"])), (x, y, yaw)
         if parameters["type"] == "ellipse":
-            return _half(float(parameters["a"]), vertices[:, 0]), _half(float(parameters["b"]), vertices[:, 1])
+            return (_half(float(parameters["a"]), own[:, 0]), _half(float(parameters["b"]), own[:, 1])), (x, y, yaw)
     except (KeyError, TypeError, ValueError) as error:
         raise RigError(f"{source}: push_rig shape_parameters {parameters!r} lacks a number ({error})") from None
     raise RigError(f"{source}: push_rig shape_parameters type {parameters['type']!r}, give 'circle' or 'ellipse'")

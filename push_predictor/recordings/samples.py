@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +45,15 @@ class CheckedSamples:
     values: Array
     usable: BoolArray
     rejected: dict[str, int]
+    frames: frozenset[str]
+
+
+class UsableSamples(NamedTuple):
+    """n samples that no rule rejects: topic, stamp (n,) in ns, values (n, k), and the frame_ids of their topic."""
+
+    topic: str
+    stamp: IntArray
+    values: Array
     frames: frozenset[str]
 
 
@@ -86,17 +96,17 @@ def slider_stream(stamp: IntArray, values: Array) -> PoseStream:
 
 def pusher_stream(stamp: IntArray, values: Array) -> PoseStream:
     """The stream of tip poses (n, 7); the tip is a point, so a missing orientation becomes heading 0."""
-    return slider_stream(stamp, np.where(has_orientation(values)[:, None], values, _upright(values)))
+    return slider_stream(stamp, np.where(has_orientation(values)[:, None], values, upright(values)))
+
+
+def upright(values: Array) -> Array:
+    """Poses (n, 7) at the same positions with the identity as orientation."""
+    return np.column_stack([values[:, :3], np.tile([0.0, 0.0, 0.0, 1.0], (len(values), 1))])
 
 
 def wrench_stream(stamp: IntArray, values: Array) -> WrenchStream:
     """The stream of wrenches (n, 6: force, torque)."""
     return WrenchStream(stamp, *values[:, PLANAR_WRENCH].T.copy())
-
-
-def _upright(values: Array) -> Array:
-    """The same positions with the identity as orientation."""
-    return np.column_stack([values[:, :3], np.tile([0.0, 0.0, 0.0, 1.0], (len(values), 1))])
 
 
 def _not_finite(values: Array) -> BoolArray:
@@ -108,3 +118,5 @@ SLIDER = SampleRules(
 )
 PUSHER = SampleRules(POSE_STAMPED, {NOT_FINITE: lambda values: _not_finite(values[:, :3])})
 WRENCH = SampleRules(WRENCH_STAMPED, {NOT_FINITE: lambda values: _not_finite(values[:, PLANAR_WRENCH])})
+# A wrench whose axes are turned needs all six numbers.
+SPATIAL_WRENCH = SampleRules(WRENCH_STAMPED, {NOT_FINITE: _not_finite})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from push_predictor.recordings.fields.wrench_bias import WrenchBias
 from push_predictor.recordings.rig import Rig
 from push_predictor.types import Array, IntArray
 
@@ -60,7 +61,8 @@ class Recording:
     """All streams of one recording.
 
     name: stem of its file or folder. wrench: None without a force sensor. scalars: by topic name, the possible
-    covariates. notes: sentences about what the reader discarded, repaired or assumed.
+    covariates. notes: sentences about what the reader discarded, repaired or assumed. wrench_bias: what was subtracted
+    from the wrench, None if nothing was.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Recording:
     wrench: WrenchStream | None
     scalars: dict[str, ScalarStream] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    wrench_bias: WrenchBias | None = None
 
     def __repr__(self) -> str:
         seconds = 1e-9 * float(self.slider.stamp[-1] - self.slider.stamp[0]) if len(self.slider) else 0.0

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from push_predictor.errors import RecordingError
+from push_predictor.errors import RecordingError, RequestError
 from push_predictor.recordings.atomic import write_whole
 
 ENDING = ".recording.yaml"
 FRAMES = ("slider", "pusher", "world")
+STREAMS = ("slider", "pusher", "wrench")
+WORLD_AXES, TIP_AXES = "world", "tip"
+FREE_MOTION, NO_BIAS = "free_motion", "none"
+BIASES = (FREE_MOTION, NO_BIAS)
+KEYS = (
+    *(f"{name}_topic" for name in STREAMS),
+    "covariate_topics",
+    "wrench_frame",
+    "wrench_bias",
+    "world_frame",
+    "frames",
+)
 
 
 @dataclass(frozen=True)
@@ -18,8 +30,10 @@ class Topics:
     """Where the streams of a recording are (docs/reference/recordings.md); '' and () mean: not given.
 
     slider, pusher and wrench are topics; a leading slash makes no difference. `TOPIC.FIELD` names a field of another
-    type, `/tf:FRAME` a frame. covariates: further scalars, each a topic or TOPIC.FIELD. world: the frame in which
-    poses from tf are given.
+    type, `/tf:FRAME` a frame. covariates: further scalars, each a topic or TOPIC.FIELD. world: the frame in which poses
+    from tf are given, and into which tf turns other poses. wrench_frame: the axes of the wrench, `world`, `tip`, or a
+    frame in tf. wrench_bias: `free_motion` to estimate and subtract it, `none` not to. Raises RequestError for another
+    one.
     """
 
     slider: str = ""
@@ -27,6 +41,23 @@ class Topics:
     wrench: str = ""
     covariates: tuple[str, ...] = ()
     world: str = ""
+    wrench_frame: str = ""
+    wrench_bias: str = ""
+
+    def __post_init__(self) -> None:
+        if self.wrench_bias not in ("", *BIASES):
+            raise RequestError("wrench_bias", self.wrench_bias, " or ".join(BIASES))
+
+    @property
+    def wrench_axes(self) -> str:
+        """`world`, `tip`, or '' where the wrench has the axes of `wrench_tf_frame`."""
+        given = self.wrench_frame or WORLD_AXES
+        return given if given in (WORLD_AXES, TIP_AXES) else ""
+
+    @property
+    def wrench_tf_frame(self) -> str:
+        """The frame in tf whose axes the wrench has, '' without one; `/tf:tip` is a frame, `tip` is not."""
+        return "" if self.wrench_axes else self.wrench_frame.rpartition(":")[2].strip("/")
 
     def over(self, other: Topics) -> Topics:
         """These topics, and those of another where these are not given."""
@@ -63,9 +94,9 @@ def save_topics(recording: Path, topics: Topics) -> Path:
     """Save topics next to a recording and return the file's path. Raises OSError that names the path."""
     import yaml
 
-    content: dict[str, object] = {_key(name): getattr(topics, name) for name in ("slider", "pusher", "wrench")}
-    content |= {"covariate_topics": list(topics.covariates)}
-    content |= {"frames": {"world": topics.world} if topics.world else {}}
+    content: dict[str, object] = {_key(name): getattr(topics, name) for name in STREAMS}
+    content |= {"covariate_topics": list(topics.covariates), "wrench_frame": topics.wrench_frame}
+    content |= {"wrench_bias": topics.wrench_bias, "world_frame": topics.world}
     path = topics_path(recording)
     write_whole(path, yaml.safe_dump({key: value for key, value in content.items() if value}, sort_keys=False).encode())
     return path
@@ -76,18 +107,24 @@ def _key(name: str) -> str:
 
 
 def _parsed(saved: object, path: Path) -> Topics:
-    keys = [*(_key(field.name) for field in fields(Topics)[:3]), "covariate_topics", "frames"]
     if not isinstance(saved, dict):
-        raise RecordingError(f"{path}: contains {saved!r}, give the keys {', '.join(keys)}")
-    if unknown := [key for key in saved if key not in keys]:
-        raise RecordingError(f"{path}: key {unknown[0]!r} is not accepted, give {', '.join(keys)}")
+        raise RecordingError(f"{path}: contains {saved!r}, give the keys {', '.join(KEYS)}")
+    if unknown := [key for key in saved if key not in KEYS]:
+        raise RecordingError(f"{path}: key {unknown[0]!r} is not accepted, give {', '.join(KEYS)}")
     frames = _frames(saved.get("frames"), path)
-    given = {name: _text(saved.get(_key(name)), path, _key(name)) for name in ("slider", "pusher", "wrench")}
+    given = {name: _text(saved.get(_key(name)), path, _key(name)) for name in STREAMS}
     for name in ("slider", "pusher"):
         if frames[name] and given[name]:
             raise RecordingError(f"{path}: gives both {_key(name)} and frames {name}, give one of them")
         given[name] = given[name] or (f"/tf:{frames[name]}" if frames[name] else "")
-    return Topics(**given, covariates=_list(saved.get("covariate_topics"), path), world=frames["world"])
+    covariates = _list(saved.get("covariate_topics"), path)
+    axes, bias = (_text(saved.get(key), path, key) for key in ("wrench_frame", "wrench_bias"))
+    if bias not in ("", *BIASES):
+        raise RecordingError(f"{path}: wrench_bias is {bias!r}, give {' or '.join(BIASES)}")
+    world = _text(saved.get("world_frame"), path, "world_frame")
+    if world and frames["world"]:
+        raise RecordingError(f"{path}: gives both world_frame and frames world, give one of them")
+    return Topics(**given, covariates=covariates, world=world or frames["world"], wrench_frame=axes, wrench_bias=bias)
 
 
 def _frames(value: object, path: Path) -> dict[str, str]:

@@ -50,6 +50,7 @@ class ReplayOptions:
     qos_overrides: Path | None
     window: int
     acked_timeout: int
+    strict: bool
 
 
 def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
@@ -88,6 +89,7 @@ def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptio
         qos_overrides=_path(values["play.qos_profile_overrides_path"]),
         window=values["play.read_ahead_queue_size"],
         acked_timeout=times["play.wait_acked_timeout"],
+        strict=values["strict"],
     )
 
 

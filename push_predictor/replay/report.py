@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """State of a replay; late_* in us, behind in s, acknowledged None before the end."""
+    """State of a replay; late_* in us, behind in s, acknowledged None before the end.
+
+    problems: what the check of the recording found; check: its result.
+    """
 
     recording: str
     state: str
@@ -25,6 +28,8 @@ class ReplayReport:
     unstamped: Sequence[str] = ()
     damage: Sequence[str] = ()
     rig: str = ""
+    problems: Sequence[str] = ()
+    check: str = ""
 
     @property
     def warnings(self) -> list[str]:
@@ -35,7 +40,7 @@ class ReplayReport:
         warnings += [f"{self.behind:.3f} s behind schedule"] if self.behind > 0.1 else []
         warnings += [f"not published: {topic} ({why})" for topic, why in self.skipped.items()]
         warnings += [f"not restamped: {topic} (its type does not begin with a header)" for topic in self.unstamped]
-        return warnings + ([self.rig] if self.rig else [])
+        return [*warnings, *([self.rig] if self.rig else []), *self.problems]
 
     @property
     def values(self) -> dict[str, str]:
@@ -53,6 +58,7 @@ class ReplayReport:
             "acknowledged": {None: "unknown", True: "yes", False: "no"}[self.acknowledged],
             "not_published": json.dumps(dict(self.skipped)),
             "damage": "; ".join(self.damage),
+            "data_check": self.check,
         }
 
     @property

@@ -7,7 +7,9 @@ The templates are in `templates/` (Jinja2). Each function returns one part of a 
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING
@@ -18,8 +20,11 @@ from push_predictor.reporting.chart import Chart
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 NOTHING = "–"
+CODE = re.compile(r"`([^`]+)`")
+SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z\d])")
 
 
 def page(title: str, parts: Sequence[str]) -> str:
@@ -35,14 +40,39 @@ def heading(text: str, anchor: str = "") -> str:
     return _part("heading", text, anchor)
 
 
-def finding(claim: str, verdict: str, sentence: str) -> str:
-    """A claim, its verdict and the evidence in one sentence."""
-    return _part("finding", claim, verdict, sentence)
+@dataclass(frozen=True)
+class VerdictRow:
+    """A row of `verdicts`: anchor and title of a section, a claim, its number and verdict; grey: too little data."""
+
+    anchor: str
+    section: str
+    claim: str
+    number: str
+    verdict: str
+    grey: bool = False
 
 
-def verdicts(claims: str, rows: Sequence[tuple[str, str, str, str]]) -> str:
-    """A table of (anchor, section, claim, verdict) with links to the sections; claims heads the third column."""
+@dataclass(frozen=True)
+class Bar:
+    """A bar of `shares`: its title, and how many of each kind, by name; kinds without any are not drawn."""
+
+    title: str
+    counts: Mapping[str, int]
+
+
+def finding(claim: str, verdict: str, sentence: str, grey: bool = False) -> str:
+    """A claim, its verdict and the evidence in one sentence; grey: too little data for a verdict."""
+    return _part("finding", claim, verdict, sentence, grey)
+
+
+def verdicts(claims: str, rows: Sequence[VerdictRow]) -> str:
+    """A table of claims with their numbers, verdicts and links to the sections; claims heads the second column."""
     return _part("verdicts", claims, rows)
+
+
+def shares(bars: Sequence[Bar], caption: str) -> str:
+    """Bars divided by counts of verdicts, with their legend, and a caption."""
+    return _part("shares", bars, caption)
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -61,8 +91,23 @@ def definitions(facts: Mapping[str, str]) -> str:
 
 
 def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of text. The first column names the rows; the second line of a cell is an interval."""
+    """A table of text. The first column names the rows; the second line of a cell is an interval.
+
+    On a narrow screen each row becomes a list of its columns.
+    """
     return _part("table", caption, head, [(row[0], _cells(head[1:], row[1:])) for row in rows])
+
+
+def folded_table(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], files: Mapping[str, str] | None = None
+) -> str:
+    """A table that is hidden until the reader opens it under the first sentence of its caption.
+
+    files: addresses of the same table in other formats, by the name of the format.
+    """
+    first, rest = _first_sentence(caption)
+    summary = f"{first.removesuffix('.')} ({_rows(len(rows))})"
+    return _part("folded_table", summary, table(rest, head, rows), files or {})
 
 
 def figure(picture: Picture) -> str:
@@ -74,6 +119,11 @@ def figure(picture: Picture) -> str:
 def charts(shown: Sequence[Chart], caption: str, columns: int = 0) -> str:
     """Charts in rows of that many columns (0: as many as fit), the legend of the first, and a caption."""
     return _part("charts", shown, caption, columns, template="chart.html")
+
+
+def opening(sentences: tuple[str, str, str], verdict: str, figure: str = "") -> str:
+    """The opening of every page: what was found, how sure or how large, what to do; a label; and one figure."""
+    return _part("opening", answer(sentences, verdict), figure)
 
 
 def answer(sentences: Sequence[str], verdict: str) -> str:
@@ -97,6 +147,16 @@ def number(value: float | None, digits: int = 4, zeros: bool = False) -> str:
         return NOTHING
     text = f"{value:#.{digits}g}".removesuffix(".") if zeros else f"{value:.{digits}g}"
     return text.replace("-", "−")
+
+
+def _first_sentence(text: str) -> tuple[str, str]:
+    """The first sentence of a text, and the rest."""
+    first, *rest = SENTENCE_END.split(text, maxsplit=1)
+    return first, "".join(rest)
+
+
+def _rows(count: int) -> str:
+    return "1 row" if count == 1 else f"{count} rows"
 
 
 def _cells(head: Sequence[str], row: Sequence[str]) -> list[tuple[str, str, str]]:
@@ -123,7 +183,16 @@ def _environment() -> Environment:
     except ImportError as error:
         raise PushPredictorError(f"pages need Jinja2 ({error}); pip install 'push_predictor[report]'") from None
     loader = PackageLoader("push_predictor.reporting")
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters["code"] = _code
+    return made
+
+
+def _code(text: str) -> Markup:
+    """A text in which what stands in backticks is code."""
+    from markupsafe import Markup, escape
+
+    return Markup(CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
 def _part(macro: str, *arguments: object, template: str = "parts.html") -> str:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_predictor.evaluation.offline import window_options
-from push_predictor.models.watch import Watch, no_watch
 from push_predictor.recordings.table import PushTable
 from push_predictor.residuals.channels.corrections import correct
 from push_predictor.residuals.channels.measurement import MeasurementFault, MeasurementFinding, measurement_errors
@@ -17,6 +16,7 @@ from push_predictor.residuals.evidence.loading import corrected_data
 from push_predictor.residuals.evidence.split import held_out_rows
 from push_predictor.residuals.evidence.standardised import Evidence, evidence_of
 from push_predictor.residuals.question import Question
+from push_predictor.watch import Watch, no_watch
 
 BADLY_OFF = 0.5  # mean excess of the squared residuals from which a correction must reduce them
 

@@ -15,7 +15,7 @@ from push_predictor.evaluation.offline import window_options
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.models.watch import Watch, no_watch
+from push_predictor.recordings.load import Inspect, no_inspection
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.topics import Topics
@@ -37,6 +37,7 @@ from push_predictor.residuals.outcome import FoundEffect, Gain, HeldOut, Sized, 
 from push_predictor.residuals.question import SHARES, Question
 from push_predictor.residuals.reporting.notes import CUT_AGAIN, NO_STREAMS, notes_of, notes_of_data, notes_of_shift
 from push_predictor.residuals.selection.absolute_fit import parts_of_others
+from push_predictor.watch import Watch, no_watch
 
 NO_GAIN = Gain(0.0, 0.0, 0.0)
 
@@ -52,16 +53,19 @@ def trace_data(
     watch: Watch = no_watch,
     experiment: Sequence[Path | str] = (),
     topics: Topics = Topics(),
+    inspect: Inspect = no_inspection,
 ) -> Trace:
     """Judge a model file on recordings or push tables that it was not trained on; see `trace`.
 
     experiment: recordings of the pushes that an earlier trace proposed. They are analysed and never held out, so that
-    the errors before and after are of the same pushes as in that trace. topics: of all recordings.
+    the errors before and after are of the same pushes as in that trace. topics: of all recordings. inspect: called
+    with each path, its data and the rig.
     """
     watch("windows", 0.0)
     model = load_model(Path(model_path))
     data, designed = ([Path(path) for path in given] for given in (paths, experiment))
-    loaded = load_evidence(data, rig, window_options(model), experiment=designed, topics=topics)
+    options = window_options(model)
+    loaded = load_evidence(data, rig, options, experiment=designed, topics=topics, inspect=inspect)
     return trace(model, loaded, alpha=alpha, covariates=covariates, seed=seed, watch=watch)
 
 

@@ -20,6 +20,7 @@ from push_predictor.simulation.sensors import (
 )
 from push_predictor.simulation.spec import SimulationSpec, simulated_rig
 from push_predictor.simulation.timeline import PushMotion, Truth, run_in_turn
+from push_predictor.watch import Watch, no_watch
 
 __all__ = ["PushPlan", "Sensors", "SimulationSpec", "grid_pushes", "push_outcomes", "random_pushes", "simulate"]
 
@@ -27,10 +28,17 @@ TEMPERATURE_TOPIC = "surface/temperature"
 FIRST_STAMP, STAMP_RANGE = 1_500_000_000, 10**8  # s since 1970
 
 
-def simulate(spec: SimulationSpec) -> Recording:
-    """The recording of a spec's pushes. Raises RigError for an unknown shape or surface."""
-    motions = {row: _motion(batch, i) for batch in run_pushes(spec) for i, row in enumerate(batch.rows.tolist())}
-    truth = run_in_turn([motions[row] for row in range(len(spec.pushes))], spec.pauses)
+def simulate(spec: SimulationSpec, watch: Watch = no_watch) -> Recording:
+    """The recording of a spec's pushes. Raises RigError for an unknown shape or surface.
+
+    watch: called with the share of the pushes that is simulated.
+    """
+    motions: dict[int, PushMotion] = {}
+    count = len(spec.pushes)
+    for batch in run_pushes(spec):
+        motions |= {row: _motion(batch, i) for i, row in enumerate(batch.rows.tolist())}
+        watch(f"push {len(motions)} of {count}", len(motions) / count)
+    truth = run_in_turn([motions[row] for row in range(count)], spec.pauses)
     epoch = _epoch(spec)
     return Recording(
         name=spec.name,

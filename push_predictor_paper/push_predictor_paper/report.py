@@ -29,7 +29,12 @@ from push_predictor_paper.data.corpus import simulated_corpus
 from push_predictor_paper.data.measured import measured_corpora
 from push_predictor_paper.data.repetitions import repeated_grid
 from push_predictor_paper.plan import Plan
-from push_predictor_paper.section import VERDICTS, Origin, Section, Table
+from push_predictor_paper.presentation.enough import too_little
+from push_predictor_paper.presentation.places import PLACES, heading
+from push_predictor_paper.presentation.summary import CLAIMS as CLAIM_KINDS
+from push_predictor_paper.presentation.summary import counts, opening_sentences
+from push_predictor_paper.presentation.table_files import write_tables
+from push_predictor_paper.section import Origin, Section
 from push_predictor_paper.study import Study
 from push_predictor_paper.work import Work, fingerprint
 
@@ -60,9 +65,11 @@ HOW_TO_READ = (
     "works and that the simulated physics suffices for the effect. It does not show that real pushes behave so.",
 )
 QUICK_WARNING = (
-    "Made with --quick: a few small recordings, to check that everything runs. Intervals are wide, and verdicts "
-    "rest on little data. Without --quick the paper's full size is computed."
+    "Made with `--quick`: a few small recordings, to check that everything runs. Intervals are wide. Verdicts in grey "
+    "have too little data; their sections state what they lack. Without `--quick` the paper's full size is computed."
 )
+COUNTS = "Number of verdicts. Each claim and its number are in the tables below."
+Files = Mapping[str, Sequence[Mapping[str, str]]]
 
 
 class Stages(Protocol):
@@ -75,7 +82,7 @@ class Stages(Protocol):
 def report_paper(
     plan: Plan, work: Work, out: Path, measured: Path | None, keep: Path | None, stages: Stages
 ) -> tuple[Path, dict[str, Any]]:
-    """Compute all claims; write out/paper.html and out/paper.json. Returns the page and the content of the JSON.
+    """Compute all claims; write out/paper.html, out/paper.json and out/tables. Returns the page and the JSON's content.
 
     measured: a folder of measured pushes (see data.measured). keep: a folder that receives all simulated recordings.
     """
@@ -87,9 +94,9 @@ def report_paper(
     for number, (title, section) in enumerate(CLAIMS.items(), 2):
         stages.stage(number, count, title)
         sections.append(section(study))
-    content = _content(plan, sections, time.monotonic() - begun)
+    content, files = _content(plan, sections, time.monotonic() - begun), write_tables(out, sections)
     write_whole(out / "paper.json", (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
-    write_whole(out / "paper.html", _page(plan, study, sections, content["made"]).encode())
+    write_whole(out / "paper.html", _page(plan, study, sections, content["made"], files).encode())
     return out / "paper.html", content
 
 
@@ -115,13 +122,15 @@ def _content(plan: Plan, sections: list[Section], seconds: float) -> dict[str, A
             "scipy": scipy.__version__,
             "seconds": round(seconds, 1),
         },
-        "sections": {s.key: _section_json(s) for s in sections},
+        "sections": {s.key: _section_json(s, too_little(plan).get(s.key, "")) for s in sections},
     }
 
 
-def _section_json(section: Section) -> dict[str, Any]:
+def _section_json(section: Section, lacks: str) -> dict[str, Any]:
     return {
         "title": section.title,
+        "place": PLACES.get(section.key),
+        "too_little_data": lacks,
         "findings": [vars(finding) for finding in section.findings],
         "tables": [vars(table) for table in section.tables],
         "notes": list(section.notes),
@@ -129,34 +138,35 @@ def _section_json(section: Section) -> dict[str, Any]:
     }
 
 
-def _page(plan: Plan, study: Study, sections: list[Section], made: Mapping[str, Any]) -> str:
+def _page(plan: Plan, study: Study, sections: list[Section], made: Mapping[str, Any], files: Files) -> str:
+    lacking = too_little(plan)
+    bars = [html.Bar(CLAIM_KINDS[origin].capitalize(), counts(sections, origin, lacking)) for origin in CLAIM_KINDS]
+    label = "quick check" if lacking else "full size"
     parts = [
-        html.paragraph(_summary_sentence(sections), "lead"),
-        *([html.paragraph(QUICK_WARNING, "warning")] if plan.name == "quick" else []),
-        *_summary_tables(sections),
+        html.opening(opening_sentences(sections, study, lacking), label, html.shares(bars, COUNTS)),
+        *([html.paragraph(QUICK_WARNING, "warning")] if lacking else []),
+        *_summary_tables(sections, lacking),
         html.heading("How to read this page"),
-        *map(html.paragraph, (_origin(study), *HOW_TO_READ)),
+        *map(html.paragraph, (f"The paper: {PAPER}.", _origin(study), *HOW_TO_READ)),
     ]
     for section in sections:
-        parts += _section_html(section)
+        parts += _section_html(section, lacking.get(section.key, ""), files[section.key])
     facts = {name: str(value) for name, value in made.items()} | {"plan": plan.name, "seed": str(plan.seed)}
     parts += [html.heading("How this page was made"), html.definitions(facts)]
     return html.page("Planar pushing: the paper, claim by claim", parts)
 
 
-def _summary_sentence(sections: Sequence[Section]) -> str:
-    """How many of the paper's claims hold, hold in part, do not hold, are not decided."""
-    verdicts = [f.verdict for section in sections for f in section.findings if f.origin == "paper"]
-    counts = ", ".join(f"{verdict}: {verdicts.count(verdict)}" for verdict in VERDICTS)
-    return f"{len(verdicts)} claims of {PAPER}, tried here. {counts.capitalize()}."
-
-
-def _summary_tables(sections: Sequence[Section]) -> list[str]:
+def _summary_tables(sections: Sequence[Section], lacking: Mapping[str, str]) -> list[str]:
     """One table of the paper's claims, one of the questions beyond the paper."""
     heads: dict[Origin, str] = {"paper": "claim of the paper", "beyond the paper": "question beyond the paper"}
     tables = []
     for origin, head in heads.items():
-        rows = [(s.key, s.title, f.claim, f.verdict) for s in sections for f in s.findings if f.origin == origin]
+        rows = [
+            html.VerdictRow(s.key, s.title, f.claim, f.number, f.verdict, s.key in lacking)
+            for s in sections
+            for f in s.findings
+            if f.origin == origin
+        ]
         tables += [html.verdicts(head, rows)] if rows else []
     return tables
 
@@ -166,15 +176,12 @@ def _origin(study: Study) -> str:
     return f"Data: {study.simulated.title}; " + (measured or "no measured pushes (give them with --data FOLDER)") + "."
 
 
-def _section_html(section: Section) -> list[str]:
+def _section_html(section: Section, lacks: str, files: Sequence[Mapping[str, str]]) -> list[str]:
     return [
-        html.heading(section.title, section.key),
-        *(html.finding(f.claim, f.verdict, f.sentence) for f in section.findings),
+        html.heading(heading(section.key, section.title), section.key),
+        *([html.paragraph(f"Grey: too little data for a verdict ({lacks}).")] if lacks else []),
+        *(html.finding(f.claim, f.verdict, f.sentence, bool(lacks)) for f in section.findings),
         *map(html.figure, section.pictures),
-        *map(_table_html, section.tables),
+        *(html.folded_table(t.caption, t.head, t.rows, f) for t, f in zip(section.tables, files, strict=True)),
         *([html.bullets(section.notes)] if section.notes else []),
     ]
-
-
-def _table_html(table: Table) -> str:
-    return html.table(table.caption, table.head, table.rows)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from push_predictor.reporting.canvas import Picture
+from push_predictor.reporting.html import NOTHING
 
 Verdict = Literal["holds", "holds in part", "does not hold", "not decided"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -17,13 +18,15 @@ Origin = Literal["paper", "beyond the paper"]
 class Finding:
     """A claim in our words, its verdict, and the evidence: numbers with intervals, then the rule of the verdict.
 
-    origin: the paper, or a question that the paper does not ask.
+    number: the one that decides, with its interval, for the summary. origin: the paper, or a question that the paper
+    does not ask.
     """
 
     claim: str
     verdict: Verdict
     sentence: str
     origin: Origin = "paper"
+    number: str = field(default=NOTHING, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ NO_RESULTS = (  # folders on which no cached result depends
     "online",
     "commands",
     "claims",
+    "presentation",
     "residuals",
 )
 

@@ -15,6 +15,7 @@ from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import save_rig
 
 BAG = str(REPOSITORY / "bags" / "hexagon_delrin")
+SOUND = str(REPOSITORY / "bags" / "square_abs_test")
 
 
 def wrong_rig(folder: Path, size: float) -> str:
@@ -25,8 +26,19 @@ def wrong_rig(folder: Path, size: float) -> str:
 
 
 def test_a_sound_recording_has_no_findings(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", SOUND, "--strict"]) == 0
+    assert capsys.readouterr().out == f"{SOUND}: no findings\n"
+
+
+def test_few_pushes_are_a_note_with_what_to_record_next(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BAG, "--strict"]) == 0
-    assert capsys.readouterr().out == f"{BAG}: no findings\n"
+    assert "note     few_pushes" in (text := capsys.readouterr().out) and "at least 20 more pushes" in text
+
+
+def test_the_json_contains_the_coverage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BAG, "--json", "-"]) == 0
+    coverage = json.loads(capsys.readouterr().out)["about"][BAG]["coverage"]
+    assert (coverage["pushes"], coverage["windows"]) == (10, sum(coverage["windows_by_side"]))
 
 
 def test_a_warning_fails_only_with_strict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -34,7 +46,7 @@ def test_a_warning_fails_only_with_strict(tmp_path: Path, capsys: pytest.Capture
     assert main(["check", BAG, "--rig", rig]) == 0
     assert "warning  outline_size" in capsys.readouterr().out
     assert main(["check", BAG, "--rig", rig, "--strict"]) == 1
-    assert capsys.readouterr().err == f"push_predictor check: {BAG}: outline_size\n"
+    assert capsys.readouterr().err.splitlines()[-1] == f"push_predictor check: {BAG}: outline_size"  # after progress
 
 
 def test_a_refusal_fails_and_is_in_the_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -43,3 +55,11 @@ def test_a_refusal_fails_and_is_in_the_json(tmp_path: Path, capsys: pytest.Captu
     (finding,) = content["data"][BAG]
     assert not content["sound"]
     assert (finding["name"], finding["severity"], finding["values"]["reach"]["unit"]) == ("units_rig", "refused", "m")
+
+
+def test_the_page_is_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "check.html"
+    assert main(["check", BAG, "--page", str(page)]) == 0
+    assert capsys.readouterr().out.endswith(f"page: {page}\n") and "No mistake was found." in page.read_text()
+    assert main(["check", BAG, "--page", str(tmp_path)]) == 1
+    assert "--page" in capsys.readouterr().err

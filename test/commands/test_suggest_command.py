@@ -54,7 +54,19 @@ def test_writes_the_suggested_pushes_in_order(folder: Path, capsys: pytest.Captu
 
 
 def test_keeps_to_the_limits_without_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    limits = ["--speed", "0.03", "0.05", "--angle", "-0.2", "0.4", "--travel", "0.02", "--exclude", "0.5", "1.0"]
+    limits = [
+        "--speed-range",
+        "0.03",
+        "0.05",
+        "--angle-range",
+        "-0.2",
+        "0.4",
+        "--travel",
+        "0.02",
+        "--exclude",
+        "0.5",
+        "1.0",
+    ]
     call = ["suggest", "--rig", str(folder / "rig.yaml"), "--count", "3", "--transfer-speed", "0.1", *limits]
     assert main([*call, "--out", str(folder / "first.csv"), "--json", "-"]) == 0
     found, shown = written(folder / "first.csv"), json.loads(capsys.readouterr().out)
@@ -80,7 +92,7 @@ def test_the_pushes_that_matter_may_be_given(folder: Path) -> None:
         (["MODEL", "--rig", "RIG"], 2, "either MODEL or --rig"),
         ([], 2, "either MODEL or --rig"),
         (["MODEL", "--count", "0"], 1, "count: 0"),
-        (["MODEL", "--speed", "0.05", "0.02"], 1, "speed: (0.05, 0.02)"),
+        (["MODEL", "--speed-range", "0.05", "0.02"], 1, "speed: (0.05, 0.02)"),
         (["MODEL", "--matter", "nowhere.csv"], 1, "nowhere.csv: no such file"),
         (["MODEL", "--covariate", "warmth"], 1, "--covariate: 'warmth'"),
         (["MODEL", "--seed", "-1"], 1, "--seed: -1"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from synthetic import square_rig
 
 from push_predictor.evaluation.ladder.ladder_page import write_ladder_page
-from push_predictor.evaluation.ladder.ladder_text import ladder_json, ladder_lines
+from push_predictor.evaluation.ladder.ladder_text import ladder_answer, ladder_json, ladder_lines
 from push_predictor.evaluation.ladder.scored_ladder import ScoredLadder, changed, score_ladder
 from push_predictor.models.mechanics.fit import FitRows, JointFit
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -70,9 +71,30 @@ def test_gain_is_per_push(ladder: ScoredLadder) -> None:
 
 def test_text_shows_steps_and_parameters(ladder: ScoredLadder) -> None:
     lines = ladder_lines(ladder)
+    assert tuple(lines[:3]) == ladder_answer(ladder) and not lines[3]
+    lines = lines[4:]
     assert lines[1].startswith("0     textbook") and lines[2].startswith("1     + body_anisotropy")
     assert any(line.strip().startswith("body_anisotropy  0.1 (0.09") for line in lines)
     assert "40 windows of 10 pushes" in lines[3]
+
+
+def test_answer_states_gain_evidence_and_action(ladder: ScoredLadder) -> None:
+    gain, evidence, action = ladder_answer(ladder)
+    share = 100.0 * (1.0 - ladder.steps[1].nmse.value / ladder.steps[0].nmse.value)
+    assert gain == f"1 fitted parameter reduces the squared error of held-out pushes by {share:.0f} %."
+    assert evidence.startswith("Their NMSE falls from 3.") and evidence.endswith("from 40 windows of 10 pushes.")
+    assert action == "Use this model. Score it on other pushes with `push_predictor evaluate`."
+
+
+def test_answer_of_few_pushes_asks_for_more() -> None:
+    few = made_up_ladder(windows_per_push=5)
+    assert ladder_answer(few)[2] == "Only 8 pushes are behind the choice. Record at least 10 and fit again."
+
+
+def test_answer_of_a_ladder_without_a_step_is_the_textbook(ladder: ScoredLadder) -> None:
+    gain, evidence, action = ladder_answer(replace(ladder, steps=ladder.steps[:1], final=[]))
+    assert gain.startswith("The textbook values suffice") and action.startswith("Use this model.")
+    assert evidence.startswith("Their NMSE is 3.") and "falls" not in evidence
 
 
 def test_json_has_what_the_reference_lists(ladder: ScoredLadder) -> None:
@@ -95,6 +117,6 @@ def test_changes_are_written_in_words() -> None:
 def test_page_is_self_contained_and_answers_first(ladder: ScoredLadder, tmp_path: Path) -> None:
     text = write_ladder_page(tmp_path / "m.ladder.html", ladder).read_text()
     assert "1 fitted parameter reduces the squared error of held-out pushes by" in text
-    assert text.index("fitted parameter reduces") < text.index("<img") < text.index("Steps")
+    assert text.index("fitted parameter reduces") < text.index("<svg") < text.index("<h2") < text.index("<img")
     assert "data:image/png;base64" in text and "http" not in text
     assert not list(tmp_path.glob("*.png"))

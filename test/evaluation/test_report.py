@@ -19,6 +19,7 @@ from scipy.stats import f, kstest, multivariate_t
 from push_predictor.errors import PushPredictorError, TableError
 from push_predictor.evaluation.metrics import standardised
 from push_predictor.evaluation.report.figures.calibration import LEVELS, coverage_curve, expected_counts
+from push_predictor.evaluation.report.figures.coverage import coverage_chart
 from push_predictor.evaluation.report.figures.ellipses import ellipse, inside
 from push_predictor.evaluation.report.figures.nearby import examples, spread_rows
 from push_predictor.evaluation.report.figures.push_maps import colour_scale
@@ -49,6 +50,7 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable, concatenate
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor.reporting import html
+from push_predictor.reporting.chart import Band, Line
 
 PICTURES = {"map_mean.png", "map_sd.png", "examples.png", "calibration.png", "residuals.png"}
 
@@ -446,6 +448,48 @@ def test_page_is_self_contained_and_escapes_all_text(page: Path) -> None:
     assert "Held-out <b>square</b> & co" in shown.text
     assert len(shown.alternatives) == len(shown.addresses) and all(shown.alternatives)
     assert "url(" not in page.read_text() and "@import" not in page.read_text()
+
+
+@pytest.mark.slow
+def test_page_opens_with_three_sentences_and_one_figure(page: Path) -> None:
+    text = page.read_text()
+    opening = text[text.index('<section class="opening">') : text.index("</section>")]
+    assert text.index("<h1>") < text.index('<section class="opening">') < text.index("<h2")
+    assert opening.count("<p>") == 3 and opening.count("<svg") - opening.count("<svg viewBox") == 1
+    assert "Nothing speaks against the model: 95 % intervals cover" in opening  # no alarm was given
+    assert '<span class="verdict">no objection</span>' in opening
+
+
+@pytest.mark.slow
+def test_every_table_is_folded(page: Path) -> None:
+    text = page.read_text()
+    assert text.count("<table") == text.count('<details class="tabular">') == 5 and "<details open" not in text
+    assert "<summary>Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than" in text
+
+
+def test_judgement_of_the_page_is_that_of_its_alarm(
+    models: list[PushModel],
+    comparisons: list[Comparison],
+    table: PushTable,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("push_predictor.evaluation.report.page.SECTIONS", ())  # the text alone
+    given = (tmp_path, "alarm", table, None, models[:1], comparisons[:1], {}, [])
+    for alarm, label in (({"fired": True}, "no longer fits"), ({"fired": False}, "fits")):
+        page = write_validation_report(*given, alarm=alarm).read_text()
+        assert f'<span class="verdict">{label}</span>' in page
+
+
+def test_coverage_chart_shows_each_output_and_its_band() -> None:
+    chart = coverage_chart(gaussian_comparison(0.5, pushes=40))
+    bands = [mark for mark in chart.marks if isinstance(mark, Band)]
+    lines = [mark for mark in chart.marks if isinstance(mark, Line)]
+    assert [line.name for line in lines] == ["as promised", "Δx", "Δy", "Δθ"] and len(bands) == 3
+    for band, line in zip(bands, lines[1:], strict=True):
+        assert np.all((band.low <= line.y) & (line.y <= band.high)) and line.kind == band.kind
+        assert np.all(line.y[5:-5] < line.x[5:-5])  # too narrow: below the diagonal, in percent
+        assert line.x[-1] == pytest.approx(98.0)
 
 
 def test_figures_and_numbers_are_written_next_to_the_page(page: Path, comparisons: list[Comparison]) -> None:

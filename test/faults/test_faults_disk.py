@@ -24,8 +24,9 @@ from synthetic import noisy_pushes, square_rig
 from trace_bench import drifting_folder, server_of
 
 from push_predictor.cli import main
-from push_predictor.commands import output
-from push_predictor.commands.output import write_text
+from push_predictor.commands.common import progress
+from push_predictor.commands.common.output import write_text
+from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import RecordingError
 from push_predictor.evaluation.report.page import write_validation_report
 from push_predictor.evaluation.validation import compare
@@ -186,7 +187,7 @@ def test_a_command_on_a_full_disk_ends_with_one_line(
 ) -> None:
     from push_predictor.recordings.rig import save_rig
 
-    monkeypatch.setattr(output, "PATIENCE", 600.0)  # no progress messages on a busy machine
+    monkeypatch.setattr(progress, "PATIENCE", 600.0)  # no progress messages on a busy machine
     inside, out = tmp_path / "in", tmp_path / "out"
     inside.mkdir()
     out.mkdir()
@@ -227,7 +228,8 @@ def test_a_trace_reports_which_result_could_not_be_written(
     pipe = Pipe()
     with full_disk():
         trace_process._run(pipe, task)  # type: ignore[arg-type]  # a pipe that records what it sends
-    assert pipe.sent[-1] == trace_process.Failed(f"[Errno 27] File too large: '{tmp_path}/result/trace.json'")
+    reason = f"[Errno 27] File too large: '{tmp_path}/result/trace.json'"
+    assert pipe.sent[-1] == trace_process.Failed(reason, ErrorCode.INVALID_FILE)
     assert not list(place.iterdir())
 
 

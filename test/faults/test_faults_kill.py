@@ -201,7 +201,7 @@ def test_a_killed_validator_leaves_its_data_and_the_next_one_keeps_them(
             with replaying(domain, rate=2.0) as replay:
                 assert wait_until(lambda: len(received) >= before + 20, 60.0)
                 kill(replay)
-            text = status.wait_for_message("No data for 5 s.", 60.0)
+            text = status.wait_for_message("No usable sample for 5 s.", 60.0)
             assert "Call `~/finish` to write the results." in text and status.values["state"] == "validating"
             assert finish(node).success
             (kept,) = tmp_path.glob("cut_off_*")

@@ -40,7 +40,12 @@ from push_predictor.nodes.network_security import DISCOVERY, RANGE, limit_discov
 from push_predictor.recordings.load import load_data, load_rig_for
 from push_predictor_interfaces.srv import Resume
 
-NODES = {"predict_server": "push_predictor", "push_replay": "push_replay", "push_validator": "push_validator"}
+NODES = {
+    "predict_server": "push_predictor",
+    "push_recorder": "push_recorder",
+    "push_replay": "push_replay",
+    "push_validator": "push_validator",
+}
 BAG = REPOSITORY / "bags" / "square_abs_test"
 SHORT = {"play.playback_duration.sec": 1, "play.exclude_topics_to_filter": ["surface/temperature"]}
 
@@ -171,7 +176,7 @@ def test_another_machine_discovers_a_node_only_on_request(asked: Mapping[str, st
     assert ("Other machines cannot discover this node" in log.read_text()) == (not asked)
 
 
-# --- health and policy: three nodes, /clock standing still ------------------------------------------------------------
+# --- health and policy: four nodes, /clock standing still ------------------------------------------------------------
 
 
 @dataclass
@@ -211,6 +216,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
         "predict_server": {"models": [str(model)], "autostart": False, "introspection": "metadata"},
         "push_replay": {"recording": BAG, "play.start_paused": True, "play.clock_publish_frequency": 0.0, **SHORT},
         "push_validator": {},
+        "push_recorder": {"bag": tmp_path_factory.mktemp("recorded") / "bag"},
     }
     domain = free_domain()
     with ExitStack() as stack:

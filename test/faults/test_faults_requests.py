@@ -35,6 +35,7 @@ from push_predictor.models.store.model_file import save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.nodes.parameters import Param, declare
+from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.server.prediction_services import handle_predict_push, handle_predict_push_batch
@@ -46,6 +47,7 @@ NAN, INF = math.nan, math.inf
 TABLES = {
     "predict_server": server_parameters.PARAMETERS,
     "push_validator": validator_parameters.PARAMETERS,
+    "push_recorder": recorder_parameters.PARAMETERS,
     "push_replay": replay_parameters.PARAMETERS,
 }
 

@@ -13,11 +13,20 @@ from scipy.special import ellipe
 from push_predictor.errors import RigError
 from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
+from push_predictor.geometry.shapes import (
+    SHAPES,
+    ellipse,
+    has_mirror_symmetry,
+    mirror_image,
+    shape_outline,
+    square,
+    transformed,
+)
 
 TRIANGLE = Outline(np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]]))
 ELL = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.1], [0.0, 0.1]]))
-OUTLINES = {name: shape_outline(name) for name in SHAPES} | {"triangle": TRIANGLE, "ell": ELL}
+MOVED = transformed(ellipse(0.0785, 0.0525), 0.4, (0.01, -0.02))
+OUTLINES = {name: shape_outline(name) for name in SHAPES} | {"triangle": TRIANGLE, "ell": ELL, "moved": MOVED}
 EVERY_OUTLINE = pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 CONVEX = pytest.mark.parametrize("name", [name for name in OUTLINES if name != "ell"])
 
@@ -41,13 +50,13 @@ def test_contacts_are_counter_clockwise_and_proportional_to_arc_length(outline):
 @EVERY_OUTLINE
 def test_pickle_does_not_depend_on_what_was_computed_before(outline):
     """Cached results of other functions are found by it."""
-    fresh = Outline(outline.vertices, outline.semi_axes)
+    fresh = Outline(outline.vertices, outline.semi_axes, outline.pose)
     before = pickle.dumps(fresh)
     assert fresh.perimeter > 0.0 and fresh.area > 0.0 and len(fresh.project(np.zeros((1, 2))).distance) == 1
     assert pickle.dumps(fresh) == before
     copy = pickle.loads(before)
     np.testing.assert_array_equal(copy.vertices, outline.vertices)
-    assert copy.semi_axes == outline.semi_axes
+    assert (copy.semi_axes, copy.pose) == (outline.semi_axes, outline.pose)
 
 
 @EVERY_OUTLINE
@@ -161,7 +170,7 @@ def test_end_of_an_edge_belongs_to_that_edge(outline):
 
 @pytest.mark.parametrize(
     ("name", "order"),
-    [("rect1", 4), ("ellip1", 0), ("ellip2", 2), ("ellip3", 2), ("hex", 6), ("triangle", 1), ("ell", 1)],
+    [("rect1", 4), ("ellip1", 0), ("ellip2", 2), ("ellip3", 2), ("hex", 6), ("triangle", 1), ("ell", 1), ("moved", 1)],
 )
 def test_rotational_symmetry(name, order):
     assert OUTLINES[name].rotational_symmetry == order
@@ -217,3 +226,37 @@ def test_invalid_outline_is_rejected(vertices, message):
 def test_unknown_shape_is_rejected_by_name():
     with pytest.raises(RigError, match="heptagon"):
         shape_outline("heptagon")
+
+
+# --- moved and mirrored ----------------------------------------------------------------------------------------------
+
+
+@EVERY_OUTLINE
+def test_a_transformed_outline_contains_the_scaled_turned_and_shifted_points(outline):
+    moved, centre = transformed(outline, 0.3, (0.02, -0.01), 1.1), outline.centroid
+    expected = centre + [0.02, -0.01] + rotate(1.1 * (outline.point(GRID) - centre), np.array(0.3))
+    assert moved.point(GRID) == pytest.approx(expected, abs=1e-8)
+    assert moved.centroid == pytest.approx(centre + [0.02, -0.01], abs=1e-12)
+    assert moved.inward_normal(GRID) == pytest.approx(rotate(outline.inward_normal(GRID), np.array(0.3)), abs=1e-6)
+    assert moved.polar_moment == pytest.approx(1.21 * outline.polar_moment)
+
+
+def test_a_turned_ellipse_keeps_its_symmetry_and_a_turned_circle_too():
+    assert transformed(shape_outline("ellip2"), 0.4).rotational_symmetry == 2
+    assert transformed(shape_outline("ellip1"), 0.4).rotational_symmetry == 0
+    assert transformed(shape_outline("ellip1"), 0.0, (0.001, 0.0)).rotational_symmetry == 1
+
+
+@EVERY_OUTLINE
+def test_a_mirror_image_has_its_points_at_the_negative_y(outline):
+    image = mirror_image(outline)
+    assert image.point(-GRID % 1.0) == pytest.approx(outline.point(GRID) * [1.0, -1.0], abs=1e-8)
+    assert image.area == pytest.approx(outline.area)
+
+
+def test_mirror_symmetry_is_that_of_any_axis():
+    assert all(has_mirror_symmetry(OUTLINES[name]) for name in (*SHAPES, "triangle", "ell", "moved"))
+    assert has_mirror_symmetry(transformed(TRIANGLE, 0.3, (0.1, 0.0)))
+    assert not has_mirror_symmetry(Outline(TRIANGLE.vertices * [1.0, 0.8]))
+    parallelogram = Outline(np.array([[0.0, 0.0], [0.1, 0.0], [0.13, 0.05], [0.03, 0.05]]))
+    assert not has_mirror_symmetry(parallelogram)

@@ -13,12 +13,13 @@ from support_points import support_of_points
 from push_predictor.errors import RequestError, RigError, TrainingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square
+from push_predictor.geometry.shapes import SHAPES, ellipse, shape_outline, square, transformed
 from push_predictor.models.mechanics.analytical import AnalyticalPush, fit_analytical
 from push_predictor.models.mechanics.forward import Motion
 from push_predictor.models.mechanics.limit_surface import Support, contact_force, uniform_support
 from push_predictor.models.mechanics.motion.recorded_push import TruePush
 from push_predictor.models.mechanics.parameters import RowValues
+from push_predictor.models.mechanics.pressure import patch
 
 RADIUS = 0.00475
 LEVER = 0.03  # m, at which a turn is compared with a shift
@@ -427,3 +428,13 @@ def test_rejects_nonfinite_request(column, name):
     inputs[1, column] = np.nan
     with pytest.raises(RequestError, match=name):
         AnalyticalPush(square(0.09), RADIUS).displacement(inputs, duration)
+
+
+def test_the_support_of_a_moved_ellipse_moves_with_it() -> None:
+    own, pose = ellipse(0.0785, 0.0525), (0.01, -0.02, 0.4)
+    moved = transformed(own, pose[2], pose[:2])
+    support = uniform_support(moved)
+    assert support.centre == pytest.approx(pose[:2])
+    assert support.length == pytest.approx(uniform_support(own).length)
+    expected = rotate(patch(own).points, np.array(pose[2])) + pose[:2]
+    np.testing.assert_allclose(patch(moved).points, expected, atol=1e-15)

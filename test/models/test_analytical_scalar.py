@@ -13,7 +13,7 @@ from synthetic import triangle
 from push_predictor.errors import RequestError
 from push_predictor.geometry.nearest import nearest_on
 from push_predictor.geometry.outline import Outline
-from push_predictor.geometry.shapes import shape_outline
+from push_predictor.geometry.shapes import shape_outline, transformed
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.limit_surface import Support
@@ -22,6 +22,7 @@ from push_predictor.models.mechanics.scalar.mechanics import FEW
 from push_predictor.models.mechanisms import LIBRARY, Push
 from push_predictor.types import Array
 
+MOVED = transformed(shape_outline("ellip3"), 0.4, (0.01, -0.02))
 NOTCHED = Outline(np.array([[-0.04, -0.03], [0.04, -0.03], [0.04, 0.03], [0.0, 0.005], [-0.04, 0.03]]))
 OUTLINES = {
     "square": shape_outline("rect1"),
@@ -40,11 +41,11 @@ def spread_pushes(n: int, seed: int = 0) -> tuple[Array, Array]:
     return inputs, rng.uniform(0.01, 0.5, n)
 
 
-@pytest.mark.parametrize("shape", [*OUTLINES, "notched"])
+@pytest.mark.parametrize("shape", [*OUTLINES, "notched", "moved"])
 @given(place=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)))
 @settings(max_examples=100, deadline=None)
 def test_the_nearest_point_is_that_of_the_outline(shape: str, place: tuple[float, float]) -> None:
-    outline = OUTLINES.get(shape, NOTCHED)
+    outline = {**OUTLINES, "notched": NOTCHED, "moved": MOVED}[shape]
     *point, nx, ny, distance = nearest_on(outline)(*place)  # of two that are equally near it may be either
     assert distance == pytest.approx(float(outline.project(np.array([place])).distance[0]), abs=1e-14)
     np.testing.assert_allclose(outline.project(np.array([point])).distance, 0.0, atol=1e-14)

@@ -34,6 +34,7 @@ from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated import tabulated_prior
 from push_predictor.models.tabulated.tabulated_model import tabulate, with_effect_table
 from push_predictor.models.train import train_model
+from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
@@ -508,13 +509,19 @@ def test_evaluate_names_the_missing_column_of_a_table(
     assert "covariate elapsed_time" in capsys.readouterr().err
 
 
+def turned_a_little(recording: Recording) -> Recording:
+    """A slider with a constant heading would be refused: its quaternions are probably in another order."""
+    heading = np.linspace(0.0, 1e-3, len(recording.slider))
+    return replace(recording, slider=replace(recording.slider, heading=heading))
+
+
 @pytest.mark.parametrize("covariate", ["elapsed_time", "topic:/warmth"])
 def test_validate_uses_covariates_of_windows_or_names_the_missing_one(
     bases: dict[str, PushModel], covariate: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     effect = replace(slippery(0.2), basis=replace(DRIFT, drivers=(covariate,)))
     save_model(extended(bases["gp"], effect), tmp_path / "m")
-    write_recording(tmp_path / "bag", translating_push())
+    write_recording(tmp_path / "bag", turned_a_little(translating_push()))
     status = main(["validate", str(tmp_path / "m"), str(tmp_path / "bag"), "--json", "-"])
     heard = capsys.readouterr()
     if covariate == "elapsed_time":

@@ -9,7 +9,7 @@ import pytest
 from supports import FOUR_POINTS, THREE_POINTS
 
 from push_predictor.geometry.nearest import contact_on
-from push_predictor.geometry.shapes import shape_outline
+from push_predictor.geometry.shapes import shape_outline, transformed
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
@@ -125,9 +125,10 @@ def test_no_travel_and_a_receding_pusher_move_nothing() -> None:
     assert not np.any(still.displacement(inputs, np.array([0.2, 0.2])))
 
 
+@pytest.mark.parametrize("moved", [False, True])
 @pytest.mark.parametrize("shape", ["rect1", "hex", "ellip3", "ellip1"])
-def test_point_and_normal_of_a_contact_are_those_of_the_outline(shape: str) -> None:
-    outline = shape_outline(shape)
+def test_point_and_normal_of_a_contact_are_those_of_the_outline(shape: str, moved: bool) -> None:
+    outline = transformed(shape_outline(shape), 0.4, (0.01, -0.02)) if moved else shape_outline(shape)
     contacts = np.concatenate([np.random.default_rng(0).random(50), outline.edge_starts[:-1], [np.nextafter(1.0, 0.0)]])
     found = np.array([contact_on(outline)(c) for c in contacts.tolist()])
     expected = np.column_stack([outline.point(contacts), outline.inward_normal(contacts)])

@@ -22,15 +22,14 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.tabulated import prediction_table
 from push_predictor.models.tabulated.interpolation import Axis, TensorSpline, along
-from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
-from push_predictor.models.tabulated.tabulated_model import (
+from push_predictor.models.tabulated.table_accuracy import (
     COVARIANCE_TOLERANCE,
     MEAN_TOLERANCE,
     TableAccuracy,
-    TabulatedModel,
     relative_error,
-    tabulate,
 )
+from push_predictor.models.tabulated.tabulated_domain import tabulated_domain
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
@@ -306,7 +305,7 @@ def test_spline_interpolates_knots_and_reproduces_cubics() -> None:
         return np.stack([x**3 - 2.0 * x * y**2 + 1.0, y**3 * x**2], axis=-1)
 
     knots = np.meshgrid(np.linspace(-1.0, 2.0, 6), np.linspace(0.0, 0.5, 8), indexing="ij")
-    spline = TensorSpline(axes, cubic(*knots)[None])
+    spline = TensorSpline.through(axes, cubic(*knots)[None])
     points = np.random.default_rng(0).uniform([-1.0, 0.0], [2.0, 0.5], (50, 2))
     points = np.concatenate([points, [[-1.0, 0.0], [2.0, 0.5]]])
     assert spline(points, 0) == pytest.approx(cubic(*points.T), abs=1e-12)
@@ -318,7 +317,7 @@ def test_halving_the_cells_divides_the_error_of_a_spline_by_sixteen() -> None:
     errors = []
     for cells in (40, 80):
         values = np.exp(np.sin(6.0 * np.linspace(0.0, 1.0, cells + 1)))
-        spline = TensorSpline([Axis(0.0, 1.0, cells)], values[None, :, None])
+        spline = TensorSpline.through([Axis(0.0, 1.0, cells)], values[None, :, None])
         errors.append(np.max(np.abs(spline(points, 0)[:, 0] - np.exp(np.sin(6.0 * points[:, 0])))[100:-100]))
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.15)
 

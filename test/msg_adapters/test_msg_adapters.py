@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -25,6 +27,7 @@ from msg_adapters.predictions import (
 )
 from msg_adapters.residuals import ValidatedWindow, residual_to_message
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
+from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.prediction import Prediction
@@ -101,10 +104,10 @@ def test_a_refusal_contains_its_reason_and_no_number():
 
     half_written = PredictPush.Response()
     fill_response(half_written, some_prediction(1))
-    response = refuse(half_written, "velocity: nan")
+    response = refuse(half_written, "velocity: nan", ErrorCode.INVALID_REQUEST)
     assert not np.any(response.mean)
     assert not np.any(response.covariance)
-    assert len(refuse(PredictPushBatch.Response(), "x").mean) == 0
+    assert len(refuse(PredictPushBatch.Response(), "x", ErrorCode.TOO_LARGE).mean) == 0
     with pytest.raises(RefusedError, match="velocity: nan"):
         prediction_from_response(response)
 
@@ -163,6 +166,7 @@ def window_of(covariance: np.ndarray, difference: np.ndarray) -> ValidatedWindow
         predicted,
         covariance,
         predicted + difference,
+        in_domain=False,
     )
 
 
@@ -190,6 +194,7 @@ def test_a_residual_survives():
     assert message.header.frame_id == "world"
     np.testing.assert_allclose(message.standardised, [1.0, -2.0, 2.0])
     assert stamp_to_ns(message.header.stamp) == window.stamp_ns
+    assert message.in_domain is False and residual_to_message(replace(window, in_domain=True)).in_domain
     for name in ("push_id", "window", "model", "duration", "predicted", "observed"):
         np.testing.assert_array_equal(getattr(message, name), getattr(window, name))
     np.testing.assert_array_equal([message.velocity, message.contact, message.angle], window.inputs)

@@ -54,6 +54,71 @@ def test_a_call_that_arrives_within_a_turn_waits_for_the_end_of_its_run() -> Non
     assert not finish.requested
 
 
+def ended_run(session: Session, finish: FinishService) -> None:
+    """A run that a caller ends, as far as its result."""
+    session.open(0.0)
+    finish.work()
+    assert session.drain_if_due(0.1, finish.requested, rig_changed=False)
+    finish.ending()
+    finish.answer()
+
+
+def test_samples_that_come_while_the_report_is_drawn_begin_a_run_that_goes_on() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=True)
+    finish = finish_service(service, session)
+    report = finish._writer.report
+    service.calls.append("first")
+    ended_run(session, finish)
+    session.written()
+    report.busy = True  # type: ignore[misc]
+    finish.answer()
+    assert not service.responses and not finish.requested, "nobody waits for the end of the next run"
+    session.open(0.2)
+    assert not session.drain_if_due(0.3, finish.requested, rig_changed=False)
+    finish.answer()
+    assert not service.responses
+    report.busy = False  # type: ignore[misc]
+    finish.answer()
+    finish.answer()
+    assert [caller for caller, _ in service.responses] == ["first"]
+    service.calls.append("second")
+    finish.work()
+    assert session.drain_if_due(0.4, finish.requested, rig_changed=False), "a later call ends the later run"
+
+
+def test_callers_of_two_runs_are_answered_when_the_report_is_drawn() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=True)
+    finish = finish_service(service, session)
+    finish._writer.report.busy = True  # type: ignore[misc]
+    for caller in ("first", "second"):
+        service.calls.append(caller)
+        ended_run(session, finish)
+        session.written()
+        finish.answer()
+    service.calls.append("third")
+    finish.work()
+    finish.answer()
+    assert not service.responses
+    finish._writer.report.busy = False  # type: ignore[misc]
+    finish.answer()
+    assert sorted(caller for caller, _ in service.responses) == ["first", "second", "third"]
+
+
+def test_a_caller_gets_the_failure_of_its_own_run() -> None:
+    service, session = Service(), Session(last_answers=30.0, report=False)
+    finish = finish_service(service, session)
+    finish._writer.report.busy = True  # type: ignore[misc]
+    service.calls.append("caller")
+    ended_run(session, finish)
+    session.failed("disk full")
+    finish.answer()
+    session.drain_if_due(0.2, finish_requested=True, rig_changed=False)
+    session.written()
+    finish._writer.report.busy = False  # type: ignore[misc]
+    finish.answer()
+    assert [(r.success, r.message) for _, r in service.responses] == [(False, "disk full")]
+
+
 def test_all_callers_get_the_reason_why_no_run_can_begin() -> None:
     service = Service()
     finish = finish_service(service, Session(last_answers=30.0, report=False), missing="no model")

@@ -1,4 +1,4 @@
-"""The launch file starts the three nodes with parameters that they declare.
+"""The launch files start the nodes with parameters that they declare.
 
 launch and launch_ros cannot be installed together with the ROS wheels. Fakes replace the few names that the file uses,
 and the tests check what the file passes to them.
@@ -18,12 +18,15 @@ import pytest
 from ros_harness import REPOSITORY
 
 from push_predictor.nodes import predict_server
+from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 
 FILE = REPOSITORY / "launch" / "push_predictor.launch.py"
+RECORD = REPOSITORY / "launch" / "record.launch.py"
 PARAMETERS = {
     "predict_server": predict_server.PARAMETERS,
+    "push_recorder": recorder_parameters.PARAMETERS,
     "push_replay": replay_parameters.PARAMETERS,
     "push_validator": validator_parameters.PARAMETERS,
 }
@@ -44,8 +47,18 @@ def fake_action(name: str) -> type[FakeAction]:
 
 
 @pytest.fixture
-def launch_file(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+def launch_file(launch_packages: None) -> dict[str, Any]:
     """The names that the launch file defines."""
+    return runpy.run_path(str(FILE))
+
+
+@pytest.fixture
+def record_file(launch_packages: None) -> dict[str, Any]:
+    return runpy.run_path(str(RECORD))
+
+
+@pytest.fixture
+def launch_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     needed = {
         "launch": ("LaunchContext", "LaunchDescription"),
         "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable"),
@@ -56,7 +69,6 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         made = ModuleType(module)
         vars(made).update({name: fake_action(name) for name in names})
         monkeypatch.setitem(sys.modules, module, made)
-    return runpy.run_path(str(FILE))
 
 
 def actions(launch_file: dict[str, Any]) -> list[FakeAction]:
@@ -91,6 +103,11 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "rate",
         "output",
         "rig",
+        "slider_topic",
+        "pusher_topic",
+        "wrench_topic",
+        "wrench_frame",
+        "world_frame",
         "rviz",
         "rviz_config",
     ]
@@ -108,6 +125,17 @@ def test_discovery_is_limited_to_this_machine_unless_the_environment_sets_it(
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", outside)
     (setting,) = (action for action in actions(launch_file) if type(action).__name__ == "SetEnvironmentVariable")
     assert setting.args == ("ROS_AUTOMATIC_DISCOVERY_RANGE", inside)
+
+
+def test_the_validator_gets_the_topics_of_a_laboratory(launch_file):
+    given = {
+        "slider_topic": "/vicon/block/block",
+        "pusher_topic": "/tf:tool0",
+        "wrench_topic": "/ft",
+        "world_frame": "map",
+    }
+    assert parameters(nodes(launch_file, **given)["push_validator"]) == given
+    assert given.keys().isdisjoint(parameters(nodes(launch_file)["push_validator"]))
 
 
 def test_three_nodes_start_with_their_parameters(launch_file):
@@ -149,11 +177,12 @@ def test_executables_are_installed_under_their_node_names(launch_file):
         assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
 
 
-def test_nodes_run_in_their_enclaves_of_the_policy(launch_file):
+def test_nodes_run_in_their_enclaves_of_the_policy(launch_file, record_file):
     policy = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
     enclaves = {enclave.attrib["path"] for enclave in policy.iter("enclave")}
     started = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
-    assert {node["arguments"][-1] for node in started.values()} == enclaves
+    recorder = nodes(record_file, enclave="/push_predictor/push_recorder")["push_recorder"]
+    assert {node["arguments"][-1] for node in [*started.values(), recorder]} == enclaves
     for executable, node in started.items():
         assert node["arguments"][-2:] == ["--enclave", f"/push_predictor/{executable}"]
 
@@ -181,6 +210,31 @@ def test_rviz_is_optional_and_uses_the_installed_configuration(launch_file):
     assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()
     own = nodes(launch_file, rviz="1", rviz_config="own.rviz")["rviz2"]
     assert own["arguments"] == ["-d", str(Path.cwd() / "own.rviz")]
+
+
+def test_the_recorder_gets_what_was_given_and_nothing_else(record_file):
+    given = {
+        "bag": "monday",
+        "rig": "~/rig.yaml",
+        "slider_topic": "/tf:block",
+        "covariate_topics": "/warmth, /driver.x",
+    }
+    (node,) = nodes(record_file, **given, duration="60", use_sim_time="true", namespace="cell").values()
+    assert (node["executable"], node["name"], node["namespace"]) == ("push_recorder", "push_recorder", "cell")
+    assert (REPOSITORY / "scripts" / "run" / "push_recorder").exists()
+    assert parameters(node) == {
+        "bag": str(Path.cwd() / "monday"),
+        "rig": str(Path.home() / "rig.yaml"),
+        "slider_topic": "/tf:block",
+        "covariate_topics": ["/warmth", "/driver.x"],
+        "duration": 60.0,
+        "use_sim_time": True,
+    }
+    table = {row.name: row for row in PARAMETERS["push_recorder"]}
+    values = parameters(nodes(record_file, **given, force="true", duration="2.5")["push_recorder"])
+    assert values["force"] is True and all(table[name].allows(value) for name, value in values.items())
+    plain = nodes(record_file, params_file="/p.yaml")["push_recorder"]
+    assert plain["parameters"] == ["/p.yaml", {}]
 
 
 def test_launch_file_is_installed():

@@ -30,6 +30,7 @@ from msg_adapters.predictions import (
 from push_predictor.errors import RequestError
 from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.store.table_cache import load_served
 from push_predictor.models.tabulated.tabulated_model import tabulate
 from push_predictor.models.train import train_model
 from push_predictor.nodes import predict_server
@@ -78,7 +79,7 @@ def test_serves_a_model_that_was_trained_on_no_push(tmp_path):
         assert running.push([0.02, 0.1, 0.2], duration=0.7).success
         assert not running.push([0.5, 0.1, 0.2]).in_domain
         answered = prediction_from_response(running.batch(MANY))
-    expected = tabulate(model).predict_rows(MANY, np.full(len(MANY), 0.2))
+    expected = load_served(tmp_path / "prior.model").predict_rows(MANY, np.full(len(MANY), 0.2))
     np.testing.assert_allclose(answered.covariance, expected.covariance, rtol=1e-9)
 
 
@@ -102,8 +103,16 @@ def test_empty_name_means_the_default_model(server):
 def test_push_outside_the_domain_is_predicted_and_flagged(server):
     assert server.push().in_domain
     far = server.push([0.2, 0.1, 0.2])
-    assert far.success
-    assert not far.in_domain
+    assert far.success and far.error_code == far.NONE
+    assert not far.in_domain and far.message.startswith("out of domain: velocity 0.2 m/s, training covers ")
+    batch = server.batch([[0.02, 0.1, 0.2], [0.2, 0.1, 0.2]])
+    assert batch.success and batch.message.startswith("out of domain: 1 of 2 pushes, first push 1: velocity 0.2 m/s")
+
+
+def test_duration_zero_means_the_models_own_window(server):
+    own = server.list().models[1].window_duration
+    assert list(server.push(duration=0.0).mean) == list(server.push(duration=own).mean)
+    assert list(server.batch(MANY, 0.0).mean) == list(server.batch(MANY, own).mean)
 
 
 def test_empty_batch_gets_empty_arrays(server):
@@ -207,7 +216,7 @@ def test_one_bad_push_refuses_the_batch_by_index(server, field, value):
     assert not len(response.mean)
 
 
-@pytest.mark.parametrize("duration", [np.nan, np.inf, 0.0, -0.2, 5.0])
+@pytest.mark.parametrize("duration", [np.nan, np.inf, -0.2, 5.0])
 def test_rejects_bad_duration(server, duration):
     for response in (
         server.push(duration=duration),
@@ -225,7 +234,7 @@ def test_analytical_model_predicts_long_pushes(server):
 
 def test_rejects_unknown_model_and_lists_loaded_names(server):
     for response in (server.push(model="nobody"), server.batch(MANY, model="nobody")):
-        assert not response.success
+        assert not response.success and response.error_code == response.UNKNOWN_MODEL
         assert response.message == "model: 'nobody' is not accepted, give one of analytical, gp, vhgp"
 
 
@@ -453,7 +462,8 @@ def test_inactive_node_refuses_requests(folder):
             active = step == Transition.TRANSITION_ACTIVATE
             assert server.push().success == server.batch(MANY).success == active
             assert list(server.list().names) == ["gp"]
-        assert server.push().message == "the node is inactive: activate it"
+        refused = server.push()
+        assert refused.message == "the node is inactive: activate it" and refused.error_code == refused.NOT_ACTIVE
         assert "the node is inactive" in server.process.text()
         assert server.change(Transition.TRANSITION_CLEANUP)
         assert server.change(Transition.TRANSITION_CONFIGURE)

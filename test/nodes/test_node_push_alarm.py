@@ -144,6 +144,7 @@ def test_a_change_during_a_replay_raises_one_alarm(changed: Outcome, validated):
     order = list(dict.fromkeys(window.push_id for window in windows))
     assert order.index(alarm.push_id) >= CHANGE_AT - 1 and alarm.pushes == order.index(alarm.push_id) + 1
     assert alarm.log10_evidence >= 2.0 and alarm.false_alarm_rate == 0.01
+    assert alarm.score == changed.result["alarm"]["score"] and alarm.model == changed.result["model"]
     stamp = alarm.header.stamp.sec * 10**9 + alarm.header.stamp.nanosec
     assert stamp == max(window.end for window in windows if window.push_id == alarm.push_id)
     assert [late.push_id for late in changed.late] == [alarm.push_id], "a later subscriber receives it too"

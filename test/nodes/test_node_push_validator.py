@@ -226,7 +226,8 @@ def test_the_schema_in_the_bag_is_the_installed_message():
     own = RESIDUAL_DEFINITION.split("=" * 80)[0].split("\n")
     written = {name: kind for kind, name in map(str.split, filter(None, own))}
     installed = {
-        name: kind.replace("double", "float64") for name, kind in PushResidual.get_fields_and_field_types().items()
+        name: kind.replace("double", "float64").replace("boolean", "bool")
+        for name, kind in PushResidual.get_fields_and_field_types().items()
     }
     assert list(written.items()) == list(installed.items())
 
@@ -410,7 +411,8 @@ class StubServer:
     def _answer(self, request: PredictPush.Request, response: PredictPush.Response) -> PredictPush.Response:
         self.asked += 1
         if self.asked <= 3:
-            response.message = "the node is inactive: activate it"  # about the server's state: the validator asks again
+            response.message = "the node is inactive: activate it"
+            response.error_code = PredictPush.Response.NOT_ACTIVE  # the server's state: the validator asks again
             return response
         response.success, response.mean = True, [0.004, 0.0, 0.0]
         response.covariance = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-3]
@@ -420,7 +422,9 @@ class StubServer:
         elif kind == 1:
             response.covariance = [0.0] * 9
         elif kind == 2:
-            response = PredictPush.Response(success=False, message="angle: 1.6 is not accepted, give less")
+            response = PredictPush.Response(
+                success=False, message="angle: 1.6 is not accepted, give less", error_code=2
+            )
         return response
 
 
@@ -551,21 +555,23 @@ def pose(frame: str = "world", x: float = 0.0, w: float = 1.0) -> PoseStamped:
     return message
 
 
+def subscribed(node: Node, topic: str) -> list[ReliabilityPolicy]:
+    return [info.qos_profile.reliability for info in node.get_subscriptions_info_by_topic(topic)]
+
+
 def test_unusable_messages_are_counted_by_kind(domain: int, models):
     overrides = ("-p", "qos_overrides./slider/pose.subscription.reliability:=best_effort")
     with ros_context(domain) as node, validator(domain, *overrides, model=models["gp"]) as process:
         status = Status(node)
         slider, pusher = (node.create_publisher(PoseStamped, f"{name}/pose", 100) for name in ("slider", "pusher"))
         wrench = node.create_publisher(WrenchStamped, "pusher/wrench", 100)
-        node.create_publisher(WrenchStamped, "pusher/wrench", qos_profile_sensor_data)  # best effort: nothing arrives
+        node.create_publisher(WrenchStamped, "pusher/wrench", qos_profile_sensor_data)  # the other one is reliable
         rig = node.create_publisher(String, "rig", LATCHED)  # created last: who has received it knows the others too
         for publisher in (slider, pusher, wrench):
             assert wait_until(lambda publisher=publisher: publisher.get_subscription_count() > 0)
-        (info,) = node.get_subscriptions_info_by_topic("/slider/pose")
-        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-        (info,) = node.get_subscriptions_info_by_topic("/pusher/pose")
-        assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-        process.wait_for_text("offering incompatible QoS")
+        assert subscribed(node, "/slider/pose") == [ReliabilityPolicy.BEST_EFFORT]
+        assert subscribed(node, "/pusher/pose") == [ReliabilityPolicy.RELIABLE]
+        assert wait_until(lambda: subscribed(node, "/pusher/wrench") == [ReliabilityPolicy.BEST_EFFORT])
 
         rig.publish(String(data='{"shape": "rect1"}'))
         assert "outline" in status.wait_for_message("push_rig lacks")
@@ -594,7 +600,7 @@ def test_no_markers_are_made_while_nobody_subscribes(monkeypatch: pytest.MonkeyP
     for subscribers in (0, 1):
         topic = SimpleNamespace(get_subscription_count=lambda count=subscribers: count, publish=lambda message: None)
         node = SimpleNamespace(create_publisher=lambda *of_what, topic=topic: topic, get_logger=lambda: None)
-        publishers.ResultPublishers(node, "world").publish("rig", 0, "window", "prediction", "residual")
+        publishers.ResultPublishers(node, lambda: "world").publish("rig", 0, "window", "prediction", "residual")
         assert len(made) == subscribers
 
 

@@ -117,7 +117,13 @@ def test_message_reports_samples_that_leave_the_domain(ask: Ask) -> None:
     assert ask(covariance=np.zeros((3, 3)), steps=[[0.02, 0.1, 0.1, 0.2]]).message == ""
     response = ask(steps=[STEPS[0], [0.5, 0.1, 0.1, 0.2]])
     assert response.success
-    assert response.message.startswith("100 % of the samples leave the domain of the training data, from steps[1] on")
+    expected = "out of domain: 100 % of the samples leave the domain of the training data, from steps[1] on"
+    assert response.message.startswith(expected)
+
+
+def test_duration_zero_of_a_step_means_the_models_own_window(ask: Ask) -> None:
+    zero, own = (ask(steps=[[0.02, 0.1, 0.1, duration], STEPS[1]]) for duration in (0.0, 0.2))
+    assert zero.success and zero.poses == own.poses
 
 
 @pytest.mark.parametrize(
@@ -136,7 +142,7 @@ def test_message_reports_samples_that_leave_the_domain(ask: Ask) -> None:
 )
 def test_rejects_bad_request_by_field_and_value(ask: Ask, change: dict[str, Any], message: str) -> None:
     response = ask(**change)
-    assert not response.success and message in response.message
+    assert not response.success and message in response.message and response.error_code != response.NONE
     assert response.poses == [] and len(response.samples) == 0
 
 

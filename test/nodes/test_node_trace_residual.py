@@ -101,13 +101,14 @@ def test_second_goal_is_refused_and_a_cancelled_trace_leaves_no_files(
     first = server.trace(drifting, covariates=[])
     worker = server.held(first)
     status, result = server.trace(tmp_path / "other").end()
-    assert status == GoalStatus.STATUS_ABORTED and not result.success
+    assert status == GoalStatus.STATUS_ABORTED and not result.success and result.error_code == result.BUSY
     assert "one at a time" in result.message and "deployed" in result.message
     assert not (tmp_path / "other").exists() and not first.ended
 
     first.handle.cancel_goal_async()
     status, result = first.end()
     assert status == GoalStatus.STATUS_CANCELED and not result.success and "cancelled" in result.message
+    assert result.error_code == result.CANCELLED
     assert names(drifting) == before and worker not in server.workers()
     assert server.push().success
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from importlib import import_module
 from types import FrameType
 from typing import Any
 
@@ -61,6 +62,7 @@ def no_node(stop: Stop) -> Any:
         (["--help", "--ros-args", "-p", "rate:=2.0"], 0, "out", "usage: push_replay"),
         (["recordng:=bags/square_abs_test"], 2, "err", "unrecognized arguments: recordng:=bags/square_abs_test"),
         (["--ros-args", "-r", "__ns:=/cell", "--", "--typo"], 2, "err", "unrecognized arguments: --typo"),
+        (["--versio"], 2, "err", "unrecognized arguments: --versio"),
         (["--rate", "3", "--ros-args", "-r", "__ns:=/cell"], 2, "err", "unrecognized arguments: --rate 3"),
     ],
 )
@@ -70,6 +72,21 @@ def test_help_version_and_unknown_arguments_start_no_node(
     with pytest.raises(SystemExit) as end:
         run("push_replay", no_node, arguments)
     assert end.value.code == status and words in getattr(capsys.readouterr(), stream)
+
+
+@pytest.mark.parametrize("node", ["predict_server", "push_replay", "push_validator"])
+@pytest.mark.parametrize(("argument", "status"), [("--version", 0), ("--help", 0), ("--typo", 2)])
+def test_every_node_answers_before_ros_starts(
+    node: str, argument: str, status: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rclpy.init", lambda **_: pytest.fail("rclpy was started"))
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "")  # push_replay sets it, for the tests after this one too
+    monkeypatch.setattr(sys, "argv", [node, argument])
+    with pytest.raises(SystemExit) as end:
+        import_module(f"push_predictor.nodes.{node}").main()
+    printed = capsys.readouterr()
+    assert end.value.code == status and (printed.err == "") is (status == 0)
+    assert node in printed.out or f"push_predictor {__version__}\n" == printed.out or status == 2
 
 
 @pytest.mark.parametrize("arguments", [[], ["--ros-args", "-p", "rate:=2.0"], ["--ros-args", "-r", "__ns:=/a", "--"]])

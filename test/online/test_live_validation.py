@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,8 +146,17 @@ def test_predictions_in_any_order_give_the_comparison_of_the_table(models: dict[
 
 def test_residuals_are_ordered_by_window_and_model(models: dict[str, PushModel]):
     windows = made_up_windows(5)
-    found = [(name, window.start) for name, window, _, _ in answered(models, windows, shuffle=3).residuals()]
+    found = [(each.model, each.window.start) for each in answered(models, windows, shuffle=3).residuals()]
     assert found == [(name, window.start) for window in windows for name in models]
+
+
+def test_residuals_keep_whether_the_push_was_in_the_domain(models: dict[str, PushModel]):
+    windows, live = made_up_windows(3), LiveValidation(models)
+    for inside, window in zip((True, False, True), windows, strict=True):
+        prediction = predict(live.models[0], window)
+        live.record(0, live.add(window), replace(prediction, in_domain=np.array([inside])))
+    assert [each.in_domain for each in live.residuals()] == [True, False, True]
+    assert [each.window.start for each in live.residuals()] == [window.start for window in windows]
 
 
 def test_windows_without_a_prediction_are_counted_and_not_scored(models: dict[str, PushModel]):

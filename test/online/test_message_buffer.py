@@ -131,8 +131,25 @@ def test_a_full_buffer_drops_the_oldest_and_counts_them(monkeypatch: pytest.Monk
     for k in range(305):
         buffer.put(pose(*GOOD, nanosec=k))
     assert len(buffer) <= 100 and len(buffer) + buffer.dropped == 305
+    assert len(buffer._sent) == len(buffer)
     stamp, _ = buffer.take()
     assert stamp[-1] == 7_000_000_304 and np.all(np.diff(stamp) == 1)
+
+
+def test_a_conversion_applies_to_the_messages_that_come_after_it():
+    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD))
+    buffer.convert_by(lambda messages, sent: [pose(*GOOD, frame="map", nanosec=time) for time in sent], "map")
+    assert len(buffer) == 0 and buffer.dropped == 1 and len(buffer.recent()[0]) == 0
+    for sent in (3, 4):
+        buffer.put(b"of another type", sent, received=10 * sent)
+    stamp, received, frames = buffer.recent()
+    assert (stamp.tolist(), received.tolist(), frames) == ([7_000_000_003, 7_000_000_004], [30, 40], {"map"})
+    assert buffer.take()[0].tolist() == [7_000_000_003, 7_000_000_004] and not buffer.rejected
+
+
+def test_unreadable_messages_are_not_among_the_recent_ones():
+    buffer = filled(MessageBuffer(SLIDER, "world"), pose(*GOOD), b"", pose(*GOOD))
+    assert [len(part) for part in buffer.recent()] == [2, 2, 1]
 
 
 def test_messages_and_a_bag_of_them_give_the_same_streams(tmp_path: Path):
@@ -162,7 +179,7 @@ def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(mo
     monkeypatch.setattr(sensor_subscriber, "monotonic", lambda: now[0])
     slider: list[bytes] = []
     wrench: list[bytes] = []
-    subscriber: Any = SimpleNamespace(_buffers={"slider": slider, "wrench": wrench}, _empty=0.0)
+    subscriber: Any = SimpleNamespace(_buffers={"slider": slider, "wrench": wrench}, _empty=0.0, _settled=True)
     subscriber._scalars = SimpleNamespace(waiting=lambda: True)
     complete = sensor_subscriber.SensorSubscriber.complete
     assert not complete(subscriber), "no message yet"
@@ -174,3 +191,7 @@ def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(mo
     wrench.append(b"force")
     subscriber._empty = now[0]
     assert complete(subscriber), "messages of every topic"
+    subscriber._settled = False
+    assert not complete(subscriber), "the root of the tree may not be known yet"
+    now[0] += 1.1
+    assert complete(subscriber)

@@ -198,6 +198,7 @@ def test_a_change_of_a_source_that_matters_changes_the_fingerprint(copied_packag
         "push_predictor_paper/claims/data.py",
         "push_predictor_paper/figures/__init__.py",
         "push_predictor_paper/report.py",
+        "push_predictor_paper/presentation/places.py",
     ],
 )
 def test_a_change_of_layout_keeps_the_fingerprint(copied_packages: Path, name: str) -> None:

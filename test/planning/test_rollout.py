@@ -11,7 +11,7 @@ import pytest
 from synthetic import RADIUS, square_rig
 
 from benchmarks.planning.rollout_truth import EnergyDistance
-from push_predictor.errors import RequestError
+from push_predictor.errors import CovariateError, RequestError
 from push_predictor.geometry.frames import rotate, to_world, wrap_angle
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.geometry.touch import covariance_in_world, displaced
@@ -351,7 +351,7 @@ def test_accepts_a_singular_start_covariance() -> None:
 class Attentive:
     """A predictor that needs covariates, and remembers what it was given."""
 
-    learnt, integrates, effects, covariates, tails = False, True, (), (), None
+    learnt, integrates, effects, covariates, tails, own_limits = False, True, (), (), None, None
     needs: tuple[str, ...]
     seen: list[Push] = field(default_factory=list)
 
@@ -360,9 +360,6 @@ class Attentive:
         self.seen.append(push)
         covariance = np.zeros((len(push.inputs), 3, 3))
         return np.tile([1e-3, 0.0, 0.1], (len(push.inputs), 1)), covariance, covariance
-
-    def in_own_domain(self, inputs: Array) -> None:
-        """Its training rows bound its domain."""
 
 
 def test_pose_covariates_are_those_of_each_sample() -> None:
@@ -401,11 +398,38 @@ def test_anisotropic_friction_uses_the_heading_of_each_sample() -> None:
     assert moved[0] != pytest.approx(moved[1], abs=1e-5)
 
 
-def test_rejects_a_covariate_that_the_pose_does_not_give_by_name() -> None:
+def test_given_covariates_apply_to_all_windows_of_their_step() -> None:
+    predictor = Attentive(("slider_x", "elapsed_time"))
+    model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
+    steps, given = [[0.02, 0.125, 0.0, 0.4], [0.02, 0.125, 0.0, 0.2]], {"elapsed_time": np.array([7.0, 9.0])}
+    start = np.array([0.3, 0.0, 0.0])
+    rollout(model, start, CERTAIN, steps, 2, persistence=INDEPENDENT, covariates=given)
+    assert [push.covariates["elapsed_time"].tolist() for push in predictor.seen] == [[7.0, 7.0], [7.0, 7.0], [9.0, 9.0]]
+    assert predictor.seen[0].covariates["slider_x"].tolist() == [0.3, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {},
+            r"^steps\[0\]\.covariate elapsed_time: 'missing' is not accepted, give a finite number",
+        ),
+        ({"elapsed_time": [1.0, np.nan]}, r"^steps\[1\]\.covariate elapsed_time: nan is not accepted"),
+        (
+            {"elapsed_time": [1.0, 1.0], "slider_heading": [0.1, 0.1]},
+            r"^covariate_names: 'slider_heading' is not accepted",
+        ),
+    ],
+)
+def test_rejects_covariates_that_are_missing_not_finite_or_known_from_the_pose(
+    given: dict[str, list[float]], message: str
+) -> None:
     predictor = Attentive(("slider_heading", "elapsed_time"))
     model = replace(model_with(CERTAIN), predictor=predictor)  # type: ignore[arg-type]  # a predictor of the test's own
-    with pytest.raises(RequestError, match=r"made.*this one needs elapsed_time$"):
-        rollout(model, AT_REST, CERTAIN, [PUSH], 3)
+    covariates = {name: np.array(values) for name, values in given.items()}
+    with pytest.raises(CovariateError, match=message):
+        rollout(model, AT_REST, CERTAIN, [PUSH, PUSH], 3, covariates=covariates)
 
 
 # --- what the benchmark measures by ---------------------------------------------------------------------------------

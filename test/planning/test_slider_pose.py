@@ -25,13 +25,14 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel, tabulate
 from push_predictor.models.train import train_model
 from push_predictor.planning.slider_pose import MAX_DEPTH, MAX_GAP, SliderAfter, WorldPush, slider_after
+from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.windows.cut import pusher_motion
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import windows_to_table
-from push_predictor.recordings.windows.track import NANOSECOND, Track
+from push_predictor.recordings.windows.track import Track
 
 RADIUS, SPEED, DURATION = 0.00475, 0.02, 0.2
 TOLD = ("slider_x", "slider_y", "slider_heading", "push_heading", "contact_gap")

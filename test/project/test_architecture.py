@@ -149,7 +149,7 @@ def test_the_simulator_knows_no_model() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("node", ["predict_server", "push_replay", "push_validator"])
+@pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay", "push_validator"])
 def test_a_node_starts_without_the_slow_packages_of_scipy(node: str) -> None:
     """They take 0.6 s to import. A node needs no optimiser, and push_predictor.normal_scores replaces scipy.stats."""
     slow = {"scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.spatial"}

@@ -19,16 +19,18 @@ import push_predictor
 from push_predictor.cli import COMMANDS, build_parser
 from push_predictor.geometry.shapes import SHAPES, shape_outline
 from push_predictor.nodes.parameters import Param
+from push_predictor.nodes.recorder import parameters as recorder_parameters
 from push_predictor.nodes.replay import parameters as replay_parameters
 from push_predictor.nodes.server import parameters as server_parameters
 from push_predictor.nodes.validator import parameters as validator_parameters
 from push_predictor.nodes.validator.scalar_subscriber import CLOCK
-from push_predictor.nodes.validator.sensor_subscriber import TOPICS
 from push_predictor.online.live_validation import MAIN_RESULT
 from push_predictor.recordings.rig import Rig, load_rig
+from push_predictor.recordings.topics import DEFAULT_TOPICS
 
 NODES: dict[str, tuple[str, tuple[Param, ...]]] = {
     "predict_server": ("push_predictor", tuple(server_parameters.PARAMETERS)),
+    "push_recorder": ("push_recorder", tuple(recorder_parameters.PARAMETERS)),
     "push_replay": ("push_replay", tuple(replay_parameters.PARAMETERS)),
     "push_validator": ("push_validator", tuple(validator_parameters.PARAMETERS)),
 }
@@ -99,7 +101,7 @@ def test_the_table_of_the_validators_parameters_is_that_of_the_code():
     assert written == {row.name: (row.default, row.description) for row in validator_parameters.PARAMETERS}
 
 
-@pytest.mark.parametrize("node", ["predict_server", "push_replay"])
+@pytest.mark.parametrize("node", ["predict_server", "push_recorder", "push_replay"])
 def test_the_reference_page_lists_every_parameter_with_its_default(node: str):
     rows = table(REFERENCE / f"{node}.md", "Parameters")
     written = {row[0].strip("`"): yaml.safe_load(row[1].strip("`")) for row in rows}
@@ -114,7 +116,7 @@ def test_the_table_of_the_validators_topics_names_what_it_uses():
     modules = [nodes / "push_validator.py", *sorted((nodes / "validator").rglob("*.py"))]
     code = "".join(path.read_text() for path in modules)
     calls = r"create_(?:subscription|publisher|client|service)\(\s*\w+, \"([^\"]+)\""
-    used = {*re.findall(calls, code), *(topic for _, _, topic, _ in TOPICS), CLOCK}
+    used = {*re.findall(calls, code), DEFAULT_TOPICS.slider, DEFAULT_TOPICS.pusher, DEFAULT_TOPICS.wrench, CLOCK}
     rows = table(REFERENCE / "push_validator.md", "Topics and services")
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row[0])} == used
 

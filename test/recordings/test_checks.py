@@ -8,10 +8,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mistakes import (
+    MISTAKES,
+    Mistake,
+    force_in_slider_frame,
+    force_turned,
+    heading_in_degrees,
+    late,
+    outline_altered,
+    tracked,
+)
 from repository import REPOSITORY
 
-from push_predictor.geometry.frames import rotate, wrap_angle
-from push_predictor.geometry.outline import Outline
 from push_predictor.recordings.checks.check import check_recording, check_table
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.checks.frames import mirrored, swapped
@@ -46,20 +54,6 @@ def bag_apothem(name: str) -> float:
     return float(np.linalg.norm(0.5 * (corners[0] + corners[1])))
 
 
-def altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
-    """The rig with an outline turned, then shifted, then scaled; for polygons."""
-    vertices = size * (rotate(rig.outline.vertices, np.array(yaw)) + shift)
-    return replace(rig, outline=Outline(vertices))
-
-
-def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:
-    """The recording of a tracked frame whose origin is at `shift` in the slider's, turned by `yaw` against it."""
-    slider = recording.slider
-    move = rotate(np.array(shift), slider.heading)
-    heading = wrap_angle(slider.heading + yaw)
-    return replace(recording, slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=heading))
-
-
 @pytest.mark.parametrize("name", BAGS)
 def test_the_bags_give_no_finding(name: str) -> None:
     assert check_recording(bag(name), rig_of(name)) == ()
@@ -92,7 +86,7 @@ def test_a_turn_that_the_outline_does_not_show_is_no_finding(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["hexagon_delrin", "square_abs_test", "square_abs_train"])
 def test_a_wrong_size_is_found(name: str) -> None:
-    finding = found(bag(name), altered(rig_of(name), size=1.03))["outline_size"]
+    finding = found(bag(name), outline_altered(rig_of(name), size=1.03))["outline_size"]
     assert finding.values["scale"].value == pytest.approx(1 / 1.03, abs=0.003)
     half = 45.0 if name.startswith("square") else 1e3 * bag_apothem(name)
     stated = re.search(r", (-\d+\.\d) mm a side", finding.sentence)
@@ -100,7 +94,7 @@ def test_a_wrong_size_is_found(name: str) -> None:
 
 
 def test_a_wrong_size_seen_from_one_side_is_reported_with_its_rival() -> None:
-    finding = found(bag(ONE_SIDE), altered(rig_of(ONE_SIDE), size=1.03))["outline_shifted"]
+    finding = found(bag(ONE_SIDE), outline_altered(rig_of(ONE_SIDE), size=1.03))["outline_shifted"]
     assert "Or the size is wrong" in finding.advice
 
 
@@ -142,11 +136,13 @@ def test_a_slider_that_never_moves_is_refused() -> None:
 
 
 @pytest.mark.parametrize("lag", [0.05, -0.05])
-@pytest.mark.parametrize("name", ["square_abs_test", "square_abs_train"])
-def test_clocks_apart_are_found_with_the_lag(name: str, lag: float) -> None:
-    slider = bag(name).slider
-    late = replace(bag(name), slider=replace(slider, stamp=slider.stamp + int(lag * 1e9)))
-    assert found(late, rig_of(name))["clocks_apart"].values["lag"].value == pytest.approx(lag, abs=0.015)
+@pytest.mark.parametrize("name", BAGS)
+def test_clocks_apart_are_found_with_lag_and_sd(name: str, lag: float) -> None:
+    finding = found(late(bag(name), lag), rig_of(name))["clocks_apart"]
+    estimate = finding.values["lag"]
+    assert estimate.value == pytest.approx(lag, abs=0.02 if name == ONE_SIDE else 0.015)
+    assert estimate.sd is not None and 0.0 < estimate.sd < 0.005
+    assert f"{1e3 * abs(estimate.value):.0f} ms {'late' if lag > 0.0 else 'early'} (sd " in finding.sentence
 
 
 @pytest.mark.parametrize("stream", ["slider", "pusher"])
@@ -158,7 +154,7 @@ def test_millimetres_are_refused_by_name(stream: str) -> None:
 
 
 def test_a_rig_in_millimetres_is_refused() -> None:
-    assert "units_rig" in found(bag(SMALL), altered(rig_of(SMALL), size=1e3))
+    assert "units_rig" in found(bag(SMALL), outline_altered(rig_of(SMALL), size=1e3))
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e3])
@@ -189,6 +185,26 @@ def test_a_wrench_along_other_axes_is_named(name: str) -> None:
     assert wrench is not None
     wrong = replace(bag(name), wrench=replace(wrench, fx=-wrench.fy, fy=wrench.fx))
     assert list(found(wrong, rig_of(name))) == ["wrench_frame"]
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("mistake", [force_in_slider_frame, lambda recording: force_turned(recording, -np.pi / 2.0)])
+def test_a_wrench_in_the_sliders_or_a_turned_frame_is_named(name: str, mistake: Mistake) -> None:
+    assert list(found(mistake(bag(name)), rig_of(name))) == ["wrench_frame"]
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_heading_in_degrees_is_refused(name: str) -> None:
+    finding = found(heading_in_degrees(bag(name)), rig_of(name))["units_heading"]
+    assert finding.severity == "refused" and "degrees" in finding.sentence
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_each_mistake_of_the_list_is_found_alone(name: str) -> None:
+    mistake, finding, severity = MISTAKES[name]
+    findings = check_recording(mistake(bag(SMALL)), rig_of(SMALL))
+    assert (findings[0].name, findings[0].severity) == (finding, severity)
+    assert len(findings) == (2 if name == "both in mm" else 1)
 
 
 @pytest.mark.parametrize(

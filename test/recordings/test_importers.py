@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_predictor.errors import ImportSourceError
+from push_predictor.errors import ImportSourceError, RecordingError
 from push_predictor.geometry.frames import rotate, to_body
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers import import_source
@@ -373,6 +373,32 @@ def test_import_overwrites_nothing_and_a_failure_writes_nothing(tmp_path: Path) 
     with pytest.raises(ImportSourceError, match="does not exist"):
         import_source("mit", [good, tmp_path / "absent.json"], tmp_path / "out2")
     assert not (tmp_path / "out2").exists()
+
+
+def test_import_replaces_earlier_results_if_asked_but_no_folder_that_is_no_bag(tmp_path: Path) -> None:
+    streams, out = _mit_streams(), tmp_path / "out"
+    source = _write_mit(tmp_path, streams)
+    (bag,) = import_source("mit", [source], out).written
+    (bag / "metadata.yaml").write_text("earlier")
+    assert import_source("mit", [source], out, overwrite=True).written == (bag,)
+    assert (bag / "metadata.yaml").read_text() != "earlier"
+    assert [path.name for path in out.iterdir()] == [bag.name]
+    (bag / "notes.txt").write_text("not of a bag")
+    with pytest.raises(RecordingError, match="exists and is not a bag"):
+        import_source("mit", [source], out, overwrite=True)
+    assert (bag / "notes.txt").exists() and [path.name for path in out.iterdir()] == [bag.name]
+    rows = _square_csv(tmp_path / "t.csv.gz")
+    table, rig = import_source("mit-square", [rows], out).written
+    table.write_text("earlier")
+    assert import_source("mit-square", [rows], out, overwrite=True).written == (table, rig)
+    assert table.read_text() != "earlier"
+
+
+def test_import_reports_the_share_of_the_files_that_is_done(tmp_path: Path) -> None:
+    seen: list[float] = []
+    sources = [_square_csv(tmp_path / f"{name}.csv.gz") for name in "ab"]
+    import_source("mit-square", sources, tmp_path / "out", watch=lambda stage, fraction: seen.append(fraction))
+    assert seen == [0.0, 0.5, 1.0]
 
 
 def test_unknown_kind_and_missing_source_are_rejected(tmp_path: Path) -> None:

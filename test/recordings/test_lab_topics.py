@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rosbags")
-from lab_bags import LATENCY, Lab, pose_rows, short_recording
+from lab_bags import LATENCY, Lab, pose_rows, robot_in_tf, short_recording
 
 from push_predictor.cli import main
 from push_predictor.errors import RecordingError
@@ -45,8 +45,8 @@ def table(recording: Recording) -> PushTable:
     return windows_to_table(find_windows(recording, recording.rig))
 
 
-def assert_same_windows(found: Recording) -> None:
-    one, other = table(found), table(replace(original(), name=found.name))
+def assert_same_windows(found: Recording, wanted: Recording | None = None) -> None:
+    one, other = table(found), table(replace(wanted or original(), name=found.name))
     tolerance = {"rtol": 0.0, "atol": 1e-9}  # of rounding: a heading becomes a quaternion and a heading again
     assert len(one) == len(other) > 10 and one.push_id.tolist() == other.push_id.tolist()
     np.testing.assert_allclose(one.inputs, other.inputs, **tolerance)
@@ -113,27 +113,7 @@ def test_a_wrench_in_a_field_is_read(tmp_path: Path) -> None:
 
 
 def tf_lab(world: str = "world") -> Lab:
-    """A block below a static camera, and a robot of two moving joints and a static tool."""
-    lab, slider, pusher = Lab(), original().slider, original().pusher
-    block, tip = pose_rows(slider), pose_rows(pusher)
-    camera = normalised(np.array([[0.4, -0.2, 1.1, 0.1, 0.7, -0.2, 0.5]]))
-    base = normalised(np.array([[-0.5, 0.3, 0.02, 0.0, 0.0, 0.6, 0.8]]))
-    tool = normalised(np.array([[0.01, 0.02, 0.03, 0.5, -0.5, 0.1, 0.7]]))
-    n = len(pusher)
-    angle = np.linspace(0.0, 1.0, n)
-    arm = normalised(np.column_stack([angle, -angle, angle**2, np.sin(angle), np.zeros((n, 2)), np.cos(angle)]))
-    rows = {"camera": camera, "base": base, "tool": tool}
-    everywhere = {name: np.repeat(row, n, axis=0) for name, row in rows.items()}
-    in_arm = composed(inverted(composed(everywhere["base"], arm)), composed(tip, inverted(everywhere["tool"])))
-    first = slider.stamp[:1]
-    lab.transform("/tf_static", world, "camera", first, camera)
-    lab.transform("/tf_static", f"/{world}", "/base", first, base)
-    lab.transform("/tf_static", "wrist", "tip", first, tool)
-    seen = composed(inverted(np.repeat(camera, len(slider), axis=0)), block)
-    lab.transform("/tf", "camera", "block", slider.stamp, seen)
-    lab.transform("/tf", "base", "arm", pusher.stamp, arm)
-    lab.transform("/tf", "arm", "wrist", pusher.stamp, in_arm)
-    return lab
+    return robot_in_tf(original(), world)
 
 
 @pytest.mark.parametrize("world", ["world", "map"])
@@ -183,7 +163,7 @@ def test_a_coarser_transform_is_interpolated_and_its_dropout_is_kept(tmp_path: P
     [
         (Topics("/tf:blok", "/tf:tip"), r"slider_topic '/tf:blok' \(option --slider-topic\): no frame 'blok'; .*block"),
         (Topics("/tf:block", "/tf:camera"), r"pusher_topic '/tf:camera' .*never moves in 'world'"),
-        (Topics("/tf:block", "/tf:tip", world="table"), r"no frame 'table'; the frames are arm, base"),
+        (Topics("/tf:block", "/tf:tip", world="table"), r"lab: world_frame 'table' .*: no frame 'table'; .* arm, base"),
         (Topics("/tf:block", "/tf"), r"pusher_topic '/tf' .*TFMessage', give a frame, as in /tf:block"),
         (Topics("/tf:block", "/tf_static:island"), "no frame 'island'"),
     ],
@@ -264,7 +244,7 @@ def matrix(row: np.ndarray) -> np.ndarray:
         (replace(NAMES, wrench="/ft"), rf"wrench_topic '/ft' \(option --wrench-topic\): {ABSENT}"),
         (replace(NAMES, covariates=("/heat",)), rf"covariate_topics '/heat' \(option --covariate-topic\): {ABSENT}"),
         (Topics(pusher=UR), r"no topic /slider/pose of geometry_msgs/msg/PoseStamped; .*; give --slider-topic$"),
-        (replace(NAMES, pusher="/joints"), r"'/joints' .*JointState', which has no pose; record /tf .*in /tf:tool0"),
+        (replace(NAMES, pusher="/joints"), r"'/joints' .*JointState', which has no pose; take it .*in /tf:tool0"),
         (replace(NAMES, pusher="/netft"), r"WrenchStamped'; no field of it is a pose, geometry_msgs/msg/PoseStamped"),
         (replace(NAMES, wrench=UR), r"wrench_topic .*TransformStamped'; no field of it is a wrench"),
         (replace(NAMES, pusher=f"{UR}.pose"), r"has no pose in field 'pose', give one of .*: /ur5/tool0_pose.tr"),
@@ -323,6 +303,8 @@ def test_saved_topics_come_back(tmp_path: Path, topics: Topics) -> None:
 def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
     (tmp_path / "lab.recording.yaml").write_text("frames: {slider: block, pusher: tip, world: base}\n")
     assert load_topics(tmp_path / "lab.mcap") == Topics("/tf:block", "/tf:tip", world="base")
+    (tmp_path / "lab.recording.yaml").write_text("world_frame: base\n")
+    assert load_topics(tmp_path / "lab.mcap") == Topics(world="base")
 
 
 @pytest.mark.parametrize(
@@ -333,6 +315,7 @@ def test_frames_may_be_given_in_the_file(tmp_path: Path) -> None:
         ("slider_topic: ''", "slider_topic is '', give a name"),
         ("covariate_topics: /a", "covariate_topics is '/a', give a list of topics"),
         ("frames: {tip: a}", "frames is {'tip': 'a'}, give a mapping with the keys slider, pusher, world"),
+        ("frames: {world: a}\nworld_frame: b", "gives both world_frame and frames world, give one of them"),
         ("frames: {slider: a}\nslider_topic: /b", "gives both slider_topic and frames slider, give one of them"),
         ("- a", r"contains \['a'\], give the keys slider_topic"),
         ("a: [", "cannot be read"),
@@ -370,10 +353,19 @@ def test_topics_are_not_saved_before_the_recording_was_read(tmp_path: Path) -> N
     assert not (tmp_path / "lab.recording.yaml").exists()
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "validate", "trace", "suggest", "report", "info", "doctor"])
+@pytest.mark.parametrize(
+    "command", ["train", "evaluate", "validate", "trace", "suggest", "report validation", "info", "doctor"]
+)
 def test_every_command_that_reads_recordings_has_the_options(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main([command, "--help"])
+        main([*command.split(), "--help"])
     shown = capsys.readouterr().out
-    for option in ("--slider-topic", "--pusher-topic", "--wrench-topic", "--covariate-topic", "--save-topics"):
+    for option in (
+        "--slider-topic",
+        "--pusher-topic",
+        "--wrench-topic",
+        "--covariate-topic",
+        "--wrench-frame",
+        "--save-topics",
+    ):
         assert option in shown

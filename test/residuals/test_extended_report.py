@@ -116,7 +116,7 @@ def test_report_of_an_extended_model_names_the_covariates_of_its_maps(
     save_model(model, tmp_path / "extended.pushmodel")
     save_model(base, tmp_path / "plain.pushmodel")
     models = [str(tmp_path / f"{name}.pushmodel") for name in ("extended", "plain")]
-    call = ["report", "validation", "--model", *models, "--recording", str(BAG), "--out", str(tmp_path / "out")]
+    call = ["report", "validation", *models, "--recording", str(BAG), "--out", str(tmp_path / "out")]
     assert main([*call, "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     page = html.unescape(Path(found["report"]).read_text())

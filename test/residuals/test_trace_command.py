@@ -61,7 +61,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def run(place: Path, *options: str) -> int:
-    return main(["trace", str(place / "new.csv"), "--model", str(place / "deployed.pushmodel"), *options])
+    return main(["trace", str(place / "deployed.pushmodel"), str(place / "new.csv"), *options])
 
 
 @pytest.mark.slow
@@ -127,7 +127,8 @@ def test_prints_verdict_worth_and_held_out_figures_without_json(
     found(extended)
     assert run(place) == 0
     text = capsys.readouterr().out
-    assert text.startswith("Contact friction changes with elapsed time: 0.0")
+    assert text.startswith("Contact friction changes with elapsed time.\n")
+    assert "\nContact friction changes with elapsed time: 0.0" in text
     assert "The motion model is extended." in text and extended.held_out.digest in text
     for name in ("before", "refit", "after"):
         assert f"\n{name} " in text
@@ -154,7 +155,6 @@ def test_saved_extended_model_predicts_the_same(place: Path, tmp_path: Path, fou
         (["--seed", "-1"], ["--seed"]),
         (["--covariates", "elapsed_time,,x"], ["--covariates", "commas"]),
         (["--covariates", "topic:/absent"], ["topic:/absent", "elapsed_time", "slider_x"]),
-        (["--model", "absent.pushmodel"], ["absent.pushmodel"]),
         (["--rig", "absent.yaml"], ["absent.yaml"]),
         (["--and", "absent"], ["absent", "no such file"]),
     ],
@@ -255,18 +255,16 @@ def test_prints_the_verdict_when_the_model_cannot_be_written(
     monkeypatch.setattr("push_predictor.models.store.model_file.save_model", fail)
     assert run(place, "--save-model", str(tmp_path / "extended.pushmodel")) == 1
     printed = capsys.readouterr()
-    assert printed.out.startswith("Contact friction changes with") and "extended model:" not in printed.out
+    assert printed.out.startswith("Contact friction changes with") and "extended model: extended" not in printed.out
     assert printed.err == "push_predictor trace: extended.pushmodel: No space left on device\n"
 
 
 def test_rejects_missing_data_by_name(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trace", "absent.csv", "--model", str(place / "deployed.pushmodel")]) == 1
+    assert main(["trace", str(place / "deployed.pushmodel"), "absent.csv"]) == 1
     assert "absent.csv: no such file or folder" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "call", [["trace"], ["trace", "new.csv"], ["trace", "new.csv", "--model", "m", "--alpha", "x"]]
-)
+@pytest.mark.parametrize("call", [["trace"], ["trace", "new.csv"], ["trace", "m", "new.csv", "--alpha", "x"]])
 def test_a_wrong_call_exits_with_2(call: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(call)

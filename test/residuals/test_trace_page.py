@@ -212,7 +212,7 @@ def test_page_answers_before_it_proves(pages: Callable[[str], str]) -> None:
     assert page.index("<svg") < page.index("<h2")  # the key picture
 
 
-def test_fifteen_candidates_are_open_and_the_others_folded(pages: Callable[[str], str]) -> None:
+def test_fifteen_candidates_come_first_and_the_others_are_folded_apart(pages: Callable[[str], str]) -> None:
     page = pages("effect")
     section = page[page.index("What else was tested") : page.index("What remains")]
     shown, folded = section.split("<details>")
@@ -220,7 +220,7 @@ def test_fifteen_candidates_are_open_and_the_others_folded(pages: Callable[[str]
     assert "The other 9 pairs" in folded and "<details open" not in page
 
 
-def test_found_candidate_is_open_however_large_its_p(tmp_path: Path) -> None:
+def test_found_candidate_comes_first_however_large_its_p(tmp_path: Path) -> None:
     trace = trace_of("effect")
     tested = tuple(replace(t, p_value=0.9) if t.covariate == "elapsed_time" else t for t in trace.tested)
     page = write_trace_report(tmp_path / "trace.html", replace(trace, tested=tested)).read_text()
@@ -346,8 +346,23 @@ def test_input_shift_beside_another_verdict_is_a_warning(tmp_path: Path) -> None
 
 def test_input_shift_reaches_json_and_terminal() -> None:
     trace = trace_of("input_shift")
-    assert summary_lines(trace)[0].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
-    assert summary_lines(trace)[1].endswith("Train on pushes in the new range, then trace again.")
+    lines = summary_lines(trace)
+    assert lines[4].startswith("Pushing speed is now 100 to 150 mm/s, in training 10 to 50 mm/s: 97 %")
+    assert lines[5].endswith("Train on pushes in the new range, then trace again.")
+
+
+@pytest.mark.parametrize("name", ["none", "effect", "input_shift"])
+def test_terminal_begins_with_the_sentences_of_the_page(name: str) -> None:
+    trace = trace_of(name)
+    assert summary_lines(trace)[:4] == [*(sentence.replace("−", "-") for sentence in answer(trace)), ""]
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_tables_are_folded_except_the_pushes_to_make(pages: Callable[[str], str], name: str) -> None:
+    page = pages(name)
+    folded = sum(part.count("<table") for part in re.findall(r"<details.*?</details>", page, re.S))
+    open_tables = page.count("<table") - folded
+    assert folded and open_tables == int("Pushes that would separate the rivals." in page)
 
 
 def test_json_lists_the_input_shift() -> None:

@@ -12,6 +12,7 @@ from repository import REPOSITORY
 
 from push_predictor.geometry.frames import quaternion_of_yaw
 from push_predictor.recordings.bag.writer import BagWriter
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import RECORD_NAME, Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
@@ -115,6 +116,30 @@ class Lab:
             for stamp, topic, data in self.in_order():
                 writer.write(topic, stamp, data)
         return path
+
+
+def robot_in_tf(recording: Recording, world: str = "world") -> Lab:
+    """A block below a static camera, and a robot of two moving joints and a static tool."""
+    lab, slider, pusher = Lab(), recording.slider, recording.pusher
+    block, tip = pose_rows(slider), pose_rows(pusher)
+    camera = normalised(np.array([[0.4, -0.2, 1.1, 0.1, 0.7, -0.2, 0.5]]))
+    base = normalised(np.array([[-0.5, 0.3, 0.02, 0.0, 0.0, 0.6, 0.8]]))
+    tool = normalised(np.array([[0.01, 0.02, 0.03, 0.5, -0.5, 0.1, 0.7]]))
+    n = len(pusher)
+    angle = np.linspace(0.0, 1.0, n)
+    arm = normalised(np.column_stack([angle, -angle, angle**2, np.sin(angle), np.zeros((n, 2)), np.cos(angle)]))
+    rows = {"camera": camera, "base": base, "tool": tool}
+    everywhere = {name: np.repeat(row, n, axis=0) for name, row in rows.items()}
+    in_arm = composed(inverted(composed(everywhere["base"], arm)), composed(tip, inverted(everywhere["tool"])))
+    first = slider.stamp[:1]
+    lab.transform("/tf_static", world, "camera", first, camera)
+    lab.transform("/tf_static", f"/{world}", "/base", first, base)
+    lab.transform("/tf_static", "wrist", "tip", first, tool)
+    seen = composed(inverted(np.repeat(camera, len(slider), axis=0)), block)
+    lab.transform("/tf", "camera", "block", slider.stamp, seen)
+    lab.transform("/tf", "base", "arm", pusher.stamp, arm)
+    lab.transform("/tf", "arm", "wrist", pusher.stamp, in_arm)
+    return lab
 
 
 def pose_rows(stream: PoseStream) -> Any:

@@ -32,9 +32,10 @@ NEEDED = {
 EXTRAS = {
     "report": (("matplotlib", "jinja2"), "report pages"),
     "live": (("rich",), "progress bars and the live table of the demonstration"),
+    "completion": (("argcomplete",), "completion in the shell"),
     "import": (("rosbags", "h5py"), "ROS 1 bags, and `import` of the MIT push data set"),
 }
-NODES = ("predict_server", "push_replay", "push_validator")
+NODES = ("predict_server", "push_recorder", "push_replay", "push_validator")
 MODULES = {"PyYAML": "yaml"}
 ENOUGH = 200e6  # bytes: a recording of some minutes and a report
 
@@ -71,10 +72,11 @@ def recording_reads(given: Path | None, topics: Topics | None = None) -> Finding
     """Check that a recording (default: a simulated one) can be read and contains pushes."""
     try:
         from push_predictor.recordings.describe import describe_recording
+        from push_predictor.recordings.topics import Topics
 
         with tempfile.TemporaryDirectory(prefix="push_predictor_doctor_") as folder:
             path = given or _simulated(Path(folder))
-            found = describe_recording(path, *([topics] if topics else []))
+            found = describe_recording(path, topics or Topics())
     except Exception as error:  # as above
         return _broken("recording", _words(error), _OF_A_RECORDING)
     source = str(given) if given else "simulated recording"

@@ -34,6 +34,7 @@ from push_predictor.models.push_model import PushModel
 from push_predictor.models.train import retrain_model
 from push_predictor.recordings.table import OUTPUTS, PushTable
 from push_predictor.types import Array, IntArray
+from push_predictor.watch import Watch, no_watch, watched
 
 FOLDS = 2
 FEWEST_PUSHES = 10  # calibration pushes; with fewer even hundreds of pushes give no evidence
@@ -102,23 +103,33 @@ def alarm_state(
 
 
 def recording_alarm(
-    model: PushModel, windows: PushTable, comparison: Comparison, rate: float = DEFAULT_RATE
+    model: PushModel,
+    windows: PushTable,
+    comparison: Comparison,
+    rate: float = DEFAULT_RATE,
+    watch: Watch = no_watch,
 ) -> dict[str, object]:
-    """The field `alarm` of the JSON of `validate`. Raises RequestError for a rate outside (0, 1)."""
+    """The field `alarm` of the JSON of `validate`; watch: as in `calibrate`.
+
+    Raises RequestError for a rate outside (0, 1).
+    """
     checked_rate(rate)
     try:
-        calibration = calibrate(model)
+        calibration = calibrate(model, watch)
     except RequestError as error:
         return alarm_json(None, str(error))
     return alarm_json(alarm_state(calibration, windows, comparison.mean, comparison.covariance, rate))
 
 
-def calibrate(model: PushModel) -> Calibration:
-    """Score a model's training pushes by cross-validation. Raises RequestError for fewer than FEWEST_PUSHES."""
+def calibrate(model: PushModel, watch: Watch = no_watch) -> Calibration:
+    """Score a model's training pushes by cross-validation. Raises RequestError for fewer than FEWEST_PUSHES.
+
+    watch: called before each refit of the model.
+    """
     table = model.training
     if len(table.pushes) < FEWEST_PUSHES:
         raise RequestError("training pushes of the model", len(table.pushes), f"at least {FEWEST_PUSHES}")
-    mean, covariance = held_out_moments(model)
+    mean, covariance = held_out_moments(model, watch)
     mechanisms = tuple(mechanism for mechanism in LIBRARY if _computable(mechanism, table))
     blank = Calibration(_kinds(mechanisms), np.empty((0, 0)), mechanisms, model.base.predictor.physics, np.empty(0))
     rows = [np.flatnonzero(table.push_id == push) for push in table.pushes]
@@ -127,7 +138,7 @@ def calibrate(model: PushModel) -> Calibration:
     return replace(known, scores=np.array([_scores(known, [(a[r], b[r]) for a, b in parts]) for r in rows]))
 
 
-def held_out_moments(model: PushModel) -> tuple[Array, Array]:
+def held_out_moments(model: PushModel, watch: Watch = no_watch) -> tuple[Array, Array]:
     """Mean (n, 3) and covariance (n, 3, 3) for the training windows, by the model without their half of the pushes.
 
     Effects are kept, and so are models that are not learnt: they have few parameters. Hyperparameters are kept where
@@ -136,15 +147,15 @@ def held_out_moments(model: PushModel) -> tuple[Array, Array]:
     predictor, rows, folds = model.predictor, model.training, push_folds(model.training, FOLDS)
     push = Push(rows.inputs, rows.duration, rows.covariates)
     of_base = replace(rows, outcomes=rows.outcomes - predictor.shift(push).mean)
-    base = _by_refits(model.base, of_base, folds) if predictor.learnt else None
+    base = _by_refits(model.base, of_base, folds, watch) if predictor.learnt else None
     moments = model.held_out_moments(folds) if base is None else predictor.with_effects(base, push)
     return moments.mean, moments.covariance
 
 
-def _by_refits(base: PushModel, rows: PushTable, folds: IntArray) -> Moments | None:
+def _by_refits(base: PushModel, rows: PushTable, folds: IntArray, watch: Watch) -> Moments | None:
     """Moments at the rows by the base refitted on those of the other folds; None where these are too few."""
     found = Moments(*(np.empty((len(rows), *shape)) for shape in ((3,), (3, 3), (3, 3))))
-    for fold in range(FOLDS):
+    for fold in watched(range(FOLDS), watch, "alarm: refit"):
         own = folds == fold
         try:
             model = retrain_model(base, rows.take(np.flatnonzero(~own)))

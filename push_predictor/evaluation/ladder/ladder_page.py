@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.evaluation.ladder.ladder_text import COLUMNS, count, interval, ladder_rows, unit
+from push_predictor.evaluation.ladder.ladder_text import COLUMNS, count, interval, ladder_answer, ladder_rows, unit
 from push_predictor.evaluation.ladder.scored_ladder import FittedParameter, ScoredLadder
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.reporting import html
 from push_predictor.reporting.canvas import NEARBY, OBSERVED, PREDICTED, Picture, draw, grid
+from push_predictor.reporting.chart import Bars, Chart, limits_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,12 +30,17 @@ METHOD = (
     "Score the model on other pushes with push_predictor evaluate.",
 )
 
+ERROR = (
+    "Total NMSE of held-out pushes after each step, with 95 % intervals. Step 0 has the textbook values. Hover over a "
+    "point to see what its step adds."
+)
+
 
 def write_ladder_page(path: Path, ladder: ScoredLadder) -> Path:
     """Write the page; return its path. Raises OSError, or PushPredictorError without matplotlib or Jinja2."""
     with TemporaryDirectory() as folder:
         parts = _parts(Path(folder), ladder)
-    write_whole(path, html.page(f"Fitted mechanics of the model `{ladder.model.name}`", parts).encode())
+    write_whole(path, html.page(f"Fitted mechanics of the model {ladder.model.name}", parts).encode())
     return path
 
 
@@ -42,32 +48,42 @@ def _parts(folder: Path, ladder: ScoredLadder) -> list[str]:
     steps = [(f"{row[0]}  {row[1]}", *row[2:]) for row in ladder_rows(ladder)]
     head = ["Step and free parameters", *(column[0].upper() + column[1:] for column in COLUMNS[2:])]
     parts = [
-        html.paragraph(_answer(ladder), "lead"),
-        html.figure(_picture(folder, ladder)),
+        html.opening(ladder_answer(ladder), _label(ladder), html.charts([error_chart(ladder)], ERROR)),
         html.heading("Fitted parameters"),
-        html.table(
-            "Values with 95 % intervals from the variation between pushes.", PARAMETER_HEAD, _parameter_rows(ladder)
+        html.figure(_picture(folder, ladder)),
+        html.folded_table(
+            "Fitted parameters. Values with 95 % intervals from the variation between pushes.",
+            PARAMETER_HEAD,
+            _parameter_rows(ladder),
         ),
         html.heading("Steps"),
-        html.table(f"Scores by cross-validation over whole pushes: {count(ladder)}.", head, steps),
+        html.folded_table(f"Scores by cross-validation over whole pushes: {count(ladder)}.", head, steps),
         html.heading("Method"),
         html.bullets(METHOD),
     ]
     return parts
 
 
-def _answer(ladder: ScoredLadder) -> str:
-    first, last = ladder.steps[0], ladder.steps[-1]
-    if len(ladder.steps) == 1:
-        return f"The textbook values suffice: no fitted parameter clearly improves held-out scores ({count(ladder)})."
-    change = f"from {first.nmse.text('.3f')} to {last.nmse.text('.3f')}"
-    share = 100.0 * (1.0 - last.nmse.value / first.nmse.value)
-    number = len(ladder.final)
-    fitted = "1 fitted parameter reduces" if number == 1 else f"{number} fitted parameters reduce"
-    return (
-        f"{fitted} the squared error of held-out pushes by {share:.0f} %. "
-        f"Their NMSE falls {change} (95 % intervals in brackets)."
+def error_chart(ladder: ScoredLadder) -> Chart:
+    """The held-out squared error after each step, with 95 % intervals."""
+    ends = np.array([[step.nmse.value, step.nmse.low, step.nmse.high] for step in ladder.steps])
+    number, names = (
+        np.arange(len(ends), dtype=np.float64),
+        [f"{k}: {step.change}" for k, step in enumerate(ladder.steps)],
     )
+    return Chart(
+        label="Squared error of held-out pushes after each step of the ladder",
+        x_label="step",
+        y_label="held-out NMSE",
+        x=(-0.5, len(ends) - 0.5),
+        y=(0.0, limits_of(ends)[1]),
+        marks=(Bars("fit", number, ends[:, 0], ends[:, 1], ends[:, 2], names),),
+        names={float(k): str(k) for k in number.astype(int)},
+    )
+
+
+def _label(ladder: ScoredLadder) -> str:
+    return "textbook values" if len(ladder.steps) == 1 else f"{len(ladder.final)} fitted"
 
 
 def _parameter_rows(ladder: ScoredLadder) -> list[tuple[str, ...]]:

@@ -5,18 +5,39 @@ from __future__ import annotations
 from typing import Any
 
 from push_predictor.evaluation.estimate import Estimate
+from push_predictor.evaluation.judgement import FEWEST
 from push_predictor.evaluation.ladder.scored_ladder import FittedParameter, ScoredLadder, ScoredStep, changed
 from push_predictor.reporting.html import number
 
 COLUMNS = ("step", "free parameters", "held-out NMSE", "held-out NLPD", "gain, nats per push")
 
 
+def ladder_answer(ladder: ScoredLadder) -> tuple[str, str, str]:
+    """What the fit brings, on which evidence, what to do: one sentence each."""
+    first, last, number = ladder.steps[0], ladder.steps[-1], len(ladder.final)
+    score = "Score it on other pushes with `push_predictor evaluate`."
+    if len(ladder.steps) == 1:
+        suffice = "The textbook values suffice: no fitted parameter clearly improves the prediction of held-out pushes."
+        return suffice, f"Their NMSE is {first.nmse.text('.3f')}, from {count(ladder)}.", f"Use this model. {score}"
+    share = 100.0 * (1.0 - last.nmse.value / first.nmse.value)
+    fitted = "1 fitted parameter reduces" if number == 1 else f"{number} fitted parameters reduce"
+    pushes = "1 push is" if ladder.pushes == 1 else f"{ladder.pushes} pushes are"
+    few = f"Only {pushes} behind the choice. Record at least {FEWEST} and fit again."
+    return (
+        f"{fitted} the squared error of held-out pushes by {share:.0f} %.",
+        f"Their NMSE falls from {first.nmse.text('.3f')} to {last.nmse.text('.3f')}, from {count(ladder)}.",
+        few if ladder.pushes < FEWEST else f"Use this model. {score}",
+    )
+
+
 def ladder_lines(ladder: ScoredLadder) -> list[str]:
-    """The ladder as a table, and the fitted parameters with intervals."""
+    """The answer, the ladder as a table, and the fitted parameters with intervals."""
     table = [COLUMNS, *ladder_rows(ladder)]
     widths = [max(len(row[k]) for row in table) for k in range(len(COLUMNS))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
     return [
+        *ladder_answer(ladder),
+        "",
         *lines,
         f"Each push is predicted from other pushes, in at most ten folds ({count(ladder)}). Brackets: 95 % intervals.",
         "",

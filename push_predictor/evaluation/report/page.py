@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import PushPredictorError
+from push_predictor.evaluation.judgement import count_pushes, judged
+from push_predictor.evaluation.report.figures.coverage import coverage_chart
 from push_predictor.evaluation.report.figures.gallery import (
     Validation,
     calibration_pictures,
@@ -18,7 +20,7 @@ from push_predictor.evaluation.report.figures.gallery import (
 from push_predictor.evaluation.report.summary import (
     calibration_sentence,
     comparison_sentence,
-    error_sentence,
+    opening_sentences,
     training_sentence,
 )
 from push_predictor.evaluation.report.tables import metrics_tables
@@ -38,6 +40,18 @@ SECTIONS: tuple[tuple[str, Callable[[Path, Validation], list[Picture]]], ...] = 
 )
 
 
+NO_ALARM: Mapping[str, object] = {"fired": False, "off": "the report was made without it"}
+NOTHING_FOUND = (
+    "No window was found, so the model cannot be judged.",
+    "There are no scores and no figures.",
+    "Check the recording with `push_predictor check`.",
+)
+COVERAGE = (
+    "Share of the outcomes inside the predicted intervals. On the dashed line the intervals contain the share that "
+    "they promise. Below it they are too narrow, above it too wide. Bands: 95 % intervals from resampling pushes."
+)
+
+
 def write_validation_report(
     out: Path,
     title: str,
@@ -47,19 +61,20 @@ def write_validation_report(
     comparisons: Sequence[Comparison],
     facts: Mapping[str, str],
     notes: Sequence[str],
+    alarm: Mapping[str, object] | None = None,
 ) -> Path:
     """Write out/report.html, its figures out/*.png and its numbers out/report.json; return the path of the page.
 
     models and comparisons have the same order, the main model first. comparisons and windows have one row per row of
-    the table. facts and notes are shown as given. Raises PushPredictorError if these do not match, or if matplotlib or
-    Jinja2 is not installed.
+    the table. facts and notes are shown as given. alarm: of the main model, as in the JSON of `validate`. Raises
+    PushPredictorError if these do not match, or if matplotlib or Jinja2 is not installed.
     """
     shown = Validation(table, windows, models, comparisons)
     _check(shown)
     out.mkdir(parents=True, exist_ok=True)
     metrics = [metrics_json(comparison) for comparison in comparisons]
     parts = [
-        *_summary(shown, metrics),
+        *_opening(shown, metrics, alarm or NO_ALARM),
         *([html.definitions(facts)] if facts else []),
         html.heading("Scores"),
         *metrics_tables(comparisons, metrics),
@@ -84,30 +99,24 @@ def _check(shown: Validation) -> None:
         raise PushPredictorError(f"report: {len(shown.windows)} windows, give the {count} of the table, or None")
 
 
-def _summary(shown: Validation, metrics: Sequence[dict[str, Any]]) -> list[str]:
-    """Answer first: how good the main model is, whether it is calibrated, how the others compare."""
+def _opening(shown: Validation, metrics: list[dict[str, Any]], alarm: Mapping[str, object]) -> list[str]:
+    """Answer first: does the main model fit, is it calibrated, how the others compare, on which data."""
     main, *others = shown.comparisons
-    rig, first = shown.models[0].rig, metrics[0]
+    first, rig = {**metrics[0], "alarm": alarm}, shown.models[0].rig
     sentence, used = training_sentence(shown.models, shown.table)
-    data = f"{first['n_test']} windows of {_pushes(first['n_pushes'])} (shape {rig.shape} on {rig.surface}). "
+    data = f"{first['n_test']} windows of {count_pushes(first['n_pushes'])} (shape {rig.shape} on {rig.surface}). "
+    about = html.paragraph(f"Model {main.model}. {data}{sentence}", "warning" if used else "")
     if not len(shown.table):
-        return [html.paragraph(data + sentence)]
+        return [html.opening(NOTHING_FOUND, "no push found"), about]
     answers = [calibration_sentence(main), *(comparison_sentence(main, other) for other in others)]
-    return [
-        html.paragraph(error_sentence(first), "lead"),
-        html.bullets(answers),
-        html.paragraph(data + sentence, "warning" if used else ""),
-    ]
-
-
-def _pushes(count: int) -> str:
-    return f"{count} push" if count == 1 else f"{count} pushes"
+    figure = html.charts([coverage_chart(main)], COVERAGE)
+    return [html.opening(opening_sentences(first), judged(first).label, figure), html.bullets(answers), about]
 
 
 def _pictures(out: Path, shown: Validation) -> list[str]:
+    parts: list[str] = []
     if not len(shown.table):
-        return [html.paragraph("No window was found, so there are no scores and no figures.", "warning")]
-    parts = []
+        return parts
     for name, draw_section in SECTIONS:
         parts += [html.heading(name), *map(html.figure, draw_section(out, shown))]
     return parts

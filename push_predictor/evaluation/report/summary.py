@@ -1,4 +1,7 @@
-"""The sentences at the top of a validation report: error, calibration, comparison, use of training pushes."""
+"""The sentences at the top of a validation report: judgement, error, action; calibration, comparison, use of training.
+
+`validate` prints the first three as well.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from push_predictor.evaluation.judgement import judged
+from push_predictor.evaluation.report.figures.coverage import SYMBOLS
 from push_predictor.evaluation.report.tables import interval_of, paired_difference, row_weights
 from push_predictor.evaluation.validation import Comparison, trained_on
 from push_predictor.models.push_model import PushModel
@@ -15,18 +20,22 @@ from push_predictor.reporting.html import number
 from push_predictor.types import Array
 
 LEVEL = 0.95
-SYMBOLS = ("Δx", "Δy", "Δθ")
+
+
+def opening_sentences(metrics: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Whether the model fits, how large its errors are, what to do; metrics: the JSON of `validate`, with the alarm."""
+    found = judged(metrics)
+    return found.sentence, error_sentence(metrics), found.action
 
 
 def error_sentence(metrics: Mapping[str, Any]) -> str:
     """The total NMSE with its interval: the unexplained share of the variation, summed over the outputs."""
     total, interval = metrics["nmse"]["total"], metrics["interval"]["nmse"]
     if total is None:
-        return f"{metrics['model']}: the outcomes do not vary, so the NMSE is undefined."
+        return "The outcomes do not vary, so the squared error has no scale (NMSE)."
     ends = "" if interval is None else f" (95 % CI {_rounded(interval['low'])} to {_rounded(interval['high'])})"
     return (
-        f"{metrics['model']} predicts these pushes with a total NMSE of {_rounded(total)}{ends}: "
-        f"0 is perfect, 3 is no better than the mean outcome in training."
+        f"Its squared error (total NMSE) is {_rounded(total)}{ends}, where 0 is perfect and 3 is the mean of training."
     )
 
 

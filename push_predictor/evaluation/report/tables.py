@@ -57,7 +57,7 @@ def _error_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         "Normalised mean squared error (NMSE) per output: 0 is perfect, 1 is no better than the training mean. "
         "The total is the sum over the outputs. In brackets, in all tables: 95 % intervals from resampling pushes."
     )
-    return html.table(caption, ("model", "training windows", "windows", "pushes", *COLUMNS), rows)
+    return html.folded_table(caption, ("model", "training windows", "windows", "pushes", *COLUMNS), rows)
 
 
 def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
@@ -71,7 +71,7 @@ def _density_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         f"Negative log predictive density (NLPD) of the predicted Gaussian, nats per window in SI units. Lower "
         f"is better. In mm and rad, total and joint are {MILLIMETRES:.4f} higher. Joint: with the full covariance."
     )
-    return html.table(caption, ("model", *COLUMNS, "joint"), rows)
+    return html.folded_table(caption, ("model", *COLUMNS, "joint"), rows)
 
 
 def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
@@ -84,7 +84,7 @@ def _exact_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         "NLPD of the model's own predictive density: a Student t, or the exact density of a VHGP. For models without "
         "either it is that of the Gaussian above."
     )
-    return html.table(caption, ("model", *COLUMNS), rows)
+    return html.folded_table(caption, ("model", *COLUMNS), rows)
 
 
 def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
@@ -103,7 +103,7 @@ def _coverage_table(pairs: Sequence[tuple[Comparison, Metrics]]) -> str:
         "outputs. Below the nominal share the intervals are "
         "too narrow, above it too wide."
     )
-    return html.table(caption, head, rows)
+    return html.folded_table(caption, head, rows)
 
 
 def _difference_table(comparisons: Sequence[Comparison]) -> str:
@@ -113,7 +113,7 @@ def _difference_table(comparisons: Sequence[Comparison]) -> str:
         f"Each model minus {main.model}, on the same windows. Above zero, {main.model} is better. "
         f"An interval that contains zero shows no significant difference."
     )
-    return html.table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)
+    return html.folded_table(caption, ("model", "total NMSE", "total NLPD (nats)"), rows)
 
 
 def row_weights(c: Comparison) -> Array:

@@ -8,8 +8,12 @@ docs/explanation/errata.md lists where the printed equations differ. Inputs and 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
+from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.gaussian_process.cross_validation import held_out_errors
 from push_predictor.models.gaussian_process.gp import SHORTEST, GpParameters, check_rows, fit_gp
 from push_predictor.models.gaussian_process.kernels import DEFAULT_CHOICE, KernelChoice
@@ -21,41 +25,65 @@ from push_predictor.models.gaussian_process.vhgp_parameters import VhgpParameter
 from push_predictor.types import Array, IntArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """The posteriors of f and g, the weights (n,) of their means, and the bound: matrices of n rows."""
+
+    bound: float
+    signal: KernelPosterior
+    signal_weights: Array
+    noise: KernelPosterior
+    noise_weights: Array
+
+
 class VHGP:
-    """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound."""
+    """A VHGP conditioned on inputs (n, D) and outputs (n,); site_precisions (n,) is Lambda of vhgp_bound.
+
+    Its matrices are computed at the first prediction: a server that predicts from a table may never need them.
+    """
 
     gaussian = False  # predictive distribution
 
     def __init__(self, inputs: Array, outputs: Array, parameters: VhgpParameters, site_precisions: Array) -> None:
         self.inputs, self.outputs = check_rows(inputs, outputs), outputs
         self.parameters, self.site_precisions = parameters, site_precisions
-        problem = VhgpProblem.of(inputs, outputs, parameters)
-        bound = Bound.tied(problem, site_precisions)
-        self.bound, self._noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
-        del bound  # frees its matrices before the factors are computed
-        self._signal = KernelPosterior(problem.signal_kernel.matrix, noise_level + parameters.jitter)
-        self._noise = KernelPosterior(problem.noise_kernel.matrix, parameters.nugget + 1.0 / site_precisions)
-        self._signal_weights = self._signal.weights(outputs)
+
+    @property
+    def bound(self) -> float:
+        """The variational bound on the log marginal likelihood."""
+        return self._posterior.bound
+
+    @cached_property
+    def _posterior(self) -> _Posterior:
+        with one_blas_thread():
+            problem = VhgpProblem.of(self.inputs, self.outputs, self.parameters)
+            bound = Bound.tied(problem, self.site_precisions)
+            value, noise_weights, noise_level = bound.value, bound.mean_weights, bound.noise_level
+            del bound  # frees its matrices before the factors are computed
+            seen_through = self.parameters.nugget + 1.0 / self.site_precisions
+            signal = KernelPosterior(problem.signal_kernel.matrix, noise_level + self.parameters.jitter)
+            noise = KernelPosterior(problem.noise_kernel.matrix, seen_through)
+            return _Posterior(value, signal, signal.weights(self.outputs), noise, noise_weights)
 
     def predict(self, inputs: Array) -> LatentPrediction:
         """Predict f and g at inputs (m, D)."""
-        signal, noise = self.parameters.signal, self.parameters.noise
+        signal, noise, posterior = self.parameters.signal, self.parameters.noise, self._posterior
         of_signal, of_noise = signal.cross(inputs, self.inputs), noise.cross(inputs, self.inputs)
         # The jitter is independent of the data, so the variance of f cannot fall below it.
-        variance = signal.variance + self.parameters.jitter - self._signal.explained_variance(of_signal)
+        variance = signal.variance + self.parameters.jitter - posterior.signal.explained_variance(of_signal)
         prior = noise.variance + self.parameters.nugget
-        log_noise_variance = prior - self._noise.explained_variance(of_noise)
+        log_noise_variance = prior - posterior.noise.explained_variance(of_noise)
         return LatentPrediction(
-            of_signal @ self._signal_weights,
+            of_signal @ posterior.signal_weights,
             np.maximum(variance, self.parameters.jitter),
-            self.parameters.noise_mean + of_noise @ self._noise_weights,
+            self.parameters.noise_mean + of_noise @ posterior.noise_weights,
             np.maximum(log_noise_variance, self.parameters.nugget + np.finfo(float).eps * noise.variance),
         )
 
     def function_covariance(self, inputs: Array) -> Array:
         """Posterior covariance (m, m) of f between inputs (m, D), without the jitter, of which data tell nothing."""
         kernel = self.parameters.signal
-        return kernel.matrix(inputs) - self._signal.explained_covariance(kernel.cross(inputs, self.inputs))
+        return kernel.matrix(inputs) - self._posterior.signal.explained_covariance(kernel.cross(inputs, self.inputs))
 
     def held_out(self, block: IntArray) -> LatentPrediction:
         """Predict f and g at the n training rows from the rows of all other blocks; hyperparameters are kept.

@@ -13,8 +13,8 @@ from push_predictor.models.mechanics.fit import Displacing, FitRows, JointFit, f
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.held_out import CrossValidation, held_out_scores
 from push_predictor.models.mechanics.parameters import PARAMETERS
-from push_predictor.models.watch import Watch, no_watch
 from push_predictor.types import Array
+from push_predictor.watch import Watch, no_watch
 
 MOST_STEPS = 20
 MOST_PARAMETERS = 12

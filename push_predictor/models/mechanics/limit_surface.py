@@ -48,7 +48,7 @@ def uniform_support(outline: Outline) -> Support:
     """
     if outline.semi_axes is not None:
         a, b = sorted(outline.semi_axes, reverse=True)
-        return Support((0.0, 0.0), float(4.0 / (3.0 * np.pi) * a * ellipe(1.0 - (b / a) ** 2)))
+        return Support(outline.pose[:2], float(4.0 / (3.0 * np.pi) * a * ellipe(1.0 - (b / a) ** 2)))
     x, y = outline.centroid
     length = _integral_of_distance(outline.vertices - outline.centroid) / outline.area
     return Support((float(x), float(y)), length)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_predictor.errors import RigError
+from push_predictor.geometry.frames import rotate
 from push_predictor.geometry.outline import Outline
 from push_predictor.types import Array
 
@@ -82,7 +83,7 @@ def _fan(outline: Outline) -> tuple[Array, Array, Array, float]:
     radius, of_radius = _gauss(RADII)
     if outline.semi_axes is not None:
         turn = (np.arange(RAYS) + 0.5) * 2.0 * np.pi / RAYS
-        rim = np.column_stack([np.cos(turn), np.sin(turn)]) * outline.semi_axes
+        rim = rotate(np.column_stack([np.cos(turn), np.sin(turn)]) * outline.semi_axes, np.array(outline.pose[2]))
         of_ray = np.ones(RAYS)
     else:
         here, there = outline.vertices - outline.centroid, np.roll(outline.vertices, -1, axis=0) - outline.centroid

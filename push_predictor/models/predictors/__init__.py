@@ -11,7 +11,7 @@ from push_predictor.models.predictors.extended_predictor import ExtendedPredicto
 from push_predictor.models.predictors.gaussian_process_predictor import GaussianProcessPredictor
 from push_predictor.models.predictors.mechanics_mean import MechanicsMean
 from push_predictor.models.predictors.mechanics_predictor import MechanicsPredictor
-from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.prior_predictor import PriorPredictor
 from push_predictor.models.predictors.scaling import Scaling
 from push_predictor.models.predictors.tails import Tails
@@ -22,6 +22,7 @@ __all__ = [
     "Cross",
     "ExtendedPredictor",
     "GaussianProcessPredictor",
+    "InputLimits",
     "MechanicsMean",
     "MechanicsPredictor",
     "Moments",

@@ -14,10 +14,10 @@ from push_predictor.models.mechanics.analytical_scalar import scalar_analytical
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.scalar.mechanics import scalar_mechanics
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 from push_predictor.models.predictors.tails import Tails
 from push_predictor.recordings.table import INPUTS
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
 SIDE = "edge"
 GIVEN_BY_INPUTS = (*INPUTS, SIDE)  # covariates that follow from the push, so that no request needs to bring them
@@ -77,9 +77,10 @@ class ExtendedPredictor:
         """See Predictor."""
         return tuple(name for name in self.covariates if name not in GIVEN_BY_INPUTS)
 
-    def in_own_domain(self, inputs: Array) -> BoolArray | None:
+    @property
+    def own_limits(self) -> InputLimits | None:
         """See Predictor."""
-        return self.base.in_own_domain(inputs)
+        return self.base.own_limits
 
     def completed(self, push: Push) -> Push:
         """See Predictor."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol, TypeAlias
 
+import numpy as np
+
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanics.analytical import AnalyticalPush
 from push_predictor.models.mechanics.fitted import FittedMechanics
@@ -28,6 +30,19 @@ class Shift(NamedTuple):
 
     mean: Array
     covariance: Array
+
+
+class InputLimits(NamedTuple):
+    """Lowest and highest velocity (m/s), smallest and largest angle (rad) of the pushes of a domain."""
+
+    velocity: tuple[float, float]
+    angle: tuple[float, float]
+
+    def contain(self, inputs: Array) -> BoolArray:
+        """Which of the pushes (n, 3: velocity m/s, contact, angle rad) are within the limits, (n,)."""
+        velocity, _, angle = inputs.T
+        fast = (velocity >= self.velocity[0]) & (velocity <= self.velocity[1])
+        return np.asarray(fast & (angle >= self.angle[0]) & (angle <= self.angle[1]))
 
 
 class Predictor(Protocol):
@@ -77,8 +92,9 @@ class Predictor(Protocol):
     def tails(self) -> Tails | None:
         """Distribution of the outcomes in units of the standard deviations; None for a Gaussian or a VHGP's own."""
 
-    def in_own_domain(self, inputs: Array) -> BoolArray | None:
-        """Whether the base is meant for each push (n, 3), (n,); None if its training pushes bound its domain."""
+    @property
+    def own_limits(self) -> InputLimits | None:
+        """Limits of the pushes for which the base is meant; None if its training pushes bound its domain."""
 
     def completed(self, push: Push) -> Push:
         """The pushes with those of `covariates` that follow from their inputs."""

@@ -14,8 +14,8 @@ from push_predictor.models.mechanics.parameter_draws import displacements
 from push_predictor.models.mechanics.process_noise import ProcessNoise
 from push_predictor.models.mechanisms import Push
 from push_predictor.models.predictors.of_mechanics import OfFittedMechanics
-from push_predictor.models.predictors.predictor import Moments
-from push_predictor.types import Array, BoolArray
+from push_predictor.models.predictors.predictor import InputLimits, Moments
+from push_predictor.types import Array
 
 ACCURACY = 0.01  # of a draw's displacement: moves means by less than 0.3 % of a standard deviation, in half the time
 FASTEST = 0.15  # m/s: beyond it inertia, which the draws lack, changes the motion by more than the noise
@@ -33,9 +33,10 @@ class PriorPredictor(OfFittedMechanics):
     draws: Array
     noise: ProcessNoise
 
-    def in_own_domain(self, inputs: Array) -> BoolArray:
+    @property
+    def own_limits(self) -> InputLimits:
         """See Predictor: pushes all around the slider, at the speeds and angles for which the priors are meant."""
-        return np.asarray((inputs[:, 0] <= FASTEST) & (np.abs(inputs[:, 2]) <= STEEPEST))
+        return InputLimits((0.0, FASTEST), (-STEEPEST, STEEPEST))
 
     @property
     def absorbs(self) -> bool:

@@ -8,8 +8,7 @@ import numpy as np
 
 from push_predictor.models.effects.effect import Effect
 from push_predictor.models.mechanisms import Push
-from push_predictor.models.predictors.predictor import BasePredictor, Cross, Moments, Predictor, Shift
-from push_predictor.types import Array, BoolArray
+from push_predictor.models.predictors.predictor import BasePredictor, Cross, InputLimits, Moments, Predictor, Shift
 
 Self = TypeVar("Self")
 
@@ -42,7 +41,8 @@ class WithoutEffects:
         """See Predictor: none."""
         return ()
 
-    def in_own_domain(self, inputs: Array) -> BoolArray | None:
+    @property
+    def own_limits(self) -> InputLimits | None:
         """See Predictor: None."""
         return None
 

@@ -51,15 +51,19 @@ def save_model(model: PushModel, path: Path) -> None:
 
 
 @one_blas_thread()
-def load_model(path: str | os.PathLike[str]) -> PushModel:
-    """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of a newer version."""
+def load_model(path: str | os.PathLike[str], *, check: bool = True) -> PushModel:
+    """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of a newer version.
+
+    check: predict some training pushes, which computes the matrices of the regressions.
+    """
     path = Path(path)
     arrays = read_arrays(path)
     header = _read_header(path, arrays)
     try:
         with np.errstate(all="ignore"):
             model = _model(header, arrays, str(path))
-            _check_answers(model)
+            if check:
+                _check_answers(model)
         return model
     except PushPredictorError as error:
         raise ModelFileError(f"{path}: the model file is damaged ({error})") from None

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from push_predictor.errors import ModelFileError, PushPredictorError, RequestError
-from push_predictor.models.store.model_file import is_model_file, load_model
-from push_predictor.models.tabulated.tabulated_model import TabulatedModel, as_served
+from push_predictor.errors import ModelFileError, PushPredictorError, UnknownModelError
+from push_predictor.models.store.model_file import is_model_file
+from push_predictor.models.store.table_cache import load_served
+from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.resources import DEFAULT_MODEL, share_path
 from push_predictor.types import Array
 
@@ -49,12 +50,16 @@ class ModelRegistry:
         self._chosen = name
 
     def get(self, name: str) -> TabulatedModel:
-        """A model by name, the default one for an empty name. Raises RequestError if it is not loaded."""
+        """A model by name, the default one for an empty name. Raises UnknownModelError if it is not loaded."""
         model = self._models.get(name or self.default)
         if model is None:
             field, value = ("model", name) if name or not self._chosen else ("default_model", self._chosen)
-            raise RequestError(field, value, self.accepted)
+            raise UnknownModelError(field, value, self.accepted)
         return model
+
+    def file(self, name: str) -> Path:
+        """The file of a loaded model."""
+        return self._files[name]
 
     def load(self, path: Path, name: str = "", *, replace: bool = True) -> str:
         """Load a model file under a name (empty: the name in the file) and return the name.
@@ -63,7 +68,7 @@ class ModelRegistry:
         in use with `replace` false; the registry is then unchanged.
         """
         path = _located(path)
-        tabulated = _tabulated(path)
+        tabulated = load_served(path)
         name = name or tabulated.model.name
         if not replace and name in self._models:
             raise ModelFileError(f"{path}: name {name!r} is already used by {self._files[name]}, give another name")
@@ -129,19 +134,6 @@ def _located(path: Path) -> Path:
         return path.expanduser().resolve()
     except (OSError, RuntimeError, ValueError) as error:  # no such user, a loop of links, a null character
         raise ModelFileError(f"{str(path)!r}: no such file ({error})") from None
-
-
-def _tabulated(path: Path) -> TabulatedModel:
-    """The model of a file, ready to predict. Raises ModelFileError, even if the numbers in the file make it fail."""
-    model = load_model(path)
-    try:
-        tabulated = as_served(model)
-        # The first prediction fills caches; no request should wait for that.
-        first = model.examples(1)
-        tabulated.predict_rows(first.inputs, first.duration, first.covariates)
-    except Exception as error:
-        raise ModelFileError(f"{path}: the model cannot predict ({type(error).__name__}: {error})") from None
-    return tabulated
 
 
 def model_files(place: Path) -> list[Path]:

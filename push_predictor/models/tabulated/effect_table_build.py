@@ -161,7 +161,7 @@ class _Builder:
         places = np.column_stack(columns) if columns else np.empty((len(box), 0))
         changes = self.change.changes(box % len(self.change.levels), places)
         found = values(np.column_stack([speed, contact, angle]), heading, changes) / speed[:, None]
-        return TensorSpline(axes, found.reshape(*grid.shape[:-1], -1))
+        return TensorSpline.through(axes, found.reshape(*grid.shape[:-1], -1))
 
     def _moved(self, inputs: Array, heading: Array, changes: Array) -> Array:
         """Shift (n, 3) at knots; its part without changes is computed once for those that differ in changes alone."""

@@ -44,23 +44,32 @@ class Axis:
 class TensorSpline:
     """Interpolating cubic splines of K functions on boxes that share their D axes; twice differentiable in each.
 
-    values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots; knots: how many there are.
+    coefficients (boxes, cells_1 + 3, ..., cells_D + 3, K); `through` computes them from values at the knots.
     """
 
-    def __init__(self, axes: Sequence[Axis], values: Array) -> None:
-        self.knots = int(np.prod(values.shape[:-1]))
-        for d, axis in enumerate(axes):
-            values = along(d + 1, _knots_to_coefficients(axis.cells), values)
-        shape = values.shape
+    def __init__(self, axes: Sequence[Axis], coefficients: Array) -> None:
+        self.axes, shape = tuple(axes), coefficients.shape
         self._low = np.array([axis.low for axis in axes])
         self._per_unit = np.array([axis.cells / (axis.high - axis.low) for axis in axes])
         self._last = np.array([axis.cells - 1 for axis in axes])
         self._sides = list(zip(self._low.tolist(), self._per_unit.tolist(), self._last.tolist(), strict=True))
-        self._grid = np.ascontiguousarray(values)
-        self._rows = self._grid.reshape(-1, shape[-1])
+        self.coefficients = np.ascontiguousarray(coefficients)
+        self._rows = self.coefficients.reshape(-1, shape[-1])
         strides = [int(np.prod(shape[d + 1 : -1])) for d in range(len(axes) + 1)]
         self._box_stride, self._strides = strides[0], np.array(strides[1:])
         self._block: IntArray = np.indices((4,) * len(axes)).reshape(len(axes), -1).T @ self._strides
+
+    @classmethod
+    def through(cls, axes: Sequence[Axis], values: Array) -> TensorSpline:
+        """The splines through values (boxes, cells_1 + 1, ..., cells_D + 1, K) at the knots."""
+        for d, axis in enumerate(axes):
+            values = along(d + 1, _knots_to_coefficients(axis.cells), values)
+        return cls(axes, values)
+
+    @property
+    def knots(self) -> int:
+        """How many knots there are, in all boxes."""
+        return len(self.coefficients) * int(np.prod([axis.cells + 1 for axis in self.axes]))
 
     def at(self, point: Sequence[float], box: int) -> Array:
         """Values (K,) at one point, in plain numbers: an array of one row costs several times as much."""
@@ -71,7 +80,7 @@ class TensorSpline:
             cell = min(int(place), last)
             index.append(slice(cell, cell + 4))
             weights.append(_weights(place - cell))
-        values = self._grid[tuple(index)]
+        values = self.coefficients[tuple(index)]
         for weight in weights:
             values = np.dot(weight, values.reshape(4, -1))
         return np.asarray(values)

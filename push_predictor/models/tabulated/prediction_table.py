@@ -117,7 +117,7 @@ def tabulate(
     )  # where the place does not vary, all edges share one box
     least = predictor.reported_sd**2 * [_least_variance(regression) for regression in regressions]
     columns = _as_slice([side.column for side in sides])
-    return PredictionTable(TensorSpline(axes, values), columns, least.tolist(), knots)
+    return PredictionTable(TensorSpline.through(axes, values), columns, least.tolist(), knots)
 
 
 def _on_grid(regression: Regression) -> OnGrid:

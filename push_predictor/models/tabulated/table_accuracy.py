@@ -1,10 +1,71 @@
-"""How far a table's covariances are from those of a model."""
+"""How far a table's predictions are from those of its model, at pushes of its domain."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.tabulated.tabulated_domain import TabulatedDomain
 from push_predictor.types import Array
+
+MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
+COVARIANCE_TOLERANCE = 1e-2  # relative, of the variance of any combination of outputs
+CHECKED = 250  # random pushes of the domain, and as many training pushes
+
+
+@dataclass(frozen=True)
+class TableAccuracy:
+    """The largest differences found between table and model.
+
+    mean: in predicted standard deviations. covariance: relative error of the variance of any combination of outputs,
+    which is the largest absolute eigenvalue of L^-1 T L^-T - I, where T is the table's covariance and L L' the model's.
+    """
+
+    mean: float
+    covariance: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a table with these errors may be used: at half the tolerances, since not every push was compared."""
+        return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.covariance <= COVARIANCE_TOLERANCE
+
+    def __str__(self) -> str:
+        return f"means to {self.mean:.1e} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
+
+
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """Pushes (n, 3) of a domain and what the model itself predicts: mean (n, 3) and covariances (n, 3, 3), SI units."""
+
+    inputs: Array
+    mean: Array
+    covariance: Array
+    process_covariance: Array
+
+    def error_of(self, domain: TabulatedDomain) -> TableAccuracy:
+        """The largest differences of a table from the model. Raises ValueError for a push outside its domain."""
+        inside, table = domain.predict(self.inputs)
+        if table is None:
+            raise ValueError(f"pushes outside the table's domain: {self.inputs[~inside]}")
+        sd = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        of_mean = np.max(np.abs(table.mean - self.mean) / sd)
+        of_outcome = relative_error(table.covariance, self.covariance)
+        of_process = relative_error(table.process_covariance, self.process_covariance)
+        return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
+
+
+def probed(model: PushModel, count: int = CHECKED) -> Probes:
+    """Pushes spread evenly over a model's domain, and training pushes, at most `count` of each."""
+    rng, known = np.random.default_rng(0), model.training.inputs
+    low, high = known.min(axis=0), known.max(axis=0)
+    low[1], high[1] = 0.0, 1.0
+    spread = rng.uniform(low, high, (20 * count, 3))
+    spread = spread[model.in_domain(spread)][:count]
+    inputs = np.concatenate([spread, rng.permutation(known)[:count]])
+    exact = model.predict_rows(inputs, np.full(len(inputs), model.training.duration[0]))
+    return Probes(inputs, exact.mean, exact.covariance, exact.process_covariance)
 
 
 def relative_error(found: Array, exact: Array) -> Array:

@@ -35,35 +35,12 @@ from push_predictor.models.tabulated.effect_table import EffectTable
 from push_predictor.models.tabulated.effect_table_build import build_effect_table
 from push_predictor.models.tabulated.prediction_table import TooFineError
 from push_predictor.models.tabulated.single_effects import SingleEffects
-from push_predictor.models.tabulated.table_accuracy import relative_error
+from push_predictor.models.tabulated.table_accuracy import TableAccuracy, probed
 from push_predictor.models.tabulated.tabulated_domain import FeatureBox, TabulatedDomain, feature_box, tabulated_domain
 from push_predictor.models.tabulated.tabulated_prior import tabulated_prior
 from push_predictor.types import Array, BoolArray
 
-MEAN_TOLERANCE = 1e-3  # predicted standard deviations, of a push in the domain
-COVARIANCE_TOLERANCE = 1e-2  # relative, of the variance of any combination of outputs
-CHECKED = 250  # random pushes of the domain, and as many training pushes
 REFINEMENTS = (1.0, 1.3, 1.7, 2.2)  # of a table, tried in turn
-
-
-@dataclass(frozen=True)
-class TableAccuracy:
-    """The largest differences found between table and model.
-
-    mean: in predicted standard deviations. covariance: relative error of the variance of any combination of outputs,
-    which is the largest absolute eigenvalue of L^-1 T L^-T - I, where T is the table's covariance and L L' the model's.
-    """
-
-    mean: float
-    covariance: float
-
-    @property
-    def accepted(self) -> bool:
-        """Whether a table with these errors may be used: at half the tolerances, since not every push was compared."""
-        return 2.0 * self.mean <= MEAN_TOLERANCE and 2.0 * self.covariance <= COVARIANCE_TOLERANCE
-
-    def __str__(self) -> str:
-        return f"means to {self.mean:.1e} standard deviations, covariances to {100.0 * self.covariance:.2g} %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +123,7 @@ class TabulatedModel:
     @cached_property
     def _residual(self) -> PushModel:
         """The model of what is tabulated: the base, without the mechanics about which it has learnt residuals."""
-        return _without_mean(self.model.base)
+        return without_mean(self.model.base)
 
     @cached_property
     def _factor(self) -> Array:
@@ -204,23 +181,28 @@ class TabulatedModel:
 
 def tabulate(model: PushModel) -> TabulatedModel:
     """The model with a table if it can have one; takes about a second for a VHGP of 1000 rows."""
-    learnt = _without_mean(model.base)
+    learnt = without_mean(model.base)
     if isinstance(learnt.predictor, PriorPredictor):
         table, how = tabulated_prior(learnt.predictor)
-        return TabulatedModel(model if table is None else _with_base(model, table), how)
+        return TabulatedModel(model if table is None else with_base(model, table), how)
     if not isinstance(learnt.predictor, GaussianProcessPredictor):
         return TabulatedModel(model, "exact: only learnt models have a table")
-    how = ""
+    how, exact = "", probed(learnt)
     for refinement in REFINEMENTS:
         try:
             domain = tabulated_domain(learnt, learnt.predictor, refinement)
         except TooFineError as too_fine:
             return TabulatedModel(model, f"exact: {how}{too_fine}")
-        error = _error(learnt, domain)
+        error = exact.error_of(domain)
         if error.accepted:
-            return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
+            return with_domain(model, domain, error)
         how = f"a table gives {error}; "
     return TabulatedModel(model, f"exact: {how}too far off")
+
+
+def with_domain(model: PushModel, domain: TabulatedDomain, error: TableAccuracy) -> TabulatedModel:
+    """The model with a table that was compared with it."""
+    return TabulatedModel(model, f"table of {domain.table.knots} knots, {error}", domain, error)
 
 
 def as_served(model: PushModel) -> TabulatedModel:
@@ -242,12 +224,14 @@ def _taken(push: Push, rows: BoolArray) -> Push:
     )
 
 
-def _with_base(model: PushModel, base: PriorPredictor) -> PushModel:
+def with_base(model: PushModel, base: PriorPredictor) -> PushModel:
+    """The model with this base, below its effects if it has any."""
     predictor = model.predictor.with_base(base) if model.predictor.effects else base
     return replace(model, predictor=predictor)
 
 
-def _without_mean(model: PushModel) -> PushModel:
+def without_mean(model: PushModel) -> PushModel:
+    """The model of what is tabulated: without the mechanics about which it has learnt residuals."""
     predictor = model.predictor
     if not isinstance(predictor, GaussianProcessPredictor) or predictor.mean is None:
         return model
@@ -256,28 +240,6 @@ def _without_mean(model: PushModel) -> PushModel:
 
 def _moments(prediction: Prediction) -> Moments:
     return Moments(prediction.mean, prediction.covariance, prediction.process_covariance)
-
-
-def _error(model: PushModel, domain: TabulatedDomain) -> TableAccuracy:
-    inputs = _probes(model)
-    inside, table = domain.predict(inputs)
-    assert table is not None, inputs[~inside]
-    exact = model.predict_rows(inputs, np.full(len(inputs), model.training.duration[0]))
-    sd = np.sqrt(np.diagonal(exact.covariance, axis1=1, axis2=2))
-    of_mean = np.max(np.abs(table.mean - exact.mean) / sd)
-    of_outcome = relative_error(table.covariance, exact.covariance)
-    of_process = relative_error(table.process_covariance, exact.process_covariance)
-    return TableAccuracy(float(of_mean), float(max(of_outcome.max(), of_process.max())))
-
-
-def _probes(model: PushModel) -> Array:
-    """Pushes spread evenly over the domain, and training pushes."""
-    rng, known = np.random.default_rng(0), model.training.inputs
-    low, high = known.min(axis=0), known.max(axis=0)
-    low[1], high[1] = 0.0, 1.0
-    spread = rng.uniform(low, high, (20 * CHECKED, 3))
-    spread = spread[model.in_domain(spread)][:CHECKED]
-    return np.concatenate([spread, rng.permutation(known)[:CHECKED]])
 
 
 def _merged(chosen: BoolArray, one: Prediction, other: Prediction) -> Prediction:

@@ -81,18 +81,27 @@ def tabulated_prior(predictor: PriorPredictor) -> tuple[TabulatedPrior | None, s
         why = "the mechanics depend on the recording" if predictor.needs else f"{knots} knots would be needed"
         return None, f"exact: {why}"
     table = _table(predictor, boxes, axes)
-    of_mean, of_spread = _errors(predictor, table)
+    how, accurate = compared(predictor, table)
+    return (table, f"table of {knots} knots, {how}") if accurate else (None, f"exact: a table gives {how}; too far off")
+
+
+def with_spline(predictor: PriorPredictor, spline: TensorSpline) -> TabulatedPrior:
+    """The predictor with a table that was computed before."""
+    return TabulatedPrior(predictor.fitted, predictor.draws, predictor.noise, spline)
+
+
+def compared(predictor: PriorPredictor, table: TabulatedPrior, probes: int = PROBES) -> tuple[str, bool]:
+    """In words, how far the table is from the predictor, and whether that is near enough."""
+    of_mean, of_spread = _errors(predictor, table, probes)
     how = f"means to {of_mean:.2g} standard deviations, standard deviations to {100.0 * of_spread:.2g} %"
-    if of_mean > MEAN_TOLERANCE or of_spread > SPREAD_TOLERANCE:
-        return None, f"exact: a table gives {how}; too far off"
-    return table, f"table of {knots} knots, {how}"
+    return how, bool(of_mean <= MEAN_TOLERANCE and of_spread <= SPREAD_TOLERANCE)
 
 
-def _errors(predictor: PriorPredictor, table: TabulatedPrior) -> tuple[float, float]:
+def _errors(predictor: PriorPredictor, table: TabulatedPrior, probes: int) -> tuple[float, float]:
     """The largest differences of means, in standard deviations, and of standard deviations, relative."""
     rng = np.random.default_rng(0)
-    inputs = np.column_stack([np.ones(PROBES), rng.random(PROBES), rng.uniform(-STEEPEST, STEEPEST, PROBES)])
-    push = Push(inputs, np.exp(rng.uniform(np.log(TRAVEL[0]), np.log(TRAVEL[1]), PROBES)), {})
+    inputs = np.column_stack([np.ones(probes), rng.random(probes), rng.uniform(-STEEPEST, STEEPEST, probes)])
+    push = Push(inputs, np.exp(rng.uniform(np.log(TRAVEL[0]), np.log(TRAVEL[1]), probes)), {})
     exact, found = predictor.moments(push), table.moments(push)
     sd, own = (np.sqrt(np.diagonal(m.covariance, axis1=1, axis2=2)) for m in (exact, found))
     return float(np.max(np.abs(found.mean - exact.mean) / sd)), float(np.max(np.abs(own / sd - 1.0)))
@@ -109,8 +118,8 @@ def _table(predictor: PriorPredictor, boxes: int, axes: list[Axis]) -> Tabulated
     noise = moments.process_covariance - np.diag(predictor.noise.factor * np.square(TRACKER))
     of_draws = moments.covariance - moments.process_covariance
     values = np.concatenate([moments.mean, _roots(of_draws, travel), _roots(noise, travel)], axis=1) / travel[:, None]
-    spline = TensorSpline(axes, values.reshape(*grid.shape[:-1], values.shape[1]))
-    return TabulatedPrior(predictor.fitted, predictor.draws, predictor.noise, spline)
+    spline = TensorSpline.through(axes, values.reshape(*grid.shape[:-1], values.shape[1]))
+    return with_spline(predictor, spline)
 
 
 def _axes(outline: Outline) -> tuple[int, list[Axis]]:

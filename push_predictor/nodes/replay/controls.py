@@ -2,105 +2,129 @@
 
 from __future__ import annotations
 
+import importlib
+import traceback
+from collections.abc import Callable
+from functools import partial
+from types import ModuleType
 from typing import Any
 
 from builtin_interfaces.msg import Duration, Time
 from rclpy.node import Node
 
-from push_predictor.errors import RequestError
+from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.player import ReplayPlayer
-from push_predictor_interfaces.srv import (
-    Burst,
-    GetRate,
-    IsPaused,
-    Pause,
-    Play,
-    PlayNext,
-    Resume,
-    Seek,
-    SetRate,
-    Stop,
-    TogglePaused,
-)
+from push_predictor_interfaces import srv as own_types
+
+ROSBAG2 = "rosbag2"  # private namespace of the services with rosbag2's own types
 
 
 class ReplayControls:
-    """The player services of a node, with private names."""
+    """The player services of a node, with private names.
+
+    `~/NAME` has this project's type. Where rosbag2_interfaces is installed, `~/rosbag2/NAME` has rosbag2's type: two
+    types of one name exclude each other.
+    """
 
     def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
         self._node, self._player, self._restamps = node, player, restamps
-        for kind, name, callback in (
-            (Pause, "pause", self._pause),
-            (Resume, "resume", self._resume),
-            (TogglePaused, "toggle_paused", self._toggle_paused),
-            (IsPaused, "is_paused", self._is_paused),
-            (GetRate, "get_rate", self._get_rate),
-            (SetRate, "set_rate", self._set_rate),
-            (Play, "play", self._play),
-            (PlayNext, "play_next", self._play_next),
-            (Burst, "burst", self._burst),
-            (Seek, "seek", self._seek),
-            (Stop, "stop", self._stop),
+        self._offer(own_types, "~")
+        if (rosbag2_types := _imported_rosbag2()) is not None:
+            self._offer(rosbag2_types, f"~/{ROSBAG2}")
+
+    def _offer(self, types: ModuleType, namespace: str) -> None:
+        """Create the services with the types of a package."""
+        for kind, name, handler in (
+            ("Pause", "pause", self._pause),
+            ("Resume", "resume", self._resume),
+            ("TogglePaused", "toggle_paused", self._toggle_paused),
+            ("IsPaused", "is_paused", self._is_paused),
+            ("GetRate", "get_rate", self._get_rate),
+            ("SetRate", "set_rate", self._set_rate),
+            ("Play", "play", self._play),
+            ("PlayNext", "play_next", self._play_next),
+            ("Burst", "burst", self._burst),
+            ("Seek", "seek", self._seek),
+            ("Stop", "stop", self._stop),
         ):
-            node.create_service(kind, f"~/{name}", callback)
+            self._node.create_service(getattr(types, kind), f"{namespace}/{name}", partial(self._guarded, handler))
 
-    def _pause(self, request: Any, response: Any) -> Any:
+    def _guarded(self, handler: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
+        """Turn every exception into a refusal: one that left a callback would end the node."""
+        try:
+            handler(request, response)
+            if hasattr(response, "success"):
+                response.success = True
+            return response
+        except PushPredictorError as error:
+            self._node.get_logger().warning(str(error))
+            return _refusal(response, str(error), error_code(error))
+        except Exception as error:
+            self._node.get_logger().error(traceback.format_exc())
+            reason = f"internal error, see the log of the node: {error!r}"
+            return _refusal(response, reason, ErrorCode.INTERNAL_ERROR)
+
+    def _pause(self, request: Any, response: Any) -> None:
         self._player.pause()
-        return response
 
-    def _resume(self, request: Any, response: Any) -> Any:
+    def _resume(self, request: Any, response: Any) -> None:
         self._player.resume()
-        return response
 
-    def _toggle_paused(self, request: Any, response: Any) -> Any:
+    def _toggle_paused(self, request: Any, response: Any) -> None:
         self._player.toggle_paused()
-        return response
 
-    def _is_paused(self, request: Any, response: Any) -> Any:
+    def _is_paused(self, request: Any, response: Any) -> None:
         response.paused = self._player.paused
-        return response
 
-    def _get_rate(self, request: Any, response: Any) -> Any:
+    def _get_rate(self, request: Any, response: Any) -> None:
         response.rate = self._player.rate
-        return response
 
-    def _set_rate(self, request: Any, response: Any) -> Any:
+    def _set_rate(self, request: Any, response: Any) -> None:
         if self._restamps and request.rate != 1.0:
-            refusal = RequestError("set_rate", request.rate, "1.0, which restamp requires")
-            self._node.get_logger().warning(str(refusal))
-            response.success = False
-        else:
-            response.success = self._player.set_rate(request.rate)
-        return response
+            raise RequestError("rate", request.rate, "1.0, which restamp requires")
+        if not self._player.set_rate(request.rate):
+            raise RequestError("rate", request.rate, "a finite number above 0")
 
-    def _play(self, request: Any, response: Any) -> Any:
-        response.success = self._player.play(
-            PlayRange(
-                max(0, _nanoseconds(request.start_offset)),
-                _limit(request.playback_duration),
-                _limit(request.playback_until_timestamp),
-            )
-        )
-        return response
+    def _play(self, request: Any, response: Any) -> None:
+        duration, until = _limit(request.playback_duration), _limit(request.playback_until_timestamp)
+        if not self._player.play(PlayRange(max(0, _nanoseconds(request.start_offset)), duration, until)):
+            raise BusyError("a playback is running: end it with ~/stop")
 
-    def _play_next(self, request: Any, response: Any) -> Any:
-        response.success = self._player.play_next()
-        return response
+    def _play_next(self, request: Any, response: Any) -> None:
+        if not self._player.play_next():
+            raise self._nothing_published()
 
-    def _burst(self, request: Any, response: Any) -> Any:
+    def _burst(self, request: Any, response: Any) -> None:
         response.actually_burst = self._player.burst(request.num_messages)
-        return response
+        if not response.actually_burst:
+            raise self._nothing_published()
 
-    def _seek(self, request: Any, response: Any) -> Any:
+    def _nothing_published(self) -> PushPredictorError:
+        if not self._player.paused:
+            return NotPausedError("the replay is not paused: pause it with ~/pause")
+        return NothingLeftError("no message is left: start again with ~/play or ~/seek")
+
+    def _seek(self, request: Any, response: Any) -> None:
         self._player.seek(_nanoseconds(request.time))
-        response.success = True
-        return response
 
-    def _stop(self, request: Any, response: Any) -> Any:
+    def _stop(self, request: Any, response: Any) -> None:
         self._player.stop()
-        return response
+
+
+def _imported_rosbag2() -> ModuleType | None:
+    try:
+        return importlib.import_module("rosbag2_interfaces.srv")
+    except ImportError:
+        return None
+
+
+def _refusal(response: Any, reason: str, code: ErrorCode) -> Any:
+    """A new response of the same kind; rosbag2's types have no message, and some types have no `success`."""
+    fields = {"success": False, "message": reason, "error_code": int(code)}
+    return type(response)(**{name: value for name, value in fields.items() if hasattr(response, name)})
 
 
 def _nanoseconds(time: Time | Duration) -> int:

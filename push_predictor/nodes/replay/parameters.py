@@ -35,6 +35,7 @@ PARAMETERS: tuple[Param, ...] = (
         3600.0,
     ),
     Param("exit_when_finished", False, "end the process after the last message"),
+    Param("strict", False, "report a warning of the check of the recording as an error in the diagnostics"),
     Param("play.rate", 1.0, "recorded seconds per second of wall time", 1.0e-6, 1.0e6),
     Param("play.loop", False, "start again after the last message"),
     Param("play.start_paused", False, "start paused"),

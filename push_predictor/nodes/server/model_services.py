@@ -5,15 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from msg_adapters.model_infos import model_to_info
 from push_predictor.errors import RequestError
 from push_predictor.models.store.model_registry import ModelRegistry
 
 
-def handle_list_models(registry: ModelRegistry, response: Any) -> None:
+def handle_list_models(registry: ModelRegistry, request: Any, response: Any) -> None:
     """Fill the response to ListModels."""
-    response.names = registry.names
-    response.descriptions = [registry.describe(name) for name in response.names]
-    response.default_model = registry.default
+    names, default = registry.names, registry.default
+    response.names, response.default_model = names, default
+    response.descriptions = [registry.describe(name) for name in names]
+    response.models = [
+        model_to_info(name, registry.file(name), registry.get(name).model, name == default) for name in names
+    ]
+    response.success = True
 
 
 def handle_load_model(registry: ModelRegistry, request: Any, response: Any) -> None:

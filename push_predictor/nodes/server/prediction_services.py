@@ -6,6 +6,7 @@ A handler fills the response, or raises a PushPredictorError that states what is
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ from msg_adapters.predictions import (
     query_from_batch_request,
     residual_from_request,
 )
-from push_predictor.errors import PushPredictorError, RequestError
+from push_predictor.errors import PredictionError, TooLargeError
+from push_predictor.models.domain_remark import domain_remark
+from push_predictor.models.mechanisms import Push
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.request import PushRequest, check_request, check_requests
+from push_predictor.models.request import PushRequest, check_request, check_requests, own_window
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
@@ -33,20 +36,19 @@ MAX_EXACT = 50_000  # of these outside a table: up to a millisecond each
 CHUNK = 4096  # rows predicted at once: the length of a batch must not determine the memory of a prediction
 
 
-class PredictionError(PushPredictorError):
-    """A model has no finite prediction for a push that passed the checks."""
-
-
 def handle_predict_push(registry: ModelRegistry, request: Any, response: Any) -> None:
     """Fill the response to PredictPush. Raises RequestError or PredictionError."""
-    push, residual = push_from_request(request), residual_from_request(request)
+    asked, residual = push_from_request(request), residual_from_request(request)
     tabulated = registry.get(request.model)
+    push = replace(asked, duration=own_window(tabulated.model, asked.duration))
     check_request(tabulated.model, push)
     prediction = tabulated.predict_one(push)
     _check_finite(tabulated, prediction, 0)
     if residual is not None:
         prediction = _given_residual(tabulated.model, push, prediction, residual)
     fill_response(response, prediction)
+    if not response.in_domain:
+        response.message = domain_remark(tabulated.model, Push(*push.arrays), prediction.in_domain)
 
 
 def handle_predict_push_batch(
@@ -57,9 +59,10 @@ def handle_predict_push_batch(
     check_cancelled: called before each chunk; it raises when the node ends. Raises RequestError or PredictionError.
     """
     if (count := len(request.velocity)) > MAX_PUSHES:
-        raise RequestError("velocity length", count, f"at most {MAX_PUSHES} pushes a call")
-    query = query_from_batch_request(request)
-    tabulated = registry.get(query.model)
+        raise TooLargeError("velocity length", count, f"at most {MAX_PUSHES} pushes a call")
+    asked = query_from_batch_request(request)
+    tabulated = registry.get(asked.model)
+    query, inside = replace(asked, duration=own_window(tabulated.model, asked.duration)), [np.ones(0, dtype=np.bool_)]
     check_requests(tabulated.model, query.inputs, query.duration, query.covariates)
     _check_exact(tabulated, query)
     for start in range(0, count, CHUNK):
@@ -69,6 +72,9 @@ def handle_predict_push_batch(
         prediction = tabulated.predict_rows(inputs, np.full(len(inputs), query.duration), covariates)
         _check_finite(tabulated, prediction, start)
         extend_batch_response(response, prediction)
+        inside.append(prediction.in_domain)
+    pushes = Push(query.inputs, np.full(count, query.duration), query.covariates)
+    response.message = domain_remark(tabulated.model, pushes, np.concatenate(inside))
     response.success = True
 
 
@@ -89,10 +95,10 @@ def _given_residual(model: PushModel, push: PushRequest, prediction: Prediction,
 
 
 def _check_exact(tabulated: TabulatedModel, query: PushQuery) -> None:
-    """Raise RequestError if too many pushes need the model itself, not its table."""
+    """Raise TooLargeError if too many pushes need the model itself, not its table."""
     if len(query.inputs) > MAX_EXACT and (count := tabulated.exact_count(query.inputs)) > MAX_EXACT:
         accepted = f"at most {MAX_EXACT} pushes a call without a table (docs/reference/predict_server.md)"
-        raise RequestError("velocity length", f"{count} pushes without a table", accepted)
+        raise TooLargeError("velocity length", f"{count} pushes without a table", accepted)
 
 
 def _check_finite(tabulated: TabulatedModel, prediction: Prediction, start: int) -> None:

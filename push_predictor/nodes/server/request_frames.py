@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 
 from msg_adapters.slider_poses import pose_of_transform
-from push_predictor.errors import RequestError
+from push_predictor.errors import FrameError
 from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
 
 
@@ -26,16 +26,16 @@ class RequestFrames:
     def pose_in_world(self, header: Any) -> SpatialPose:
         """The pose in the world of a header's frame at the header's stamp; a zero stamp means the latest.
 
-        Raises RequestError for an empty frame and for one that tf does not connect to the world.
+        Raises FrameError for an empty frame and for one that tf does not connect to the world.
         """
         if header.frame_id == self.world:
             return SAME_FRAME
         if not header.frame_id:
-            raise RequestError("header.frame_id", "", f"the frame of the poses, such as {self.world!r}")
+            raise FrameError("header.frame_id", "", f"the frame of the poses, such as {self.world!r}")
         if header.frame_id.lstrip("/") == self.world:
-            raise RequestError("header.frame_id", header.frame_id, f"{self.world!r}, without a slash")
+            raise FrameError("header.frame_id", header.frame_id, f"{self.world!r}, without a slash")
         if self._tf is None:
-            raise RequestError("header.frame_id", header.frame_id, f"{self.world!r}; tf2_ros is not installed")
+            raise FrameError("header.frame_id", header.frame_id, f"{self.world!r}; tf2_ros is not installed")
         return self._looked_up(self._tf, header)
 
     def _looked_up(self, tf: Any, header: Any) -> SpatialPose:
@@ -43,7 +43,7 @@ class RequestFrames:
             found = self._buffer.lookup_transform(self.world, header.frame_id, Time.from_msg(header.stamp))
         except tf.TransformException as error:
             accepted = f"{self.world!r}, or a frame that tf connects to it: {error}"
-            raise RequestError("header.frame_id", header.frame_id, accepted) from None
+            raise FrameError("header.frame_id", header.frame_id, accepted) from None
         return pose_of_transform(found.transform)
 
 

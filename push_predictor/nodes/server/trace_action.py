@@ -21,7 +21,8 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from push_predictor.errors import PushPredictorError, RecordingError, RequestError
+from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.errors import BusyError, PushPredictorError, RecordingError, RequestError
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
 from push_predictor.nodes.runtime import one_line
@@ -87,9 +88,9 @@ class TraceAction:
         return self._job is None and self._action.result_sent
 
     def abort(self, reason: str) -> None:
-        """End a running trace; its client gets the reason."""
+        """End a running trace because the node is no longer active; its client gets the reason."""
         if self._job is not None:
-            self._abort(self._job.goal, reason)
+            self._abort(self._job.goal, reason, ErrorCode.NOT_ACTIVE)
 
     # --- a goal ---------------------------------------------------------------------------------------------
 
@@ -100,7 +101,8 @@ class TraceAction:
         """Accept the goal. Raises PushPredictorError or OSError that states what is wrong with it."""
         if self._job is not None:
             running = f"{self._job.model.name} ({self._job.stage})"
-            raise RequestError("goal", "trace_residual", f"one at a time: {running} is being traced, wait or cancel it")
+            accepted = f"one at a time: {running} is being traced, wait or cancel it"
+            raise BusyError(f"goal: 'trace_residual' is not accepted, give {accepted}")
         request = goal.request
         model = self._model_of(request.model)
         if not request.output:
@@ -130,9 +132,9 @@ class TraceAction:
         if (job := self._job) is None:
             return
         if job.goal.is_cancel_requested:
-            self._finish(job.goal, job.goal.canceled, _result("cancelled: nothing was written"))
+            self._finish(job.goal, job.goal.canceled, _result("cancelled: nothing was written", ErrorCode.CANCELLED))
         elif self._closing.is_set():
-            self._abort(job.goal, "the node ends: nothing was written")
+            self._abort(job.goal, "the node ends: nothing was written", ErrorCode.NOT_ACTIVE)
         else:
             self._guarded(job.goal, lambda: self._advance(job))
 
@@ -147,10 +149,10 @@ class TraceAction:
         try:
             work()
         except (PushPredictorError, OSError) as error:
-            self._abort(goal, one_line(error))
+            self._abort(goal, one_line(error), error_code(error))
         except Exception as error:
             self._node.get_logger().error(traceback.format_exc())
-            self._abort(goal, f"internal error, see the log of the node: {error!r}")
+            self._abort(goal, f"internal error, see the log of the node: {error!r}", ErrorCode.INTERNAL_ERROR)
 
     def _poll_validator(self, job: _Job) -> None:
         """Start on the validator's data once its folder is known. Raises RecordingError if there is none to trace."""
@@ -169,11 +171,12 @@ class TraceAction:
         try:
             received = pipe.recv()
         except (EOFError, OSError):
-            raise RecordingError(_exit_reason(job.process)) from None
+            self._abort(job.goal, _exit_reason(job.process), ErrorCode.INTERNAL_ERROR)
+            return
         if isinstance(received, Stage):
             self._publish(received)
         elif isinstance(received, Failed):
-            self._abort(job.goal, received.reason)
+            self._abort(job.goal, received.reason, received.code)
         elif isinstance(received, Traced):
             self._succeed(job, received)
 
@@ -182,8 +185,7 @@ class TraceAction:
         for name in RESULTS:
             if (job.folder / name).exists():
                 (job.folder / name).replace(job.output / name)
-        result = _result(traced.message)
-        result.success, result.verdict = True, traced.verdict
+        result = TraceResidual.Result(success=True, message=traced.message, verdict=traced.verdict)
         if traced.needs is not None:
             result.extended_model = str(job.output / EXTENDED)
             needs = ", ".join(traced.needs) or "no covariates"
@@ -197,9 +199,9 @@ class TraceAction:
         self._job.stage = stage.name
         self._job.goal.publish_feedback(TraceResidual.Feedback(stage=stage.name, progress=stage.share))
 
-    def _abort(self, goal: Any, reason: str) -> None:
+    def _abort(self, goal: Any, reason: str, code: ErrorCode) -> None:
         self._node.get_logger().warning(f"trace_residual: {reason}")
-        self._finish(goal, goal.abort, _result(reason))
+        self._finish(goal, goal.abort, _result(reason, code))
 
     def _finish(self, goal: Any, end: Callable[[], None], result: TraceResidual.Result) -> None:
         if (job := self._job) is None or job.goal is not goal:
@@ -211,8 +213,9 @@ class TraceAction:
         self._job = None  # last: from now on `close` waits for the result to be sent
 
 
-def _result(message: str) -> TraceResidual.Result:
-    return TraceResidual.Result(success=False, message=message)
+def _result(message: str, code: ErrorCode) -> TraceResidual.Result:
+    """The result of a goal without a verdict."""
+    return TraceResidual.Result(success=False, message=message, error_code=int(code))
 
 
 def _exit_reason(process: BaseProcess | None) -> str:

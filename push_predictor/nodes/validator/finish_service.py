@@ -15,18 +15,24 @@ from push_predictor.online.session import Session, State
 
 
 class FinishService:
-    """Offers ~/finish; callers wait while the executor does other work."""
+    """Offers ~/finish; callers wait while the executor does other work.
+
+    Samples that come while a result is written, or its report is drawn, belong to the next run: it is not ended by the
+    same call.
+    """
 
     def __init__(
         self, node: Node, session: Session, models: ModelSource, rigs: RigSource, writer: ResultWriter
     ) -> None:
         self._service = node.create_service(Trigger, "~/finish", _not_called, callback_group=PolledGroup())
-        self._callers: list[Any] = []
+        self._callers: list[Any] = []  # of the run that is open, or comes next
+        self._served: list[Any] = []  # of the run that has ended
+        self._failure: str | None = None  # why its result could not be written; None until that is known
         self._session, self._models, self._rigs, self._writer = session, models, rigs, writer
 
     @property
     def requested(self) -> bool:
-        """Whether a caller waits for the answer."""
+        """Whether a caller waits for the end of a run."""
         return bool(self._callers)
 
     def work(self) -> None:
@@ -38,17 +44,27 @@ class FinishService:
             while (taken := self._service.handle.service_take_request(Trigger.Request))[1] is not None:
                 self._callers.append(taken[1])
 
-    def answer(self) -> None:
-        """Answer all callers if nothing is left to be done."""
-        if self._session.state is State.DRAINING or self._writer.report.busy or not self.requested:
-            return
-        response = self._response()
-        while self._callers:
-            self._service.send_response(response, self._callers.pop())
+    def ending(self) -> None:
+        """Note that a run ends: its result is what all present callers wait for."""
+        self._served, self._callers, self._failure = [*self._served, *self._callers], [], None
 
-    def _response(self) -> Trigger.Response:
+    def answer(self) -> None:
+        """Answer the callers for whom nothing is left to be done; call it each turn, after the session's step."""
+        draining, busy = self._session.state is State.DRAINING, self._writer.report.busy
+        if self._served and self._failure is None and not draining:
+            self._failure = self._session.failure
+        if self._served and self._failure is not None and not busy:
+            self._send(self._response(self._failure), self._served)
+        if self._callers and not draining and not busy:
+            self._send(self._response(self._session.failure), self._callers)
+
+    def _send(self, response: Trigger.Response, callers: list[Any]) -> None:
+        while callers:
+            self._service.send_response(response, callers.pop())
+
+    def _response(self, failure: str) -> Trigger.Response:
         output = self._writer.folder
-        if problem := self._session.failure or self._models.missing or self._rigs.missing:
+        if problem := failure or self._models.missing or self._rigs.missing:
             return Trigger.Response(success=False, message=problem)
         if self._writer.report.failed:
             text = f"The result is in {output}. The report failed: see the log of the node."

@@ -14,13 +14,14 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
+from push_predictor.error_codes import ErrorCode
 from push_predictor_interfaces.srv import PredictPush
 
 IN_FLIGHT = 8  # a service queue of the default depth has ten places
 DEPTH = 1000  # a client receives the answers to all clients, which would crowd its own out of a short queue
 PAUSE = 1.0  # s after which a request is repeated that the server could not answer for its model
 LOG_PERIOD = 10.0  # s between two log lines about a server that does not answer in time
-NOT_NOW = ("model:", "default_model:", "the node is ")  # refusals because of the server's state, not of the push
+NOT_NOW = (ErrorCode.NOT_ACTIVE, ErrorCode.UNKNOWN_MODEL)  # refusals because of the server's state, not of the push
 Answer: TypeAlias = Callable[[PredictPush.Response], None]
 
 
@@ -160,7 +161,7 @@ class PredictionClient:
         self._abandon(pending)
         self._note_answer()
         response, model = future.result(), pending.request.model
-        if not response.success and response.message.startswith(NOT_NOW):
+        if not response.success and response.error_code in NOT_NOW:
             self._blocked[model] = (monotonic() + PAUSE, response.message)
             self._waiting[model].appendleft(_Pending(pending.request, pending.on_answer))
         else:

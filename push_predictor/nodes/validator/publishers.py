@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
@@ -14,14 +16,12 @@ from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.push_window import PushWindow
 from push_predictor_interfaces.msg import PushAlarm, PushResidual
 
-WORLD = "world"
-
 
 class ResultPublishers:
-    """Publishers of push_residual, push_alarm and push_markers. frame_id: of the markers, empty for world."""
+    """Publishers of push_residual, push_alarm and push_markers. world: returns the frame in which the poses are."""
 
-    def __init__(self, node: Node, frame_id: str) -> None:
-        self._log, self._frame_id = node.get_logger(), frame_id or WORLD
+    def __init__(self, node: Node, world: Callable[[], str]) -> None:
+        self._log, self._world = node.get_logger(), world
         self._residuals = node.create_publisher(PushResidual, "push_residual", 1000)
         self._alarms = node.create_publisher(PushAlarm, "push_alarm", LATCHED)
         self._markers = node.create_publisher(MarkerArray, "push_markers", 100)  # for a burst after a stall
@@ -30,9 +30,9 @@ class ResultPublishers:
         """Publish the residual of a window; markers only of the main model, 0, and while somebody subscribes."""
         self._residuals.publish(residual)
         if model == 0 and self._markers.get_subscription_count():
-            self._markers.publish(window_markers(rig, window, prediction, self._frame_id))
+            self._markers.publish(window_markers(rig, window, prediction, self._world()))
 
-    def alarm(self, state: AlarmState, end: int) -> None:
-        """Log and publish an alarm that has fired; end: of the push at which it fired, ns."""
+    def alarm(self, model: str, state: AlarmState, end: int) -> None:
+        """Log and publish an alarm about a model that has fired; end: of the push at which it fired, ns."""
         self._log.warning(alarm_sentence(alarm_json(state)))
-        self._alarms.publish(alarm_to_message(state, end, self._frame_id))
+        self._alarms.publish(alarm_to_message(state, model, end, self._world()))

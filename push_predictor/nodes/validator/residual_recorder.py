@@ -45,21 +45,31 @@ def write_residuals(validation: LiveValidation, folder: Path) -> Path:
     return path
 
 
-def residual_message(model: str, window: PushWindow, mean: Array, covariance: Array) -> PushResidual:
-    """The message of a window and its prediction (3,), (3, 3).
+def residual_message(model: str, window: PushWindow, mean: Array, covariance: Array, in_domain: bool) -> PushResidual:
+    """The message of a window and its prediction (3,), (3, 3), made in or out of the model's domain.
 
     Raises MessageError for a covariance that is not positive definite.
     """
     inputs = np.array([window.velocity, window.contact, window.angle])
-    observed, name = window.displacement, window.push_id
     return residual_to_message(
-        ValidatedWindow(window.end, name, window.index, model, inputs, window.duration, mean, covariance, observed)
+        ValidatedWindow(
+            stamp_ns=window.end,
+            push_id=window.push_id,
+            window=window.index,
+            model=model,
+            inputs=inputs,
+            duration=window.duration,
+            predicted=mean,
+            covariance=covariance,
+            observed=window.displacement,
+            in_domain=in_domain,
+        )
     )
 
 
 def _residuals(validation: LiveValidation) -> Iterator[tuple[int, str, bytes]]:
-    for model, window, mean, covariance in validation.residuals():
-        yield window.end, TOPIC, serialize_message(residual_message(model, window, mean, covariance))
+    for residual in validation.residuals():
+        yield residual.window.end, TOPIC, serialize_message(residual_message(*residual))
 
 
 def _scalars(validation: LiveValidation) -> Iterator[tuple[int, str, bytes]]:

@@ -34,8 +34,10 @@ class ResultWriter:
             return failure
         self._has_result = True
         self._log.info(f"Validation written: {', '.join(map(str, written))}")
+        if not len(run.validation.predicted()):
+            self._log.warning(f"The result has no score: {windows} windows were found, and none was predicted.")
         if with_report and len(run.validation.predicted()):
-            self.report.start(run.validation, self.folder)
+            self.report.start(run.validation, self.folder, None if run.alarm is None else run.alarm.json)
         return ""
 
     def warn_of_interrupted(self, run: ValidationRun) -> None:

@@ -9,23 +9,16 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import monotonic, time_ns
-from typing import Any
 
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.subscription import Subscription
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.validate_topic_name import validate_topic_name
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.polling import PolledGroup, take_all
-from push_predictor.nodes.qos import DEPTH
-from push_predictor.nodes.replay.topics import message_class
+from push_predictor.nodes.following import FollowingSubscription
 from push_predictor.online.scalar_buffer import ClockHistory, ScalarBuffer
 from push_predictor.recordings.bag.definitions import SCALAR_LAYOUTS
 from push_predictor.recordings.streams import ScalarStream
@@ -36,44 +29,13 @@ STALE = 5_000_000_000  # ns after the last message of a /clock without publisher
 CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 
 
-class _Reader:
-    """A subscription that follows its publishers: it is made again when their type or QoS changes."""
-
-    def __init__(self, node: Node, topic: str) -> None:
-        self._node, self._topic, self._group = node, topic, PolledGroup()
-        self._subscription: Subscription | None = None
-        self._profile: tuple[Any, ...] = ()
-
-    def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        """Subscribe to this type, as these publishers offer it."""
-        profile = _common_profile([publisher.qos_profile for publisher in publishers])
-        wanted = kind, profile.durability, profile.reliability
-        if wanted == self._profile:
-            return
-        if self._subscription is not None:
-            self._node.destroy_subscription(self._subscription)
-            self._subscription, self._profile = None, ()
-        try:
-            self._subscription = self._node.create_subscription(
-                message_class(kind), self._topic, _not_called, profile, callback_group=self._group, raw=True
-            )
-        except rclpy_implementation.RCLError:
-            return  # the executor still has the one of another type: try again at the next call
-        self._profile = wanted
-
-    def taken(self) -> Iterator[tuple[bytes, int]]:
-        """The arrived messages, each with the time (ns) at which it was sent."""
-        if self._subscription is not None:
-            yield from ((data, sent) for data, _, sent in take_all(self._subscription))
-
-
 @dataclass(eq=False)
 class _Topic:
     """A requested topic. name: as in the covariate; problem: why there are no samples, empty if there are."""
 
     requested: str
     name: str
-    reader: _Reader
+    reader: FollowingSubscription
     problem: str = ""
     buffer: ScalarBuffer | None = None
 
@@ -87,8 +49,8 @@ class ScalarSubscriber:
     def __init__(self, node: Node, names: Sequence[str]) -> None:
         _check(names)
         self._node = node
-        self._topics = [_Topic(text, _name(text), _Reader(node, text)) for text in names]
-        self._ticks, self._clock = _Reader(node, CLOCK), ClockHistory()
+        self._topics = [_Topic(text, _name(text), FollowingSubscription(node, text)) for text in names]
+        self._ticks, self._clock = FollowingSubscription(node, CLOCK), ClockHistory()
         self._clock_published = False
         self._looked = 0.0
         self._draining = threading.Lock()
@@ -107,7 +69,7 @@ class ScalarSubscriber:
         with self._draining:
             for topic in self._topics:
                 self._find(topic)
-            publishers = self._node.get_publishers_info_by_topic(CLOCK)
+            publishers = self._ticks.publishers()
             self._clock_published = bool(publishers)
             if publishers:
                 self._ticks.follow(CLOCK_TYPE, publishers)
@@ -116,11 +78,11 @@ class ScalarSubscriber:
         """Move arrived messages from the middleware into the buffers."""
         with self._draining:
             for topic in self._topics:
-                for data, sent in topic.reader.taken():
+                for taken in topic.reader.taken():
                     assert topic.buffer is not None
-                    topic.buffer.put(data, sent)
-            for data, sent in self._ticks.taken():
-                self._clock.put(data, sent)
+                    topic.buffer.put(taken.message, taken.sent)
+            for taken in self._ticks.taken():
+                self._clock.put(taken.message, taken.sent)
 
     def waiting(self) -> bool:
         """Whether messages of every published topic wait."""
@@ -158,7 +120,7 @@ class ScalarSubscriber:
 
     def _find(self, topic: _Topic) -> None:
         """Subscribe to a published topic, or note why not; one that has lost its publishers stays as it is."""
-        publishers = self._node.get_publishers_info_by_topic(topic.requested)
+        publishers = topic.reader.publishers()
         kinds = sorted({publisher.topic_type for publisher in publishers})
         usable = [kind for kind in kinds if kind in SCALAR_LAYOUTS]
         if len(usable) == 1:
@@ -193,18 +155,3 @@ def _check(names: Sequence[str]) -> None:
 def _name(requested: str) -> str:
     """The name in a recording, whatever the node's namespace: with a slash before it."""
     return f"/{requested.strip('/')}"
-
-
-def _common_profile(publishers: Sequence[QoSProfile]) -> QoSProfile:
-    """The QoS that all publishers offer: earlier messages are received if all publishers keep them."""
-    kept = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
-    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
-    return QoSProfile(
-        depth=DEPTH,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-    )
-
-
-def _not_called(message: object) -> None:
-    """The callback that a subscription must have: drain() takes the messages instead."""

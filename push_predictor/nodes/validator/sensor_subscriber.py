@@ -3,62 +3,69 @@
 from __future__ import annotations
 
 import threading
-from collections import Counter
 from collections.abc import Sequence
 from time import monotonic
+from typing import TypeAlias
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from push_predictor.nodes.polling import PolledGroup, take_all
+from push_predictor.errors import RequestError
 from push_predictor.nodes.validator.scalar_subscriber import ScalarSubscriber
-from push_predictor.online.message_buffer import MessageBuffer
+from push_predictor.nodes.validator.sensors.frame_stream import FrameStream, TransformTopics
+from push_predictor.nodes.validator.sensors.stream_source import sources_of
+from push_predictor.nodes.validator.sensors.topic_stream import TopicStream
+from push_predictor.online.sensors.topic_report import ReportLog, TopicReport
+from push_predictor.online.sensors.turned_wrench import TurnedWrench
 from push_predictor.online.stream_sync import Samples
-from push_predictor.recordings.samples import PUSHER, SLIDER, WRENCH, pusher_stream, slider_stream, wrench_stream
-from push_predictor.recordings.streams import ScalarStream
-
-DEPTH = 5000  # the most that Fast DDS keeps: it rejects newer ones; memory grows as the queue fills
-PERIOD = 0.01  # s between two looks into the middleware, which keeps the last DEPTH messages only
-PATIENCE = 1.0  # s that a run waits for the first message of every topic
-TOPICS = (
-    ("slider", PoseStamped, "slider/pose", SLIDER),
-    ("pusher", PoseStamped, "pusher/pose", PUSHER),
-    ("wrench", WrenchStamped, "pusher/wrench", WRENCH),
+from push_predictor.recordings.fields.sources import Source
+from push_predictor.recordings.samples import (
+    PUSHER,
+    SLIDER,
+    SPATIAL_WRENCH,
+    WRENCH,
+    pusher_stream,
+    slider_stream,
+    wrench_stream,
 )
+from push_predictor.recordings.select import STREAMS
+from push_predictor.recordings.streams import ScalarStream
+from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
+
+PERIOD = 0.01  # s between two looks into the middleware, which keeps the last messages only
+LOOK = 0.05  # s between two looks at the publishers
+PATIENCE = 1.0  # s that a run waits for the first message of every topic
+WORLD = "world"
+RULES = {"slider": SLIDER, "pusher": PUSHER, "wrench": WRENCH}
+
+Stream: TypeAlias = TopicStream | FrameStream
 
 
 class SensorSubscriber:
-    """Subscribes to slider/pose, pusher/pose and pusher/wrench, reliable and deep unless QoS overrides change that.
+    """Subscribes to slider, pusher and wrench, as topics of any type with a pose or wrench or as frames of tf.
 
-    frame_id: frame that the headers must name, empty for any. scalars: the scalar topics to subscribe to as well. A
-    thread empties the middleware's queues: a fast replay fills them while a portion of samples is processed.
+    topics: where the streams are; slider/pose, pusher/pose and pusher/wrench where they are not given. frame_id: frame
+    that the headers must name, empty for any; topics.world replaces it. scalars: the scalar topics to subscribe to as
+    well. A thread empties the middleware's queues: a fast replay fills them while a portion of samples is processed.
+    Raises RequestError for a source that is not valid.
     """
 
-    def __init__(self, node: Node, frame_id: str, scalars: Sequence[str] = ()) -> None:
-        self._node = node
+    def __init__(self, node: Node, topics: Topics, frame_id: str, scalars: Sequence[str] = ()) -> None:
+        sources = sources_of(topics)
         self._scalars = ScalarSubscriber(node, scalars)
         self._newest: int | None = None  # stamp (ns) of the poses
-        self._buffers = {name: MessageBuffer(rules, frame_id) for name, _, _, rules in TOPICS}
-        self.lost: Counter[str] = Counter()
-        self._last: dict[str, int] = {}
+        self._frame_id = topics.world or frame_id
+        self._turned = _turned(topics)
+        self._tf = _transform_topics(node, sources, topics.world, self._frame_id)
+        self._streams = {name: self._stream(node, name, source) for name, source in sources.items()}
+        self._buffers = {name: stream.buffer for name, stream in self._streams.items()}
+        self._log = ReportLog()
+        self._reports: list[TopicReport] = []
         self._empty = monotonic()  # when nothing waited last
-        group, overriding = PolledGroup(), QoSOverridingOptions.with_default_policies()
-        self._subscriptions = {
-            name: node.create_subscription(
-                message,
-                topic,
-                self._buffers[name].put,  # not called: drain() takes the messages
-                QoSProfile(depth=DEPTH),
-                callback_group=group,
-                qos_overriding_options=overriding,
-                raw=True,
-            )
-            for name, message, topic, _ in TOPICS
-        }
+        self._settled = not self._tf or bool(topics.world)  # whether the frame of poses is known from the first message
+        self._looked = -LOOK
         self._draining, self._ending = threading.Lock(), threading.Event()
+        self.look()
         self._thread = threading.Thread(target=self._drain_repeatedly, name="sensor subscriber", daemon=True)
         self._thread.start()
 
@@ -73,12 +80,20 @@ class SensorSubscriber:
     def complete(self) -> bool:
         """Whether messages of every topic wait, or messages of some topic have waited for PATIENCE.
 
-        Call it often: it measures the time since no message waited.
+        Call it often: it measures the time since no message waited. Frames of tf always wait for PATIENCE, unless the
+        world is given: only a whole tree has the right root.
         """
         waiting = [len(buffer) > 0 for buffer in self._buffers.values()]
         if not any(waiting):
             self._empty = monotonic()
-        return (all(waiting) and self._scalars.waiting()) or monotonic() - self._empty > PATIENCE
+        early = all(waiting) and self._scalars.waiting() and self._settled
+        return early or monotonic() - self._empty > PATIENCE
+
+    @property
+    def world(self) -> str:
+        """The frame in which the poses are."""
+        found = next((topics.buffer.world for topics in self._tf.values()), "")
+        return found or self._frame_id or WORLD
 
     @property
     def scalar_names(self) -> list[str]:
@@ -86,23 +101,33 @@ class SensorSubscriber:
         return self._scalars.names
 
     def look(self) -> None:
-        """Subscribe to scalar topics that have appeared; call often, in the executor's thread."""
+        """Subscribe as the present publishers offer their topics; call often, in the executor's thread."""
         self._scalars.look()
+        if monotonic() - self._looked < LOOK:
+            return
+        self._looked = monotonic()
+        with self._draining:
+            for stream in self._subscribed():
+                stream.move()
+                stream.look()
 
     def drain(self) -> None:
         """Move arrived messages from the middleware into the buffers."""
         self._scalars.drain()
         with self._draining:  # one at a time, so that messages stay in order
-            for name, subscription in self._subscriptions.items():
-                for data, sequence, _ in take_all(subscription):
-                    self._note_loss(name, subscription.topic_name, sequence)
-                    self._buffers[name].put(data)
+            for stream in self._subscribed():
+                stream.move()
 
-    def _note_loss(self, name: str, topic: str, sequence: int) -> None:
-        """Count messages that were overwritten before they were taken: a publisher numbers its messages."""
-        last, self._last[name] = self._last.get(name, sequence), sequence
-        if sequence > last + 1 and self._node.count_publishers(topic) == 1:
-            self.lost[name] += sequence - last - 1
+    def _subscribed(self) -> list[TopicStream | TransformTopics]:
+        streams = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
+        return [*streams, *self._tf.values()]
+
+    def _stream(self, node: Node, name: str, source: Source) -> Stream:
+        if source.frame:
+            return FrameStream(node, name, source, self._tf[source.topic], RULES[name])
+        if name == "wrench" and self._turned is not None:  # its headers name the tip's frame
+            return TopicStream(node, name, source, STREAMS[name], SPATIAL_WRENCH, "")
+        return TopicStream(node, name, source, STREAMS[name], RULES[name], self._frame_id)
 
     def _drain_repeatedly(self) -> None:
         while not self._ending.wait(PERIOD):
@@ -111,7 +136,9 @@ class SensorSubscriber:
     def take(self) -> Samples:
         """The usable samples since the last call."""
         self._empty = monotonic()
-        slider, pusher, wrench = (self._buffers[name].take() for name, *_ in TOPICS)
+        slider, pusher, wrench = (self._buffers[name].take() for name in STREAMS)
+        if self._turned is not None:
+            wrench = self._turned.put(*wrench, *pusher)
         for stamp, _ in (slider, pusher):
             self._newest = int(np.median(stamp)) if len(stamp) else self._newest  # a single stamp may be wrong
         scalars = self._scalars.take(self._newest)
@@ -121,32 +148,69 @@ class SensorSubscriber:
         """The scalars since the last sample of a sensor."""
         return self._scalars.take(self._newest, last=True)
 
-    def figures(self) -> dict[str, int]:
-        """Counts of messages by topic; rejected ones also by kind, for the kinds that occurred."""
-        found: dict[str, int] = {}
-        for name, buffer in self._buffers.items():
-            found |= {f"{name} samples": buffer.received, f"{name} rejected": buffer.rejected.total()}
-            found |= {f"{name} rejected {kind}": count for kind, count in buffer.rejected.items()}
+    def inspect(self) -> list[TopicReport]:
+        """Make the reports about the topics anew, and return those to log."""
+        with self._draining:
+            self._reports = [stream.report() for stream in self._streams.values()]
+        return self._log.news(self._reports)
+
+    @property
+    def refused(self) -> bool:
+        """Whether a topic cannot be used as it is, by the last inspection."""
+        return any(report.refused for report in self._reports)
+
+    def figures(self) -> dict[str, object]:
+        """The report about each topic, counts of its messages, and of rejected ones by the kinds that occurred."""
+        found: dict[str, object] = {f"{report.stream} topic": report.line for report in self._reports}
+        for name, stream in self._streams.items():
+            buffer = stream.buffer
+            rejected = buffer.rejected
+            found |= {f"{name} samples": buffer.received, f"{name} rejected": rejected.total()}
+            found |= {f"{name} rejected {kind}": count for kind, count in rejected.items()}
             if buffer.dropped:
                 found[f"{name} dropped"] = buffer.dropped
-            if self.lost[name]:
-                found[f"{name} lost"] = self.lost[name]
+            if stream.lost:
+                found[f"{name} lost"] = stream.lost
+        if self._turned is not None and self._turned.without_pose:
+            found["wrench without pose"] = self._turned.without_pose
         return found | self._scalars.figures()
 
     def problems(self) -> list[str]:
-        """What keeps pushes from being found, in words."""
+        """What keeps pushes from being found, in words; about the topics by the last inspection."""
         found = []
-        for name, buffer in self._buffers.items():
-            topic = self._subscriptions[name].topic_name
-            if not buffer.received and name != "wrench":
-                found.append(f"No sample on {topic}. Its number of publishers: {self._node.count_publishers(topic)}.")
-            if buffer.rejected:
-                kinds = ", ".join(f"{kind} {count}" for kind, count in buffer.rejected.items())
-                found.append(
-                    f"{topic}: {buffer.rejected.total()} of {buffer.received} samples were rejected ({kinds})."
-                )
-            if lost := self.lost[name]:
+        for report in self._reports:
+            buffer, topic = self._buffers[report.stream], report.topic
+            lost, rejected = self._streams[report.stream].lost, buffer.rejected
+            if report.problem:
+                found.append(f"{topic}: {report.problem}")
+            if rejected:
+                kinds = ", ".join(f"{kind} {count}" for kind, count in rejected.items())
+                found.append(f"{topic}: {rejected.total()} of {buffer.received} samples were rejected ({kinds}).")
+            if lost:
                 found.append(f"{topic}: {lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
             if buffer.dropped:
-                found.append(f"{topic}: {buffer.dropped} samples were dropped while model or rig were unknown.")
+                found.append(f"{topic}: {buffer.dropped} samples were dropped before they could be used.")
         return found + self._scalars.problems()
+
+
+def _turned(topics: Topics) -> TurnedWrench | None:
+    """What turns the wrench, None for the world's axes. Raises RequestError for axes of a frame in tf."""
+    if topics.wrench_axes == TIP_AXES:
+        return TurnedWrench()
+    if topics.wrench_axes != WORLD_AXES:
+        raise RequestError("wrench_frame", topics.wrench_frame, f"{WORLD_AXES} or {TIP_AXES}")
+    return None
+
+
+def _transform_topics(node: Node, sources: dict[str, Source], world: str, frame_id: str) -> dict[str, TransformTopics]:
+    """The tf topics of all sources that are frames, by their name as given.
+
+    Where the other pose comes from a topic, poses from tf are given in the frame that its headers must name.
+    """
+    poses = [source for name, source in sources.items() if name != "wrench"]
+    frames = [source for source in poses if source.frame]
+    common = world if len(frames) == len(poses) else frame_id
+    return {
+        topic: TransformTopics(node, [source for source in frames if source.topic == topic], common)
+        for topic in dict.fromkeys(source.topic for source in frames)
+    }

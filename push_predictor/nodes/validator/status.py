@@ -21,7 +21,7 @@ from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
 from push_predictor.recordings.windows.stream_faults import describe_faults
 
-SILENT = f"No data for {SILENCE:g} s. Call `~/finish` to write the results."
+SILENT = f"No usable sample for {SILENCE:g} s. Call `~/finish` to write the results."
 NO_SERVER = "No node offers predict_push. Start predict_server."
 
 
@@ -45,6 +45,7 @@ class StatusPublisher:
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
+        self._log_topics()
         problems = self._problems(run)
         if problems != self._logged:
             self._logged = problems
@@ -54,10 +55,22 @@ class StatusPublisher:
         status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
+    def _log_topics(self) -> None:
+        """Log a line for each sensor topic of which something has changed."""
+        log = self._node.get_logger()
+        for report in self._sensors.inspect():
+            if report.refused:  # one line each: rclpy binds the severity to the place of the call
+                log.error(report.line)
+            elif report.problem:
+                log.warning(report.line)
+            else:
+                log.info(report.line)
+
     def _problems(self, run: ValidationRun | None) -> list[str]:
         unsaved = run.journal.failure if run and run.journal else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
+        found += run.checks.check.problems if run else []
         return [*filter(None, dict.fromkeys(found))]
 
     def _activity(self) -> str:
@@ -77,7 +90,7 @@ def validator_status(
     problems: Sequence[str],
     failure: str,
 ) -> DiagnosticStatus:
-    """The status of a validator: ERROR for a failure, WARN for a problem.
+    """The status of a validator: ERROR for a failure, a refused topic or refused samples, WARN for a problem.
 
     run: the present one or the last. problems: with models and rig, in words. failure: why a result could not be
     written, empty if it could.
@@ -85,11 +98,12 @@ def validator_status(
     warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
     if not client.server_available:
         warnings.append(NO_SERVER)
-    level = Level.ERROR if failure else Level.WARN if warnings else Level.OK
+    wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
+    level = Level.ERROR if wrong else Level.WARN if warnings else Level.OK
     values: dict[str, object] = {"state": state, **sensors.figures(), "open requests": client.open}
     values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
     if run is not None:
-        values |= _stream_figures(run) | _scores(run)
+        values |= _stream_figures(run) | _scores(run) | {"data check": run.checks.check.result}
         values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
     return diagnostic_status(name, level, _paragraph([failure, *warnings]) or state, values)
 

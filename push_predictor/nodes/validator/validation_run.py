@@ -22,6 +22,7 @@ from push_predictor.online.completed_pushes import CompletedPushes
 from push_predictor.online.files.residual_journal import ResidualJournal
 from push_predictor.online.files.window_table import WindowTable
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
+from push_predictor.online.sample_check import SampleCheck
 from push_predictor.online.stream_sync import Samples, StreamSync
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig
@@ -37,7 +38,8 @@ class ValidationRun:
 
     models: by the name to request, the main one first. publish: called for every prediction, with rig and number of
     the model. alarm: of the main model. output: folder in which windows and residuals are saved as they arrive; None:
-    they are not saved. scalars: the topics that may be published in addition to the sensors.
+    they are not saved. scalars: the topics that may be published in addition to the sensors. strict: a warning about
+    the samples is an error.
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class ValidationRun:
         alarm: AlarmProcess | None = None,
         output: Path | None = None,
         scalars: Sequence[str] = (),
+        strict: bool = False,
     ) -> None:
         self.rig = rig
         self.alarm = alarm
@@ -57,6 +60,7 @@ class ValidationRun:
         self.journal = ResidualJournal(output) if output else None
         self.validation = LiveValidation(models)
         self.sync = StreamSync(scalars)  # how far each stream has come
+        self.checks = SampleCheck(rig, strict)
         self.refused = 0
         self.last_refusal = ""
         self._pushes = CompletedPushes()
@@ -79,6 +83,7 @@ class ValidationRun:
         self._finder.add_pusher(samples.pusher)
         self._finder.add_slider(samples.slider)
         self.sync.note(samples)
+        self.checks.add(samples)
         if self.sync.in_step():
             self._request(self._finder.take_ready())
 
@@ -137,7 +142,9 @@ class ValidationRun:
         window, name = self.validation.windows[number], self.validation.names[model]
         try:
             prediction = _finite(prediction_from_response(response))
-            residual = residual_message(name, window, prediction.mean[0], prediction.covariance[0])
+            residual = residual_message(
+                name, window, prediction.mean[0], prediction.covariance[0], bool(prediction.in_domain[0])
+            )
         except (RefusedError, MessageError) as error:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"

@@ -1,4 +1,4 @@
-"""A folder of CSV files, one for each stream, as messages of a recording."""
+"""A folder of CSV or Parquet files, one for each stream, as messages of a recording."""
 
 from __future__ import annotations
 
@@ -21,29 +21,38 @@ HEADING = ("time", "x", "y", "z", "heading")
 SPATIAL = ("time", "fx", "fy", "fz", "tx", "ty", "tz")
 PLANAR = ("time", "fx", "fy", "torque")
 STREAMS = {
-    "slider.csv": ("/slider/pose", (QUATERNION, HEADING)),
-    "pusher.csv": ("/pusher/pose", (QUATERNION, HEADING)),
-    "wrench.csv": ("/pusher/wrench", (SPATIAL, PLANAR)),
+    "slider": ("/slider/pose", (QUATERNION, HEADING)),
+    "pusher": ("/pusher/pose", (QUATERNION, HEADING)),
+    "wrench": ("/pusher/wrench", (SPATIAL, PLANAR)),
 }
 SCALAR = "sensor_msgs/msg/Temperature"  # one number with a header; of another file, its further columns
+PARQUET = (
+    "Parquet files need the package pyarrow (pip install pyarrow); or convert each to CSV: "
+    "python -c \"import pandas; pandas.read_parquet('slider.parquet').to_csv('slider.csv', index=False)\""
+)
 _LATEST = 2**31 * 10**9  # ns; a header has 32 bits of seconds
 
 
 class CsvStreams:
     """The streams in slider.csv, pusher.csv, wrench.csv and further files; the attributes are those of McapFile.
 
-    time is in s; x, y, z in m; heading in rad; force in N, torque in N m. Each further column of another file is a
-    scalar named /FILE/COLUMN. Raises RecordingError that names file, line, column, value and what is accepted.
+    Each may be a Parquet file with the same columns instead. time is in s; x, y, z in m; heading in rad; force in N,
+    torque in N m. Each further column of another file is a scalar named /FILE/COLUMN. Raises RecordingError that names
+    file, line, column, value and what is accepted.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.path, self.notes = folder, list[str]()
+        self.path = folder
+        self.notes: list[str] = []
         self.schemas: dict[str, str] = {}
         self.qos: dict[str, str] = {}
         self.metadata: dict[str, Mapping[str, str]] = {}
         self._streams: dict[str, tuple[str, IntArray, list[bytes]]] = {}
-        for file in sorted(folder.glob("*.csv")):
-            self._streams |= _streams(file)
+        for file in _files(folder):
+            if file.suffix == ".csv" or file.stem in STREAMS or _parquet_is_read():
+                self._streams |= _streams(file)
+            else:
+                self.notes.append(f"{file.name} is ignored; {PARQUET}")
 
     @property
     def topics(self) -> dict[str, str]:
@@ -60,19 +69,33 @@ class CsvStreams:
 
 def is_csv_recording(folder: Path) -> bool:
     """Whether a folder contains the two streams that a recording needs."""
-    return (folder / "slider.csv").is_file() and (folder / "pusher.csv").is_file()
+    return {"slider", "pusher"} <= {file.stem for file in _files(folder)}
+
+
+def _files(folder: Path) -> list[Path]:
+    """The files of the streams; of one with both endings the CSV file."""
+    found = {file.stem: file for ending in ("parquet", "csv") for file in sorted(folder.glob(f"*.{ending}"))}
+    return [file for _, file in sorted(found.items())]
+
+
+def _parquet_is_read() -> bool:
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def _streams(file: Path) -> dict[str, tuple[str, IntArray, list[bytes]]]:
     header, rows = _cells(file)
-    if file.name not in STREAMS:
+    if file.stem not in STREAMS:
         if header[0] != "time" or len(header) < 2:
             raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give time and further columns")
         stamp, values = _numbers(file, header, rows)
         columns = {f"/{file.stem}/{name}": column for name, column in zip(header[1:], values.T, strict=True)}
         layout = SCALAR_LAYOUTS[SCALAR]
         return {name: (SCALAR, stamp, encode(stamp, column[:, None], layout)) for name, column in columns.items()}
-    topic, accepted = STREAMS[file.name]
+    topic, accepted = STREAMS[file.stem]
     if header not in accepted:
         choice = " or ".join(repr(",".join(names)) for names in accepted)
         raise RecordingError(f"{file} line 1: the header is {','.join(header)!r}, give {choice}")
@@ -94,6 +117,8 @@ def _as_message(header: Sequence[str], values: Array) -> tuple[str, Layout, Arra
 
 def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
     """The header, and the rows with their line numbers."""
+    if file.suffix == ".parquet":
+        return _parquet_cells(file)
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.reader(stream, strict=True)
@@ -107,6 +132,23 @@ def _cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
         if len(row) != len(header):
             raise RecordingError(f"{file} line {line}: {len(row)} cells, the header has {len(header)}")
     return header, found[1:]
+
+
+def _parquet_cells(file: Path) -> tuple[tuple[str, ...], list[tuple[int, list[str]]]]:
+    """The same of a Parquet file, with the line numbers that it would have as CSV."""
+    try:
+        from pyarrow import parquet
+    except ImportError:
+        raise RecordingError(f"{file}: {PARQUET}") from None
+    try:
+        table = parquet.read_table(file)
+        columns = [column.to_pylist() for column in table.columns]
+    except Exception as error:  # pyarrow raises its own classes, OSError and ValueError
+        raise RecordingError(f"{file}: cannot be read as Parquet ({' '.join(str(error).split())})") from None
+    if not table.num_rows:
+        raise RecordingError(f"{file}: contains no rows, give one row for each sample")
+    cells = (["" if cell is None else str(cell) for cell in row] for row in zip(*columns, strict=True))
+    return tuple(table.column_names), list(enumerate(cells, start=2))
 
 
 def _numbers(file: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> tuple[IntArray, Array]:

@@ -32,7 +32,10 @@ class BagMetadata:
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """A topic of metadata.yaml; durability is 'volatile' or 'transient_local'."""
+    """A topic of metadata.yaml.
+
+    durability: 'volatile' or 'transient_local'; reliability: 'reliable' or 'best_effort'.
+    """
 
     name: str
     type: str
@@ -40,6 +43,7 @@ class TopicInfo:
     type_hash: str = ""
     depth: int = 10
     durability: str = "volatile"
+    reliability: str = "reliable"
 
 
 def read_bag_metadata(folder: Path) -> BagMetadata:
@@ -130,7 +134,7 @@ def _qos(topic: TopicInfo) -> list[dict[str, object]]:
         {
             "history": "keep_last",
             "depth": topic.depth,
-            "reliability": "reliable",
+            "reliability": topic.reliability,
             "durability": topic.durability,
             "deadline": _FOREVER,
             "lifespan": _FOREVER,

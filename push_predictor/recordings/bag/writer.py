@@ -1,4 +1,4 @@
-"""Write a rosbag2 bag of any messages; it appears under its name only when it is complete."""
+"""Write a rosbag2 bag of any messages: under its name only when it is complete, or from the start (`live`)."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from push_predictor.recordings.bag.metadata import METADATA_FILE, TopicInfo, bag
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 CHUNK_SIZE = 1 << 20
+LIVE_CHUNK_SIZE = 1 << 15  # bytes: what a killed process loses at most, with what was written since the last flush()
 LARGEST_STAMP = 2**63 - 1
 
 
@@ -25,18 +26,24 @@ class BagWriter:
     """A context manager that writes a bag.
 
     path: a folder (metadata.yaml and NAME_0.mcap, for `ros2 bag play`) or a bare NAME.mcap. An earlier bag of that name
-    is replaced; after an exception inside the context it is unchanged. The same calls write the same bytes. Raises
-    RecordingError if path is not a bag or cannot be written, and for an unknown compression (zstd, lz4 and none are
-    accepted).
+    is replaced; after an exception inside the context it is unchanged. The same calls write the same bytes.
+
+    live: for messages that cannot be had again. The file grows under its final name, an earlier bag is removed on
+    entering, and the bag is completed after an exception as well. A killed process leaves a readable MCAP file.
+
+    Raises RecordingError if path is not a bag or cannot be written, and for an unknown compression (zstd, lz4 and none
+    are accepted).
     """
 
-    def __init__(self, path: Path, *, compression: str = "zstd") -> None:
+    def __init__(self, path: Path, *, compression: str = "zstd", live: bool = False) -> None:
         if compression not in COMPRESSIONS:
             raise RecordingError(f"compression: {compression!r}, give one of {', '.join(COMPRESSIONS)}")
         self.path = Path(os.path.abspath(path))
         self._bare = self.path.suffix == ".mcap"
-        _check_target(self.path, self._bare)
-        self._unfinished = self.path.with_name(f".{self.path.name}.{os.getpid()}.unfinished")
+        check_replaceable(self.path, bare=self._bare)
+        self._live = live
+        unfinished = self.path.with_name(f".{self.path.name}.{os.getpid()}.unfinished")
+        self._unfinished = self.path if live else unfinished
         self._file_name = self.path.name if self._bare else f"{self.path.name}_0.mcap"
         self._compression = COMPRESSIONS[compression]
         self._topics: dict[str, TopicInfo] = {}
@@ -51,10 +58,12 @@ class BagWriter:
             with self._naming_the_bag():
                 self._stream = self._create().open("wb")
         except RecordingError:
-            with suppress(OSError):
-                _remove(self._unfinished)
+            if not self._live:
+                with suppress(OSError):
+                    _remove(self._unfinished)
             raise
-        self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=self._compression)
+        chunk_size = LIVE_CHUNK_SIZE if self._live else CHUNK_SIZE
+        self._writer = Writer(self._stream, chunk_size=chunk_size, compression=self._compression)
         self._writer.start(profile="ros2", library="push_predictor")  # a few bytes into the stream's buffer
         return self
 
@@ -62,13 +71,14 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if kind is None:
+            if kind is None or self._live:
                 with self._naming_the_bag():
                     self._finish()
         finally:
-            with suppress(OSError):  # closing retries the failed write; the file is removed anyway
+            with suppress(OSError):  # closing retries the failed write, which has been reported
                 self._stream.close()
-            _remove(self._unfinished)
+            if not self._live:
+                _remove(self._unfinished)
 
     def add_topic(
         self,
@@ -79,9 +89,10 @@ class BagWriter:
         type_hash: str = "",
         depth: int = 10,
         durability: str = "volatile",
+        reliability: str = "reliable",
     ) -> None:
-        """Declare a topic (reliable, keep last). schema_text: ros2msg with all referenced definitions."""
-        topic = TopicInfo(absolute(name), type, 0, type_hash, depth, durability)
+        """Declare a topic (keep last). schema_text: ros2msg with all referenced definitions."""
+        topic = TopicInfo(absolute(name), type, 0, type_hash, depth, durability, reliability)
         metadata = {"offered_qos_profiles": qos_text(topic), "topic_type_hash": type_hash}
         with self._naming_the_bag():
             if type not in self._schemas:
@@ -112,6 +123,11 @@ class BagWriter:
         self._counts[name] += 1
         self._first, self._last = min(self._first, stamp), max(self._last, stamp)
 
+    def flush(self) -> None:
+        """Hand all complete chunks to the operating system. Raises RecordingError for a full disk."""
+        with self._naming_the_bag():
+            self._stream.flush()
+
     @contextmanager
     def _naming_the_bag(self) -> Iterator[None]:
         """Raise an OSError as a RecordingError that names the bag."""
@@ -137,11 +153,14 @@ class BagWriter:
         self._stream.flush()
         os.fsync(self._stream.fileno())
         self._stream.close()
+        if not self._bare:
+            write_whole(self._unfinished / METADATA_FILE, self._metadata_text().encode())
+        if self._live:
+            return
         if self._bare:
             self._unfinished.replace(self.path)
-            return
-        write_whole(self._unfinished / METADATA_FILE, self._metadata_text().encode())
-        _replace_folder(self.path, self._unfinished)
+        else:
+            replace_folder(self.path, self._unfinished)
 
     def _metadata_text(self) -> str:
         topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
@@ -154,7 +173,8 @@ def absolute(topic: str) -> str:
     return "/" + topic.lstrip("/")
 
 
-def _check_target(path: Path, bare: bool) -> None:
+def check_replaceable(path: Path, *, bare: bool = False) -> None:
+    """Raise RecordingError unless a bag can be written there: a path that is free or has a bag, no other folder."""
     if bare and path.is_dir():
         raise RecordingError(f"{path}: is a folder, give a file name or a folder name without .mcap")
     if bare or not path.exists():
@@ -163,7 +183,7 @@ def _check_target(path: Path, bare: bool) -> None:
         raise RecordingError(f"{path}: exists and is not a bag, give another name or remove it")
 
 
-def _replace_folder(path: Path, new: Path) -> None:
+def replace_folder(path: Path, new: Path) -> None:
     """Replace an earlier folder by a new one; if that fails, the earlier one is restored."""
     earlier = new.with_suffix(".earlier")
     if path.is_dir():

@@ -31,6 +31,11 @@ class Finding:
     values: dict[str, Value] = field(default_factory=dict)
 
     @property
+    def text(self) -> str:
+        """The finding and the advice, in one line."""
+        return f"{self.sentence} {self.advice}"
+
+    @property
     def lines(self) -> list[str]:
         """Lines to print: the finding and, below it, the advice."""
         return [f"{self.severity:8s} {self.name:16s} {self.sentence}", f"{'':25s} -> {self.advice}"]

@@ -1,4 +1,4 @@
-"""Fit yaw, shift and size of the outline, and the clock lag, to the tip's positions in contact.
+"""Fit yaw, shift and size of the outline, the clock lag and the tip's radius to the tip's positions in contact.
 
 In contact the tip's centre is one tip radius from the outline. The gap that is left depends on the place of contact if
 the outline is turned, shifted or of a wrong size, and on the speed if the clocks are apart. The standard deviations
@@ -16,22 +16,35 @@ from scipy.optimize import least_squares
 
 from push_predictor.geometry.frames import rotate, wrap_angle
 from push_predictor.geometry.outline import Outline
-from push_predictor.types import Array, IntArray
+from push_predictor.geometry.shapes import transformed
+from push_predictor.types import Array, BoolArray, IntArray
 
 Gaps: TypeAlias = Callable[[Array], Array]
 MOST_SAMPLES = 1200  # evenly drawn: more change the result by less than its standard deviation
 UNKNOWN_SIZE = 0.02  # relative sd
 NOISE = 1e-4  # m; a gap beyond this counts linearly, not squared
+CORNER = 0.003  # m
 STARTS = 12  # turns from which the fit begins
-WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2])  # rad, m, m, 1, s: prior sd, for what the contacts do not determine
+WEAK = np.array([1.0, 0.05, 0.05, 0.3, 0.2, 0.02])  # rad, m, m, 1, s, m: prior sd of what the contacts do not determine
+TIE = 1.3  # ratio of the gaps up to which the smallest turn is preferred: an almost symmetric outline has several
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """n samples in contact, in the slider's frame: tips (n, 2) m, velocities (n, 2) m/s, number of the push (n,)."""
+
+    tips: Array
+    velocities: Array
+    push: IntArray
 
 
 @dataclass(frozen=True, eq=False)
 class OutlineFit:
     """A correction of the outline in the slider's frame, and its uncertainty.
 
-    estimate (5,) and sd (5,): yaw (rad, counter-clockwise), shift along x and y (m), relative size minus 1, lag of the
-    slider's stamps (s). gap: median absolute gap that is left, m; pushes: number of contacts.
+    estimate (6,) and sd (6,): yaw (rad, counter-clockwise, about the centroid), shift along x and y (m), relative size
+    minus 1, lag of the slider's stamps (s), correction of the tip's radius (m); estimate and sd are 0 where a parameter
+    was not fitted. gap: median absolute gap that is left, m; pushes: number of contacts.
     """
 
     estimate: Array
@@ -40,31 +53,54 @@ class OutlineFit:
     pushes: int
 
 
-def fit_outline(outline: Outline, radius: float, tips: Array, velocities: Array, push: IntArray) -> OutlineFit:
-    """Fit the correction to tips (n, 2; m) with velocities (n, 2; m/s), in the slider's frame, of pushes (n,).
+def fit_outline(outline: Outline, radius: float, contacts: Contacts) -> OutlineFit:
+    """Fit the correction to the contacts of a tip (radius in m), with the radius as given.
 
-    The size is taken as given where the contacts do not separate it from a shift: all on one side, for example.
+    The size is taken as given too where the contacts do not separate it from a shift: all on one side, for example.
     """
-    fit = _fit(outline, radius, tips, velocities, push, True)
-    return fit if fit.sd[3] < UNKNOWN_SIZE else _fit(outline, radius, tips, velocities, push, False)
+    fit = _fit(outline, radius, contacts, sized=True, tip=False)
+    return fit if fit.sd[3] < UNKNOWN_SIZE else _fit(outline, radius, contacts, sized=False, tip=False)
 
 
-def _fit(outline: Outline, radius: float, tips: Array, velocities: Array, push: IntArray, sized: bool) -> OutlineFit:
-    rows = np.unique(np.linspace(0, len(tips) - 1, MOST_SAMPLES).astype(np.int64))
-    tips, velocities, push = tips[rows], velocities[rows], push[rows]
-    turns = outline.rotational_symmetry
-    free = np.array([turns != 0, True, True, sized, True])
+def fit_outline_and_tip(outline: Outline, radius: float, contacts: Contacts, first: OutlineFit) -> OutlineFit:
+    """Fit the correction with both size and tip radius. Large sd show that the contacts do not separate the two.
+
+    first: the fit without the radius. Contacts at corners are left out: real corners are rounded, and would decide.
+    """
+    sides = ~_at_corner(outline, contacts, first)
+    chosen = Contacts(contacts.tips[sides], contacts.velocities[sides], contacts.push[sides])
+    return _fit(outline, radius, chosen if sides.any() else contacts, sized=True, tip=True)
+
+
+def _at_corner(outline: Outline, contacts: Contacts, fit: OutlineFit) -> BoolArray:
+    """Which contacts (n,) are near a corner of the corrected outline."""
+    if outline.semi_axes is not None:
+        return np.zeros(len(contacts.tips), dtype=np.bool_)
+    yaw, x, y, growth, lag, _ = fit.estimate
+    corrected = transformed(outline, yaw, (x, y), 1.0 + growth)
+    contact = corrected.project(contacts.tips - lag * contacts.velocities).contact
+    away = np.abs(contact[:, None] - corrected.edge_starts).min(axis=1) * corrected.perimeter
+    return np.asarray(away < CORNER)
+
+
+def _fit(outline: Outline, radius: float, contacts: Contacts, sized: bool, tip: bool) -> OutlineFit:
+    rows = np.unique(np.linspace(0, len(contacts.tips) - 1, MOST_SAMPLES).astype(np.int64))
+    centre = outline.centroid  # a turn about it shifts nothing, so that both are known as well as they can be
+    centred = transformed(outline, shift=(-centre[0], -centre[1]))
+    tips, velocities, push = contacts.tips[rows] - centre, contacts.velocities[rows], contacts.push[rows]
+    turns = centred.rotational_symmetry
+    free = np.array([turns != 0, True, True, sized, True, tip])
 
     def gaps(free_part: Array) -> Array:
-        full = np.zeros(5)
+        full = np.zeros(6)
         full[free] = free_part
-        return gap_after(outline, radius, tips, velocities, full)
+        return gap_after(centred, radius, tips, velocities, full)
 
     def residuals(free_part: Array) -> Array:
         return np.concatenate([gaps(free_part) / NOISE, free_part / WEAK[free]])
 
-    best = min((_refined(residuals, start[free]) for start in _starts(turns, residuals, free)), key=_cost(gaps))
-    part, sd, estimate = best, np.zeros(5), np.zeros(5)
+    part = _best([_refined(residuals, start[free]) for start in _starts(turns, residuals, free)], gaps)
+    sd, estimate = np.zeros(6), np.zeros(6)
     sd[free], estimate[free] = _deviation(gaps, part, push, WEAK[free]), part
     if turns:
         estimate[0] = wrap_angle(np.asarray(estimate[0] * turns)) / turns
@@ -72,16 +108,22 @@ def _fit(outline: Outline, radius: float, tips: Array, velocities: Array, push: 
 
 
 def gap_after(outline: Outline, radius: float, tips: Array, velocities: Array, correction: Array) -> Array:
-    """Gaps (n,) m between tips and the corrected outline."""
-    yaw, x, y, growth, lag = correction
+    """Gaps (n,) m between tips and the corrected outline, whose centroid is the origin; correction as in OutlineFit."""
+    yaw, x, y, growth, lag, thicker = correction
     size = 1.0 + max(growth, -0.9)
     own = rotate(tips - lag * velocities - [x, y], -yaw) / size
-    return np.asarray(size * outline.project(own).distance - radius)
+    return np.asarray(size * outline.project(own).distance - radius - thicker)
+
+
+def _best(parts: list[Array], gaps: Gaps) -> Array:
+    """The first, unless another leaves a clearly smaller gap; the first begins without a correction."""
+    costs = [_cost(gaps)(part) for part in parts]
+    return parts[0] if costs[0] <= TIE * min(costs) else parts[int(np.argmin(costs))]
 
 
 def _starts(turns: int, residuals: Gaps, free: Array) -> list[Array]:
     """No correction, and the two best of the turns within one period of the symmetry."""
-    start = np.zeros((STARTS, 5))
+    start = np.zeros((STARTS, 6))
     if not turns:
         return [start[0]]
     start[:, 0] = np.arange(STARTS) * 2.0 * np.pi / turns / STARTS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from push_predictor.geometry.frames import wrap_angle
 from push_predictor.recordings.checks.finding import Finding, Value
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording
@@ -17,7 +18,8 @@ LOWEST_RATE = 1.0  # Hz
 LONGEST = 30.0  # s of a table's row
 STILL = 1e-5  # rad; a tracker's noise is larger
 TRAVEL = 0.02  # m of a slider that also turns
-OUTRUN = 5.0  # path lengths of the tip; a slider does not move farther in a window
+OUTRUN = 5.0  # path lengths of the tip; a slider does not move farther in a window, nor turn by more path lengths
+TURN_SPAN = 0.05  # s between the poses whose turns are summed
 PUSHER_MM = "Give positions in metres: divide by 1000."
 
 
@@ -27,6 +29,8 @@ def stream_units(recording: Recording, rig: Rig) -> list[Finding]:
     for name, stream in (("slider", recording.slider), ("pusher", recording.pusher)):
         if len(stream) > 2:
             found += [_rate(name, stream) or _speed(name, stream)]
+    if not any(found):
+        found.append(_turning(recording.slider, rig))
     return [finding for finding in found if finding is not None]
 
 
@@ -70,11 +74,15 @@ def _column(name: str, unit: str, value: float, most: float, of: str) -> Finding
 
 
 def _rig_length(rig: Rig) -> Finding | None:
-    reach = float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
+    reach = _reach(rig)
     if max(reach, rig.pusher_radius) < LARGEST:
         return None
     sentence = f"The rig's outline reaches {reach:.4g} m, the tip radius is {rig.pusher_radius:.4g} m: probably mm."
     return Finding("units_rig", "refused", sentence, "Give the rig's lengths in metres.", {"reach": Value(reach, "m")})
+
+
+def _reach(rig: Rig) -> float:
+    return float(np.max(np.linalg.norm(rig.outline.vertices, axis=1)))
 
 
 def _rate(name: str, stream: PoseStream) -> Finding | None:
@@ -102,6 +110,21 @@ def _speed(name: str, stream: PoseStream) -> Finding | None:
         return None
     sentence = f"The {name} moves at {speed:.3g} m/s, more than {FASTEST:.0f} m/s: its positions are probably in mm."
     return Finding(f"units_length_{name}", "refused", sentence, PUSHER_MM, {"speed": Value(speed, "m/s")})
+
+
+def _turning(slider: PoseStream, rig: Rig) -> Finding | None:
+    """A pushed slider turns about as far as it moves, in terms of its size."""
+    usable = np.isfinite(slider.x + slider.y + slider.heading)
+    period = 1e-9 * float(np.median(np.diff(slider.stamp))) if len(slider) > 1 else TURN_SPAN
+    pose = np.column_stack([slider.x, slider.y, slider.heading])[usable][
+        :: max(1, round(TURN_SPAN / max(period, 1e-6)))
+    ]
+    step = np.diff(pose, axis=0)
+    turn, path = float(np.sum(np.abs(wrap_angle(step[:, 2])))), float(np.sum(np.hypot(*step[:, :2].T)))
+    if turn * _reach(rig) <= OUTRUN * max(path, TRAVEL):
+        return None
+    sentence = f"The slider turns by {turn:.0f} rad over {path:.2f} m: its heading is probably in degrees."
+    return Finding("units_heading", "refused", sentence, "Give headings in radians.", {"turn": Value(turn, "rad")})
 
 
 def _weighted_median(values: Array, weights: Array) -> float:

@@ -1,4 +1,5 @@
 """Fields of messages of any type: poses, wrenches and scalars, as messages of the types that a recording has.
 
-Import `sources` and `transforms`; `message_text` parses definitions and `columns` reads fields from CDR.
+Import `sources`, `transforms`, `wrench_axes` and `wrench_bias`; `message_text` parses definitions and `columns` reads
+fields from CDR.
 """

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from push_predictor.types import Array
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
+from push_predictor.types import Array, IntArray
 
 _PARALLEL = 1.0 - 1e-10  # cosine above which a straight line between two quaternions is exact to rounding
 
@@ -51,3 +52,23 @@ def interpolated(first: Array, second: Array, share: Array) -> Array:
     quaternion = a[:, None] * first[:, 3:] + (sign * b)[:, None] * second[:, 3:]
     position = (1.0 - share)[:, None] * first[:, :3] + share[:, None] * second[:, :3]
     return normalised(np.hstack([position, quaternion]))
+
+
+def poses_at(stamp: IntArray, known: IntArray, rows: Array) -> Array:
+    """Poses (n, 7) at stamps (n,) ns, interpolated between the samples of a stream: known (m,) ns, rows (m, 7).
+
+    The samples may be in any order; of equal stamps the first counts. A row is NaN at a stamp outside the stream's time
+    or in a dropout of it.
+    """
+    known, first = np.unique(known, return_index=True)
+    if not len(known):
+        return np.full((len(stamp), 7), np.nan)
+    rows = rows[first]
+    after = np.minimum(np.searchsorted(known, stamp), len(known) - 1)
+    before = np.maximum(after - 1, 0)
+    span = known[after] - known[before]
+    found = interpolated(rows[before], rows[after], (stamp - known[before]) / np.maximum(span, 1))
+    period = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    dropout = span * NANOSECOND > longest_interval(period * NANOSECOND)
+    outside = (stamp < known[0]) | (stamp > known[-1]) | (dropout & (stamp != known[after]))
+    return np.asarray(np.where(outside[:, None], np.nan, found))

@@ -61,7 +61,7 @@ SCALAR_TARGET = Target(STAMPED_SCALAR, SCALAR_LAYOUTS[STAMPED_SCALAR], NUMBERS, 
 
 @dataclass(frozen=True)
 class Source:
-    """A stream as it was named. key: of NAME.recording.yaml, option: of the command line.
+    """A stream as it was named. key: of NAME.recording.yaml or a parameter; option: of the command line, '' for none.
 
     text: as given; topic, field (after the first dot) and frame (after the colon) are its parts.
     """
@@ -86,8 +86,9 @@ class Source:
         return self.text.partition(":")[2].strip("/")
 
     def error(self, path: object, problem: str) -> RecordingError:
-        """An error that names the bag, the key, the option and the value."""
-        return RecordingError(f"{path}: {self.key} {self.text!r} (option {self.option}): {problem}")
+        """An error that names the bag ('' for live topics), the key, the option and the value."""
+        before, option = f"{path}: " if path else "", f" (option {self.option})" if self.option else ""
+        return RecordingError(f"{before}{self.key} {self.text!r}{option}: {problem}")
 
 
 def definitions_of(type_name: str, schemas: Mapping[str, str]) -> Definitions:
@@ -121,7 +122,7 @@ def messages_as(
 
     The stamp and frame are those of the nearest header around the field; without one the log time is the stamp.
     """
-    header = _header(field, type_name, definitions)
+    header = header_path(field, type_name, definitions)
     converted = [b""] * len(messages)
     tops = [path.partition(".")[0].partition("[")[0] for path in (field, header) if path]
     logged = np.array(log_times, np.uint64).astype(np.int64)
@@ -146,7 +147,7 @@ def header_stamps(block: Block, header: str) -> tuple[IntArray, np.ndarray[tuple
     return seconds.astype(np.int64) * _NANO + nanoseconds.astype(np.int64), nanoseconds < _NANO
 
 
-def _header(field: str, type_name: str, definitions: Definitions) -> str:
+def header_path(field: str, type_name: str, definitions: Definitions) -> str:
     """The path of the nearest header around a field, '' without one."""
     parts = field.split(".")[:-1]
     for depth in range(len(parts), -1, -1):
@@ -159,7 +160,7 @@ def _header(field: str, type_name: str, definitions: Definitions) -> str:
 def _refusal(source: Source, type_name: str, target: Target, definitions: Definitions) -> str:
     what = f"{source.topic} is of type {type_name!r}"
     if type_name == JOINTS and target is not SCALAR_TARGET:
-        return f"{what}, which has no pose; record /tf and /tf_static and give the frame of the tip, as in /tf:tool0"
+        return f"{what}, which has no pose; take it from /tf and /tf_static: give the frame of the tip, as in /tf:tool0"
     if type_name in TF_TYPES and target is POSE_TARGET:
         return f"{what}, give a frame, as in {source.topic}:block"
     if short_name(type_name) not in definitions:

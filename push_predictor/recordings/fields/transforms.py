@@ -10,10 +10,9 @@ import numpy as np
 
 from push_predictor.recordings.fields.columns import Block, blocks
 from push_predictor.recordings.fields.message_text import STANDARD
-from push_predictor.recordings.fields.pose_rows import composed, interpolated, inverted, normalised
+from push_predictor.recordings.fields.pose_rows import composed, inverted, normalised, poses_at
 from push_predictor.recordings.fields.sources import header_stamps
-from push_predictor.recordings.windows.track import DROPOUT_PERIODS, NANOSECOND, SHORTEST_DROPOUT
-from push_predictor.types import Array, BoolArray, IntArray
+from push_predictor.types import Array, IntArray
 
 WORLD = "world"
 _NUMBERS = 9  # of a transform: two of its stamp, three of its translation, four of its rotation
@@ -53,33 +52,45 @@ class TransformTree:
         above = self._ancestors(frame)
         return WORLD if WORLD in above else above[-1]
 
-    def poses(self, frame: str, world: str) -> tuple[IntArray, Array, int]:
+    def moving(self, frame: str, world: str) -> dict[str, Edge]:
+        """The edges between two frames that are not static, by child frame. Raises TransformError if all are."""
+        names = [name for part in self._chain(frame, world) for name in part]
+        if not (found := {name: self.edges[name] for name in names if not self.edges[name].static}):
+            raise TransformError(f"frame {frame!r} never moves in {world!r}: all its transforms are static")
+        return found
+
+    def poses(self, frame: str, world: str, leader: str = "") -> tuple[IntArray, Array, int]:
         """Stamps (n,) in ns and rows (n, 7) of a frame in another, and the number of stamps without a pose.
 
-        Stamps are those of the edge with the most samples, in file order. The other edges are interpolated there; a
-        stamp outside an edge's time, or in a dropout of it, has no pose. Raises TransformError.
+        Stamps are those of the edge below `leader`, else of the edge with the most samples, in file order. The other
+        edges are interpolated there; a stamp outside an edge's time, or in a dropout of it, has no pose. Raises
+        TransformError.
         """
         up, down = self._chain(frame, world)
-        moving = [self.edges[name] for name in (*up, *down) if not self.edges[name].static]
-        if not moving:
-            raise TransformError(f"frame {frame!r} never moves in {world!r}: all its transforms are static")
-        finest = max(moving, key=lambda edge: len(edge.stamp))
-        inside = np.ones(len(finest.stamp), dtype=np.bool_)
-        for edge in moving:
-            inside &= edge is finest or _covered(edge, finest.stamp)
-        stamp = finest.stamp[inside]
-        found = self._along(up, stamp, finest, inside)
-        if down:
-            found = composed(inverted(self._along(down, stamp, finest, inside)), found)
-        return stamp, found, len(finest.stamp) - len(stamp)
+        moving = self.moving(frame, world)
+        finest = moving[leader] if leader else max(moving.values(), key=lambda edge: len(edge.stamp))
+        rows = self._composed(up, down, finest.stamp, finest)
+        inside = ~np.isnan(rows).any(axis=1) | np.isnan(finest.rows).any(axis=1)
+        return finest.stamp[inside], rows[inside], int(np.sum(~inside))
 
-    def _along(self, names: Sequence[str], stamp: IntArray, finest: Edge, inside: BoolArray) -> Array:
+    def poses_at(self, frame: str, world: str, stamp: IntArray) -> Array:
+        """Rows (n, 7) of a frame in another at stamps (n,) in ns; NaN where a transform has none.
+
+        Raises TransformError.
+        """
+        return self._composed(*self._chain(frame, world), stamp)
+
+    def _composed(self, up: Sequence[str], down: Sequence[str], stamp: IntArray, exact: Edge | None = None) -> Array:
+        """The pose (n, 7) of the first frame of `up` in that of `down`; `exact` has the stamps themselves."""
+        found = self._along(up, stamp, exact)
+        return composed(inverted(self._along(down, stamp, exact)), found) if down else found
+
+    def _along(self, names: Sequence[str], stamp: IntArray, exact: Edge | None) -> Array:
         """The pose (n, 7) of the first frame in the parent of the last."""
         found = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamp), 1))
         for name in names:
             edge = self.edges[name]
-            rows = edge.rows[inside] if edge is finest else _at(edge, stamp)
-            found = composed(rows, found)
+            found = composed(edge.rows if edge is exact else _at(edge, stamp), found)
         return found
 
     def _chain(self, frame: str, world: str) -> tuple[list[str], list[str]]:
@@ -120,6 +131,16 @@ def read_tree(recorded: Sequence[tuple[Sequence[bytes], str, bool]]) -> Transfor
     return TransformTree({child: _edge(child, parts) for child, parts in found.items()}, unreadable)
 
 
+def joined(child: str, earlier: Edge, later: Edge) -> Edge:
+    """An edge with later samples, of a static one only the last. Raises TransformError for another parent."""
+    if earlier.parent != later.parent:
+        raise _several_parents(child, [earlier.parent, later.parent])
+    static = earlier.static and later.static
+    begin = -1 if static else 0
+    stamp, rows = np.concatenate([earlier.stamp, later.stamp]), np.concatenate([earlier.rows, later.rows])
+    return Edge(earlier.parent, stamp[begin:], rows[begin:], static)
+
+
 class _Part(NamedTuple):
     """Samples of one transform: rows of the messages (n,), parents' names, stamps (n,) and poses (n, 7)."""
 
@@ -150,38 +171,17 @@ def _parts(block: Block, path: str, static: bool) -> Iterator[tuple[str, _Part]]
 def _edge(child: str, parts: Sequence[_Part]) -> Edge:
     parents = sorted(frozenset[str]().union(*(part.parents for part in parts)))
     if len(parents) > 1:
-        raise TransformError(f"frame {child!r} has the parents {' and '.join(map(repr, parents))}, one is accepted")
+        raise _several_parents(child, parents)
     order = np.argsort(np.concatenate([part.rows for part in parts]), kind="stable")
     stamp = np.concatenate([part.stamp for part in parts])[order]
     poses = normalised(np.concatenate([part.poses for part in parts])[order])
     return Edge(parents[0], stamp, poses, all(part.static for part in parts))
 
 
-def _sorted(edge: Edge) -> tuple[IntArray, Array]:
-    """Stamps in order, each once, and their rows."""
-    stamp, first = np.unique(edge.stamp, return_index=True)
-    return stamp, edge.rows[first]
-
-
-def _covered(edge: Edge, stamp: IntArray) -> BoolArray:
-    """Which stamps (n,) lie between two samples of an edge that are not a dropout apart."""
-    known, _ = _sorted(edge)
-    after = np.clip(np.searchsorted(known, stamp), 1, max(len(known) - 1, 1))
-    if len(known) < 2:
-        return np.asarray(stamp == known[0])
-    gap = np.diff(known) * NANOSECOND
-    longest = max(SHORTEST_DROPOUT, DROPOUT_PERIODS * float(np.median(gap)))
-    within = (stamp >= known[0]) & (stamp <= known[-1])
-    return np.asarray(within & ((gap[after - 1] <= longest) | (stamp == known[after]) | (stamp == known[after - 1])))
+def _several_parents(child: str, parents: Sequence[str]) -> TransformError:
+    return TransformError(f"frame {child!r} has the parents {' and '.join(map(repr, parents))}, one is accepted")
 
 
 def _at(edge: Edge, stamp: IntArray) -> Array:
-    """The rows (n, 7) of an edge at stamps that it covers."""
-    if edge.static:
-        return np.tile(edge.rows[-1], (len(stamp), 1))
-    known, rows = _sorted(edge)
-    if len(known) < 2:
-        return np.tile(rows[0], (len(stamp), 1))
-    after = np.clip(np.searchsorted(known, stamp), 1, len(known) - 1)
-    share = (stamp - known[after - 1]) / (known[after] - known[after - 1])
-    return interpolated(rows[after - 1], rows[after], np.asarray(share, dtype=np.float64))
+    """The rows (n, 7) of an edge at stamps; NaN where it has none."""
+    return np.tile(edge.rows[-1], (len(stamp), 1)) if edge.static else poses_at(stamp, edge.stamp, edge.rows)

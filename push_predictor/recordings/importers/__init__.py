@@ -15,9 +15,11 @@ from push_predictor.recordings.importers.mit.square_windows import import_mit_sq
 from push_predictor.recordings.importers.mlab.push_logs import import_mlab
 from push_predictor.recordings.importers.report import ImportReport
 from push_predictor.recordings.importers.rosbag1 import import_rosbag1
+from push_predictor.recordings.importers.staging import Staging, staged
 from push_predictor.recordings.rig import Rig
+from push_predictor.watch import Watch, no_watch
 
-Importer = Callable[[Sequence[Path], Path, Rig | None], ImportReport]
+Importer = Callable[[Sequence[Path], Staging, Rig | None], ImportReport]
 IMPORTERS: dict[str, Importer] = {
     "mit": import_mit,
     "mit-square": import_mit_square,
@@ -30,14 +32,24 @@ KINDS = tuple(IMPORTERS)
 __all__ = ["IMPORTERS", "KINDS", "ImportReport", "import_source"]
 
 
-def import_source(kind: str, sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_source(
+    kind: str,
+    sources: Sequence[Path],
+    out: Path,
+    rig: Rig | None = None,
+    *,
+    overwrite: bool = False,
+    watch: Watch = no_watch,
+) -> ImportReport:
     """Import files or folders of one kind into the folder `out`; either all results are written or none.
 
-    rig replaces the importer's own. Raises ImportSourceError that names the file, the line (or row, byte or topic) that
-    cannot be read, and what is accepted.
+    rig replaces the importer's own. overwrite: replace earlier results of the same names. watch: called with the
+    share of the files done. Raises ImportSourceError that
+    names the file, the line (or row, byte or topic) that cannot be read, and what is accepted.
     """
     if kind not in IMPORTERS:
         raise ImportSourceError(f"kind {kind!r} is not accepted, give one of {', '.join(KINDS)}")
     if not sources:
         raise ImportSourceError(f"import {kind}: no source was given")
-    return IMPORTERS[kind]([Path(source) for source in sources], Path(out), rig)
+    with staged(Path(out), overwrite=overwrite, watch=watch) as staging:
+        return IMPORTERS[kind]([Path(source) for source in sources], staging, rig)

@@ -21,7 +21,7 @@ from push_predictor.recordings.importers.rosbag1_file import (
     header_time,
     samples_of,
 )
-from push_predictor.recordings.importers.staging import safe_name, staged
+from push_predictor.recordings.importers.staging import Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
 
@@ -35,22 +35,21 @@ ACCEPTED = (
 )
 
 
-def import_rosbag1(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_rosbag1(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """One recording for each bag in files and folders (recursive). Raises ImportSourceError.
 
     A bag of the mlab profile gets no rig, because its object is not recorded.
     """
     notes = Notes()
-    with staged(out) as staging:
-        for path in _bags(sources):
-            topics = bag_topics(path)
-            if body := _vicon_body(topics):
-                staging.recording(read_mcube_bag(path, body, rig, notes), pushes=1)
-            elif all(topic in topics for topic in MLAB):
-                staging.recording(read_mlab_bag(path, bag_messages(path, MLAB), rig, notes), pushes=0)
-            else:
-                found = ", ".join(f"{topic} {kind}" for topic, kind in sorted(topics.items())) or "none"
-                raise ImportSourceError(f"{path}: topics found: {found}; accepted: {ACCEPTED}")
+    for path in staging.in_turn(_bags(sources)):
+        topics = bag_topics(path)
+        if body := _vicon_body(topics):
+            staging.recording(read_mcube_bag(path, body, rig, notes), pushes=1)
+        elif all(topic in topics for topic in MLAB):
+            staging.recording(read_mlab_bag(path, bag_messages(path, MLAB), rig, notes), pushes=0)
+        else:
+            found = ", ".join(f"{topic} {kind}" for topic, kind in sorted(topics.items())) or "none"
+            raise ImportSourceError(f"{path}: topics found: {found}; accepted: {ACCEPTED}")
     return staging.report("rosbag1", notes)
 
 

@@ -6,27 +6,36 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from push_predictor.errors import ImportSourceError
+from push_predictor.recordings.bag.writer import check_replaceable, replace_folder
 from push_predictor.recordings.importers.report import ImportReport, Notes
 from push_predictor.recordings.rig import Rig, save_rig
 from push_predictor.recordings.streams import Recording
 from push_predictor.recordings.table import PushTable
 from push_predictor.recordings.table_file import write_table
 from push_predictor.recordings.write import write_recording
+from push_predictor.watch import Watch, no_watch, watched
+
+T = TypeVar("T")
 
 
 class Staging:
     """Results collected in a temporary folder within their destination."""
 
-    def __init__(self, out: Path, folder: Path) -> None:
-        self.out, self.folder = out, folder
+    def __init__(self, out: Path, folder: Path, *, overwrite: bool = False, watch: Watch = no_watch) -> None:
+        self.out, self.folder, self.overwrite, self._watch = out, folder, overwrite, watch
         self.written: list[Path] = []
         self.recordings = 0
         self.pushes = 0
+
+    def in_turn(self, files: Sequence[T]) -> Iterator[T]:
+        """The files to import, one after the other; reports the progress."""
+        return watched(files, self._watch, "file")
 
     def recording(self, recording: Recording, pushes: int) -> None:
         """Write a recording to the folder of its name. Raises ImportSourceError if the name is taken."""
@@ -49,24 +58,27 @@ class Staging:
         target = self.out / name
         if target in self.written:
             raise ImportSourceError(f"{target}: two sources have this output, import them into different folders")
-        if target.exists():
-            raise ImportSourceError(f"{target} exists already, remove it or give another --out")
+        if target.exists() and not self.overwrite:
+            raise ImportSourceError(f"{target} exists already, give another --out, or --force to overwrite it")
         self.written.append(target)
         return self.folder / name
 
 
 @contextmanager
-def staged(out: Path) -> Iterator[Staging]:
-    """Collect results and move them to `out` when the block ends; after an error none is kept."""
+def staged(out: Path, *, overwrite: bool = False, watch: Watch = no_watch) -> Iterator[Staging]:
+    """Collect results and move them to `out` when the block ends; after an error none is kept.
+
+    overwrite: earlier results are replaced; a folder only if it is a bag.
+    """
     made = not out.exists()
     folder: Path | None = None
     try:
         out.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=".import-", dir=out))
-        staging = Staging(out, folder)
+        staging = Staging(out, folder, overwrite=overwrite, watch=watch)
         yield staging
         for target in staging.written:
-            os.replace(folder / target.name, target)
+            _move(folder / target.name, target)
     except OSError as error:
         raise ImportSourceError(f"{error.filename or out}: {error.strerror or error}") from error
     finally:
@@ -74,6 +86,14 @@ def staged(out: Path) -> Iterator[Staging]:
             shutil.rmtree(folder, ignore_errors=True)
         if made and out.is_dir() and not any(out.iterdir()):
             out.rmdir()
+
+
+def _move(made: Path, target: Path) -> None:
+    if made.is_dir():
+        check_replaceable(target)
+        replace_folder(target, made)
+    else:
+        os.replace(made, target)
 
 
 def safe_name(text: str) -> str:

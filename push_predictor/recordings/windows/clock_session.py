@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import REACH, contact_samples
 from push_predictor.recordings.windows.cut import Interval, SensorTracks, cut_window
 from push_predictor.recordings.windows.push_segmenter import PushSegmenter
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions
-from push_predictor.recordings.windows.track import NANOSECOND, Track
+from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array, IntArray
 
 LONGEST_LAG = 30.0  # s; the other streams proceed without a stream that lags more
@@ -56,6 +57,11 @@ class ClockSession:
             found.update(of_stream)
             found["refused"] += track.order.counts.total()
         return found
+
+    @property
+    def contact(self) -> tuple[int, int]:
+        """Number of slider samples in contact, and of all that were evaluated."""
+        return self._segmenter.touching, self._segmenter.samples
 
     @property
     def newest(self) -> int:

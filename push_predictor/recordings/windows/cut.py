@@ -8,10 +8,11 @@ import numpy as np
 
 from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.geometry.outline import Outline, Projection
+from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.contact import FIT_SPAN
 from push_predictor.recordings.windows.push_window import PushWindow
-from push_predictor.recordings.windows.track import NANOSECOND, Track
+from push_predictor.recordings.windows.track import Track
 from push_predictor.types import Array
 
 ENTERED, ENTERED_SHARE = 0.0005, 0.5  # m, share of the tip's displacement: a tip this much deeper enters the outline

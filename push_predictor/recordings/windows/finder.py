@@ -41,6 +41,7 @@ class WindowFinder:
     def __init__(self, rig: Rig, options: WindowOptions | None = None) -> None:
         self.rig, self.options = rig, options or WindowOptions()
         self._counts: Counter[str] = Counter()  # without those of the present session
+        self._earlier_contact = (0, 0)  # of earlier sessions
         self._session = ClockSession(rig, self.options)
         self._postponed: list[tuple[str, IntArray, Array]] = []  # samples with the time of a clock that was set
         self._scalars = ScalarTracks()
@@ -55,6 +56,12 @@ class WindowFinder:
         return {kind: found[kind] for kind in (*STREAM_FAULTS, *WINDOW_FAULTS)} | {
             k: n for k, n in sorted(found.items()) if " " in k
         }
+
+    @property
+    def contact_share(self) -> float | None:
+        """Share of the slider's samples so far in which the tip touches it, None before the first."""
+        touching, samples = self._contact()
+        return touching / samples if samples else None
 
     def find(self, recording: Recording) -> list[PushWindow]:
         """All windows of a recording; see find_windows."""
@@ -147,6 +154,7 @@ class WindowFinder:
         self._advance(final=True)
         self._release(final=True)
         self._counts += self._session.counts
+        self._earlier_contact = self._contact()
         self._session = ClockSession(self.rig, self.options)
 
     def _add_postponed(self) -> None:
@@ -154,6 +162,10 @@ class WindowFinder:
         postponed, self._postponed = self._postponed, []
         for name, stamp, values in postponed:
             self._add(name, stamp, values)
+
+    def _contact(self) -> tuple[int, int]:
+        earlier, present = self._earlier_contact, self._session.contact
+        return earlier[0] + present[0], earlier[1] + present[1]
 
     # --- windows ------------------------------------------------------------------------------------------------
 

@@ -6,10 +6,10 @@ from collections import deque
 
 import numpy as np
 
+from push_predictor.recordings.dropouts import NANOSECOND
 from push_predictor.recordings.windows.contact import ContactSample
 from push_predictor.recordings.windows.cut import PushContext
 from push_predictor.recordings.windows.push_window import TIMED_ID, WindowOptions
-from push_predictor.recordings.windows.track import NANOSECOND
 from push_predictor.types import Array
 
 FREE_GAP = 0.005  # m; farther away the pusher touches nothing, and its force is the sensor's zero
@@ -21,16 +21,23 @@ INSIDE = 0.005  # m; a tip this deep inside the outline shows unsynchronised clo
 LONGEST_BREAK = 2.0  # s; after a longer break a contact counts as another push
 
 
+def touches_nothing(sample: ContactSample, options: WindowOptions) -> bool:
+    """Whether the tip is lifted or away from the outline, so that its force is the sensor's zero."""
+    return sample.height > options.lift or sample.gap > FREE_GAP
+
+
 class PushSegmenter:
     """Takes contact samples in order and returns the windows (start, end in ns) that are complete.
 
-    counts: resets and samples inside the outline. push: the current push, None between pushes.
+    counts: resets and samples inside the outline. push: the current push, None between pushes. samples, touching: how
+    many samples there were, and how many of them in contact.
     """
 
     def __init__(self, options: WindowOptions) -> None:
         self.options = options
         self.counts = {"resets": 0, "inside": 0}
         self.push: PushContext | None = None
+        self.samples = self.touching = 0
         self._start: int | None = None  # of the incomplete window
         self._last_good = -np.inf
         self._last_time = -np.inf
@@ -54,6 +61,8 @@ class PushSegmenter:
         self._update_breaks(sample)
         self._update_tare(sample)
         self._touching = touching = not (sample.in_break or self._inside) and self._touches(sample)
+        self.samples += 1
+        self.touching += touching
         if touching and self._first_touch is None:
             self._first_touch = sample.stamp
         if touching and sample.speed >= self.options.least_speed:
@@ -78,7 +87,7 @@ class PushSegmenter:
     def _update_tare(self, sample: ContactSample) -> None:
         if sample.force is None or sample.in_break:
             return
-        if sample.height > self.options.lift or sample.gap > FREE_GAP:
+        if touches_nothing(sample, self.options):
             self._free_force.append(sample.force)
             self._zero = None
         elif sample.speed < self.options.least_speed and self.push is None:

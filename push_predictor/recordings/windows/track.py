@@ -7,13 +7,11 @@ from collections import Counter
 import numpy as np
 
 from push_predictor.geometry.frames import wrap_angle
+from push_predictor.recordings.dropouts import NANOSECOND, longest_interval
 from push_predictor.recordings.windows.stamp_order import OrderedSamples, StampOrder
 from push_predictor.types import Array, BoolArray, IntArray
 
 PERIOD_SAMPLES = 50  # intervals that determine the period: the first ones, so that later samples do not change it
-SHORTEST_DROPOUT = 0.020  # s
-DROPOUT_PERIODS = 4.0
-NANOSECOND = 1e-9
 JUMP_DISTANCE, JUMP_SPEED = 0.005, 1.5  # m, m/s: a change above distance + speed * time is no motion
 JUMP_ANGLE, JUMP_TURN_RATE = 0.1, 8.0  # rad, rad/s: the same for the heading
 
@@ -113,7 +111,7 @@ class Track:
     @property
     def longest_gap(self) -> float:
         """The longest interval (s) between two samples that is not a dropout."""
-        return max(SHORTEST_DROPOUT, DROPOUT_PERIODS * self.period)
+        return longest_interval(self.period)
 
     def _breaks(self) -> tuple[Array, Array]:
         """Starts (k,) and ends (k,) of breaks, including the time before the first and after the last sample."""

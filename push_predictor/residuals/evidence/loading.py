@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from push_predictor.errors import RecordingError
-from push_predictor.recordings.load import distinct_pushes, load_rig_for
+from push_predictor.recordings.dropouts import NANOSECOND
+from push_predictor.recordings.load import Inspect, distinct_pushes, load_rig_for, no_inspection
 from push_predictor.recordings.read import read_recording
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import Recording
@@ -18,7 +19,6 @@ from push_predictor.recordings.table_file import is_recording, read_table
 from push_predictor.recordings.topics import Topics
 from push_predictor.recordings.windows.finder import find_windows
 from push_predictor.recordings.windows.push_window import PushWindow, WindowOptions, windows_to_table
-from push_predictor.recordings.windows.track import NANOSECOND
 from push_predictor.residuals.evidence.drivers import CUMULATIVE
 from push_predictor.residuals.evidence.standardised import push_order
 from push_predictor.types import Array
@@ -47,12 +47,14 @@ def load_evidence(
     *,
     experiment: Sequence[Path] = (),
     topics: Topics = Topics(),
+    inspect: Inspect = no_inspection,
 ) -> LoadedData:
     """Load recordings and push tables; rig and topics override theirs.
 
     experiment: recordings of pushes that an earlier trace proposed. They continue the recordings before them, with the
-    same number, so that the experiment adds no covariate `recording` of its own. Raises RecordingError (also if no file
-    contains a window, or one is given twice), TableError or RigError.
+    same number, so that the experiment adds no covariate `recording` of its own. inspect: called with each path, its
+    data and the rig. Raises RecordingError (also if no file contains a window, or one is given twice), TableError or
+    RigError.
     """
     every = [Path(path) for path in (*paths, *experiment)]
     designed = {Path(path).resolve() for path in experiment}
@@ -60,13 +62,11 @@ def load_evidence(
         raise RecordingError(f"{min(twice)}: given as data and as experiment, give it once")
     rig = rig or load_rig_for(every)
     bags = [
-        (path.resolve() in designed, read_recording(path, rig=rig, topics=topics))
-        for path in every
-        if is_recording(path)
+        (path.resolve() in designed, _recording(path, rig, topics, inspect)) for path in every if is_recording(path)
     ]
     bags.sort(key=lambda bag: _first_stamp(bag[1]))
     files = [path for path in every if not is_recording(path)]
-    tables = [(path.resolve() in designed, path.name, _read(path, rig)) for path in files]
+    tables = [(path.resolve() in designed, path.name, _read(path, rig, inspect)) for path in files]
     found = _loaded(bags, tables, rig, options)
     if not len(found.table):
         raise RecordingError(f"{', '.join(map(str, every))}: no push was found, give recordings of pushes")
@@ -163,8 +163,16 @@ def _later(window: PushWindow, added: Array) -> PushWindow:
     return replace(window, covariates={**window.covariates, **later})
 
 
-def _read(path: Path, rig: Rig) -> PushTable:
-    table = with_inputs(read_table(path))
+def _recording(path: Path, rig: Rig, topics: Topics, inspect: Inspect) -> Recording:
+    recording = read_recording(path, rig=rig, topics=topics)
+    inspect(path, recording, rig)
+    return recording
+
+
+def _read(path: Path, rig: Rig, inspect: Inspect) -> PushTable:
+    rows = read_table(path)
+    inspect(path, rows, rig)
+    table = with_inputs(rows)
     edge = rig.outline.edge(table.inputs[:, 1])[0].astype(np.float64)
     return replace(table, covariates={"edge": edge, **table.covariates})
 

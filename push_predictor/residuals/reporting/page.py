@@ -66,8 +66,7 @@ def write_trace_report(path: Path, trace: Trace) -> Path:
 
 def _parts(trace: Trace) -> list[str]:
     return [
-        html.answer(answer(trace), VERDICTS[trace.verdict]),
-        *key_figure(trace),
+        html.opening(answer(trace), VERDICTS[trace.verdict], html.joined(key_figure(trace))),
         *_shifted_inputs(trace),
         *_held_out(trace),
         *_rivals(trace),

@@ -11,13 +11,15 @@ import numpy as np
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.reporting.html import NOTHING
 from push_predictor.residuals.outcome import Trace
+from push_predictor.residuals.reporting.answer import answer
 from push_predictor.residuals.reporting.phrases import effect_phrase, with_unit
 from push_predictor.residuals.reporting.wording import verdict_sentence, worth_sentence
 
 
 def summary_lines(trace: Trace) -> list[str]:
-    """Verdict, what it means, the pushes that would decide, held-out figures and notes; plain ASCII."""
-    lines = [verdict_sentence(trace), worth_sentence(trace), *_experiment(trace), "", *_held_out(trace)]
+    """The page's answer, its evidence, the pushes that would decide, held-out figures and notes; plain ASCII."""
+    evidence = [verdict_sentence(trace), worth_sentence(trace), *_experiment(trace)]
+    lines = [*answer(trace), "", *evidence, "", *_held_out(trace)]
     if trace.remaining is not None:
         lines.append(f"Still significant after these effects: {effect_phrase(*trace.remaining)}.")
     lines += [f"Note: {note}" for note in trace.notes]

@@ -33,7 +33,7 @@ def effects_table(trace: Trace) -> str:
         "change over its range."
     )
     used = [k for k in range(len(head)) if any(row[k] != html.NOTHING for row in rows)]
-    return html.table(caption, [head[k] for k in used], [[row[k] for k in used] for row in rows])
+    return html.folded_table(caption, [head[k] for k in used], [[row[k] for k in used] for row in rows])
 
 
 def shifts_table(trace: Trace) -> str:
@@ -48,11 +48,11 @@ def shifts_table(trace: Trace) -> str:
         "Shift of a window's outcome by each effect: root mean square over the analysis pushes. The 95 % intervals "
         "allow for dependence between neighbouring pushes."
     )
-    return html.table(caption, head, rows)
+    return html.folded_table(caption, head, rows)
 
 
 def tested_tables(trace: Trace) -> list[str]:
-    """All candidates, smallest p first; all but fifteen are hidden until the reader opens them."""
+    """All candidates, smallest p first; all but fifteen are in a table of their own."""
     best = best_of(trace.tested)
     shown = _at_once(trace, best)
     rest = [tested for tested in best if tested not in shown]
@@ -62,7 +62,7 @@ def tested_tables(trace: Trace) -> list[str]:
         "its best basis, before any effect is subtracted. Neighbours of a true effect are often significant too, "
         "because covariates and responses correlate."
     )
-    parts = [html.table(caption, head, [_tested_row(trace, tested) for tested in shown])]
+    parts = [html.folded_table(caption, head, [_tested_row(trace, tested) for tested in shown])]
     if rest:
         title = f"The other {count(len(rest), 'pair', 'pairs')}"
         table = html.table(f"{title}.", head, [_tested_row(trace, tested) for tested in rest])
@@ -78,7 +78,7 @@ def held_out_table(trace: Trace) -> str:
         "dtheta. NLPD: negative log predictive density, lower is better. Coverage: should be 90 %. In brackets: 95 % "
         "intervals."
     )
-    return html.table(caption, head, [_held_out_row(comparison) for comparison in comparisons_of(trace)])
+    return html.folded_table(caption, head, [_held_out_row(comparison) for comparison in comparisons_of(trace)])
 
 
 def metric_tables(trace: Trace) -> list[str]:
@@ -106,7 +106,7 @@ def gain_table(trace: Trace) -> str:
         "paired bootstrap of pushes. The reference is the better of the deployed model and the refit. Its predicted "
         "uncertainty is calibrated and contains that of the effects, so the gain counts only what the mean brings."
     )
-    return html.table(caption, ("", f"after minus {other}"), rows)
+    return html.folded_table(caption, ("", f"after minus {other}"), rows)
 
 
 def detectable_table(trace: Trace) -> str:
@@ -121,7 +121,7 @@ def detectable_table(trace: Trace) -> str:
         "The smallest detectable effect of each mechanism: what the search finds with 80 % probability on these pushes "
         "at this level. Along a covariate the size is per standard deviation of the covariate."
     )
-    return html.table(caption, ("mechanism", "constant", "along a covariate", "covariate"), rows)
+    return html.folded_table(caption, ("mechanism", "constant", "along a covariate", "covariate"), rows)
 
 
 def experiment_table(trace: Trace) -> str:

@@ -118,6 +118,7 @@ def _learning_finding(study: Study, counts: list[SpeedCount]) -> Finding:
         f"speed are required: {lacking}. At {speeds[-1] * 1e3:.0f} mm/s {share_text} of the pushes stayed in contact "
         f"for a window. Rule: holds if all {PAPER_SETS} sets have enough windows at every speed; does not hold if a "
         "set has too few at half of the speeds or more; else in part.",
+        number=f"{pairs} of {PAPER_SETS} sets; enough windows at {len(counts) - len(poor)} of {len(counts)} speeds",
     )
 
 
@@ -144,6 +145,7 @@ def _grid_finding(grid: RepeatedGrid) -> Finding:
         f"{ENOUGH_SEEN:.0%} of the repetitions gave a first window ({np.sum(seen) / len(grid.cells):.0%} of the "
         f"pushes). Holds if the interval of that share lies above {ENOUGH_SEEN:.0%}; in part if it begins above "
         f"{HALF:.0%}; does not hold if it ends below {HALF:.0%}; else not decided.",
+        number=f"{share.text('.0%')} of {len(grid.cells)} pushes",
     )
 
 

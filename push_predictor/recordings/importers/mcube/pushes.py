@@ -18,7 +18,7 @@ from push_predictor.geometry.frames import rotate, to_body, wrap_angle
 from push_predictor.recordings.importers.cleaning import Samples, in_order, require_overlap, twist, without_repeats
 from push_predictor.recordings.importers.mcube.rig import CLOCK, FORCE, HEIGHT, TIP_LATE, Block, block_of
 from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import safe_name, staged
+from push_predictor.recordings.importers.staging import Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.types import Array
@@ -32,12 +32,11 @@ IN_TOUCH = 0.002  # m
 TREND = 8  # samples that predict the next heading
 
 
-def import_mcube(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_mcube(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """One recording FOLDER_RUN for each run in folders (recursive) or named by its *_obj.txt."""
     notes = Notes()
-    with staged(out) as staging:
-        for path in _runs(sources):
-            staging.recording(read_mcube(path, rig, notes), pushes=1)
+    for path in staging.in_turn(_runs(sources)):
+        staging.recording(read_mcube(path, rig, notes), pushes=1)
     return staging.report("mcube", notes)
 
 

@@ -17,7 +17,7 @@ from push_predictor.recordings.importers.cleaning import Samples, in_order, nano
 from push_predictor.recordings.importers.heading import repair_heading
 from push_predictor.recordings.importers.mit.source import MitFile, file_arrays, file_metadata, mit_files
 from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import safe_name, staged
+from push_predictor.recordings.importers.staging import Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
 from push_predictor.types import Array
@@ -33,25 +33,24 @@ CLOCK = "tip, object and wrench share a clock; no offset was applied"
 HEIGHT = "tip and slider are at height 0: the set has planar poses, and the tip is never lifted within a file"
 
 
-def import_mit(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_mit(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """One recording for each file in files, folders and zip archives.
 
     An unreadable file in a folder or archive is reported as dropped. Raises ImportSourceError for an unreadable file
     that was named itself, and if no file can be read. rig: for a shape that is not in the set.
     """
     notes = Notes()
-    with staged(out) as staging:
-        for file in mit_files(sources):
-            try:
-                recording = read_mit(file, rig, notes)
-            except ImportSourceError as error:
-                if file.alone:
-                    raise
-                notes.dropped.append(f"{error}; file skipped")
-                continue
-            staging.recording(recording, pushes=1)
-        if not staging.recordings:
-            raise ImportSourceError(f"no file could be imported; the first: {notes.dropped[0]}")
+    for file in mit_files(sources):
+        try:
+            recording = read_mit(file, rig, notes)
+        except ImportSourceError as error:
+            if file.alone:
+                raise
+            notes.dropped.append(f"{error}; file skipped")
+            continue
+        staging.recording(recording, pushes=1)
+    if not staging.recordings:
+        raise ImportSourceError(f"no file could be imported; the first: {notes.dropped[0]}")
     return staging.report("mit", notes)
 
 

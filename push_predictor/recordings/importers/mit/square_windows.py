@@ -20,7 +20,7 @@ from push_predictor.geometry.outline import Outline
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.recordings.importers.mit.pushes import MASSES, PUSHER_RADIUS
 from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import safe_name, staged
+from push_predictor.recordings.importers.staging import Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -38,17 +38,16 @@ ASSUMED = (
 )
 
 
-def import_mit_square(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_mit_square(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """NAME.csv and NAME.rig.yaml for each .npz or .csv[.gz].
 
     Raises ImportSourceError with line or array index.
     """
     notes = Notes(assumed=list(ASSUMED))
-    with staged(out) as staging:
-        for source in sources:
-            name = safe_name(source.name.split(".")[0])
-            used = rig or square_rig()
-            staging.table(name, read_mit_square(source, used.outline), used)
+    for source in staging.in_turn(sources):
+        name = safe_name(source.name.split(".")[0])
+        used = rig or square_rig()
+        staging.table(name, read_mit_square(source, used.outline), used)
     return staging.report("mit-square", notes)
 
 

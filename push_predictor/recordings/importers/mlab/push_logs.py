@@ -20,7 +20,7 @@ from push_predictor.recordings.importers.mlab.force import contact_force
 from push_predictor.recordings.importers.mlab.log_parser import LogPush, read_log, report_irregularities
 from push_predictor.recordings.importers.mlab.rig import CENTROID, folder_rig
 from push_predictor.recordings.importers.report import ImportReport, Notes
-from push_predictor.recordings.importers.staging import safe_name, staged
+from push_predictor.recordings.importers.staging import Staging, safe_name
 from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.table import PushTable
 from push_predictor.types import Array
@@ -55,23 +55,22 @@ class NotAPushError(Exception):
     """A logged push that cannot become a row; the text states why."""
 
 
-def import_mlab(sources: Sequence[Path], out: Path, rig: Rig | None = None) -> ImportReport:
+def import_mlab(sources: Sequence[Path], staging: Staging, rig: Rig | None = None) -> ImportReport:
     """NAME.csv and NAME.rig.yaml for each log, NAME = FOLDER_LOG.
 
     Raises ImportSourceError with file and line.
     """
     notes = Notes(assumed=list(ASSUMED))
-    with staged(out) as staging:
-        for path in _logs(sources):
-            name = safe_name(f"{path.parent.name}_{path.name.split('.')[0]}")
-            used = rig or folder_rig(path.parent.name, notes)
-            table = read_mlab(path, name, used, notes)
-            if len(table):
-                staging.table(name, table, used)
-        if not staging.written:
-            raise ImportSourceError(
-                f"{', '.join(map(str, sources))}: contains no usable push; {'; '.join(notes.dropped)[:300]}"
-            )
+    for path in staging.in_turn(_logs(sources)):
+        name = safe_name(f"{path.parent.name}_{path.name.split('.')[0]}")
+        used = rig or folder_rig(path.parent.name, notes)
+        table = read_mlab(path, name, used, notes)
+        if len(table):
+            staging.table(name, table, used)
+    if not staging.written:
+        raise ImportSourceError(
+            f"{', '.join(map(str, sources))}: contains no usable push; {'; '.join(notes.dropped)[:300]}"
+        )
     return staging.report("mlab", notes)
 
 

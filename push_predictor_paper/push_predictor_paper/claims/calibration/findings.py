@@ -41,6 +41,7 @@ def coverage_finding(found: Calibrated, model: str) -> Finding:
         f"An output is `open` if so, but a 95 % interval is wider than {TOO_WIDE}; else `broken`. The claim holds if "
         "all three are kept, in part if some are.",
         OURS,
+        number=f"95 % intervals: {_least_covered(coverages)}",
     )
 
 
@@ -58,6 +59,7 @@ def shape_finding(found: Calibrated) -> Finding:
         f"over {len(OUTPUTS)} outputs). The claim holds if all agree, in part if some do. Agreement of fewer than "
         f"{FEWEST_PUSHES} pushes decides nothing.",
         OURS,
+        number=f"{sum(flat)} of {len(flat)} outputs agree",
     )
 
 
@@ -72,7 +74,14 @@ def density_finding(found: Calibrated) -> Finding:
         f"({found.windows('push')}), {gains['random'].text('+.3f')} on the {SPLIT_WORDS['random']}. Below zero is "
         "better. Rule: holds if the 95 % interval by push is below zero on both splits, in part if on one.",
         OURS,
+        number=f"{gains['push'].text('+.3f')} nats",
     )
+
+
+def _least_covered(coverages: Sequence[Sequence[Estimate]]) -> str:
+    """The output whose 95 % intervals cover least; coverages: by level, then by output."""
+    name, least = min(zip(OUTPUTS, coverages[-1], strict=True), key=lambda pair: pair[1].value)
+    return f"{name} {least.text('.3f')}"
 
 
 def promise(coverages: Sequence[Estimate]) -> str:

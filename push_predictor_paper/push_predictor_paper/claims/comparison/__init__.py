@@ -1,4 +1,4 @@
-"""Claims of section V-B: analytical model, GP and VHGP compared, also by speed.
+"""Claims of section VI-B: analytical model, GP and VHGP compared, also by speed.
 
 Sections of the report: `section`, `mean_gain` and `speed_error`.
 """

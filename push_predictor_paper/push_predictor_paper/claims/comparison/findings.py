@@ -53,9 +53,8 @@ def early(corpus: Corpus, where: Crossings) -> Finding:
         f"{PAPER_SIZE} means up to {ABOUT}. Holds if both intervals end by then, in part if one does, does not hold if "
         "both begin later."
     )
-    return Finding(
-        f"GP and VHGP beat the analytical model from about 100 samples ({corpus.name})", _in_time(where), sentence
-    )
+    claim = f"GP and VHGP beat the analytical model from about {PAPER_SIZE} samples ({corpus.name})"
+    return Finding(claim, _in_time(where), sentence, number=f"windows: {listed}")
 
 
 def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
@@ -67,7 +66,8 @@ def in_the_end(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"{_how(corpus, found, n)}. Rule: holds if both intervals lie below 0, in part if one does, does not hold if "
         "both lie above."
     )
-    return Finding(f"The learned models predict better than the analytical one ({corpus.name})", _below(gaps), sentence)
+    claim = f"The learned models predict better than the analytical one ({corpus.name})"
+    return Finding(claim, _below(gaps), sentence, number=f"NMSE minus the analytical model's: {listed}")
 
 
 def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
@@ -80,7 +80,8 @@ def similar_mean(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"Rule: similar means within {SIMILAR:.0%}. Holds if the interval lies within, in part if only the value does, "
         "does not hold if the interval lies outside."
     )
-    return Finding(f"GP and VHGP have a similar NMSE ({corpus.name})", _alike(ratio), sentence)
+    claim = f"GP and VHGP have a similar NMSE ({corpus.name})"
+    return Finding(claim, _alike(ratio), sentence, number=f"ratio {ratio.text()}")
 
 
 def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
@@ -92,7 +93,8 @@ def better_density(corpus: Corpus, found: Curves, n: int) -> Finding:
         f"{exact.text()} (paper: −0.91). {_how(corpus, found, n)}. Rule: holds if the first interval lies below 0, in "
         "part if only that of the exact density does, does not hold if the first lies above."
     )
-    return Finding(f"The VHGP beats the GP in NLPD ({corpus.name})", _denser(gaussian, exact), sentence)
+    claim = f"The VHGP beats the GP in NLPD ({corpus.name})"
+    return Finding(claim, _denser(gaussian, exact), sentence, number=f"{gaussian.text()} nats")
 
 
 def _gap(corpus: Corpus, found: Curves, first: str, second: str, n: int) -> Estimate:

@@ -1,4 +1,4 @@
-"""Does input-dependent noise improve the mean too? NMSE of the VHGP minus that of the GP (paper, section III)."""
+"""Does input-dependent noise improve the mean too? NMSE of the VHGP minus that of the GP (paper, section IV)."""
 
 from __future__ import annotations
 
@@ -58,7 +58,8 @@ def improves(corpus: Corpus, gains: Mapping[int, Sequence[Estimate]], pushes: in
         "corrected for their number). Rule: the largest size decides. Holds if its interval lies below 0, does not "
         "hold if above."
     )
-    return Finding(f"Input-dependent noise improves the mean too ({corpus.name})", _verdict(gains[last][0]), sentence)
+    claim, gain = f"Input-dependent noise improves the mean too ({corpus.name})", gains[last][0]
+    return Finding(claim, _verdict(gain), sentence, number=f"NMSE {gain.text('+.3f')} at n = {last}")
 
 
 def where_it_counts(corpus: Corpus, windows: HeldOut, groups: Sequence[int], improvement: Verdict) -> Finding:
@@ -80,7 +81,8 @@ def where_it_counts(corpus: Corpus, windows: HeldOut, groups: Sequence[int], imp
         "half's lies above 0; not decided unless the claim above holds."
     )
     gained = improvement in ("holds", "holds in part")
-    return Finding(claim, _slow_verdict(slow, fast) if gained else "not decided", sentence, "beyond the paper")
+    verdict, number = _slow_verdict(slow, fast) if gained else "not decided", f"NMSE {slow.text('+.3f')} (slower half)"
+    return Finding(claim, verdict, sentence, "beyond the paper", number=number)
 
 
 def _gains(corpus: Corpus, found: Curves, split: SplitName, n: int) -> tuple[Estimate, ...]:

@@ -1,4 +1,4 @@
-"""Analytical model, GP and VHGP on the reference pair: scores, curves, crossing (paper, section V-B)."""
+"""Analytical model, GP and VHGP on the reference pair: scores, curves, crossing (paper, section VI-B)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The models' error against the pusher's speed (paper, section V-B: "for high velocities ... more unreliable")."""
+"""The models' error against the pusher's speed (paper, section VI-B: "for high velocities ... more unreliable")."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def unreliable(corpus: Corpus, windows: HeldOut, curve: SpeedCurve) -> Finding:
         f"{_speed(curve.speeds[0])} to {curve.nmse[-1].text()} at {_speed(curve.speeds[-1])}. Rule: holds if both "
         f"intervals lie above {NOTABLE}, in part if one does, does not hold if both end below {NOTABLE}."
     )
-    return Finding(f"The analytical model is less reliable at high speed ({corpus.name})", _grows(ranks), sentence)
+    claim = f"The analytical model is less reliable at high speed ({corpus.name})"
+    return Finding(claim, _grows(ranks), sentence, number=f"rank correlation {ranks[0].text()}")
 
 
 def captured(corpus: Corpus, windows: HeldOut, groups: list[int]) -> Finding:
@@ -78,7 +79,8 @@ def captured(corpus: Corpus, windows: HeldOut, groups: list[int]) -> Finding:
         f"{SPLIT_WORDS['push']}, {_set(corpus)}, interval by push. Rule: holds if the interval lies below 0 at all of "
         "these speeds, in part if at some, does not hold if it lies above 0 at some and below at none."
     )
-    return Finding(claim, _ahead(list(gaps.values())), sentence)
+    last = f"NMSE {gaps[fast[-1]].text('+.2f')} at {_speed(windows.speeds[fast[-1]])}"
+    return Finding(claim, _ahead(list(gaps.values())), sentence, number=last)
 
 
 def rank_correlation(windows: HeldOut, kind: str) -> Estimate:

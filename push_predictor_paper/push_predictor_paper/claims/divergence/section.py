@@ -86,6 +86,7 @@ def _lower(name: str, claim: str, of: Mapping[str, Divergences]) -> Finding:
         f"pushes of the grid, in blocks of neighbours; lower in {below} of {len(gp)} seeds of training windows. "
         f"Difference by the formula as printed: {printed.text()}. Rule: holds if the interval of the difference and "
         "every seed lie below 0, in part if only the interval does, does not hold if the interval lies above 0.",
+        number=f"VHGP minus GP: {difference.text()}",
     )
 
 
@@ -98,6 +99,7 @@ def _good(vhgp: Divergences, pushes: int) -> Finding:
         f"with exact means has {TOO_WIDE} if its sds are twice too wide, {TOO_NARROW} if they are half as wide. "
         f"Rule: holds if the median's interval lies below {TOO_WIDE}, in part if below {TOO_NARROW}, does not hold "
         "if above it.",
+        number=f"median {median.text()}",
     )
 
 

@@ -1,4 +1,4 @@
-"""Claims of section V-A: learning curves. Beyond the paper: other kernels.
+"""Claims of section VI-A: learning curves. Beyond the paper: other kernels.
 
 Sections of the report: `learning_curves` and `variants`.
 """

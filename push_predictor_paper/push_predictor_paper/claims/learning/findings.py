@@ -58,7 +58,7 @@ def circle(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
         "(Student; one surface gives none). Rule: holds if all of these lie above 0, in part if half of them do, does "
         "not hold if some lie below and fewer above. The intervals are not corrected for their number."
     )
-    return Finding(claim, verdict, sentence)
+    return Finding(claim, verdict, sentence, number=f"{wins} of {2 * len(others)} differences above 0, {losses} below")
 
 
 def surface(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
@@ -80,7 +80,7 @@ def surface(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
         f"{LITTLE}; does not hold if both begin above {AS_MUCH:g}; in part if one ends below {LITTLE} or both below "
         f"{AS_MUCH:g}."
     )
-    return Finding(claim, _little(ratios), sentence)
+    return Finding(claim, _little(ratios), sentence, number=f"surfaces over shapes: NMSE {ratios[0].text()}")
 
 
 def saturation(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
@@ -97,7 +97,8 @@ def saturation(corpus: Corpus, found: Curves, pairs: Sequence[Pair]) -> Finding:
         f"(NMSE) or {SATURATED_NATS:g} nats (NLPD). Holds if both are flat, in part if one is; does not hold if "
         f"neither is and one clearly still falls at n = {ENOUGH}; else not decided."
     )
-    return Finding(claim, _flat(nmse, nats, sizes[-1] >= ENOUGH), sentence)
+    number = f"NMSE falls by {_percent(nmse)} from n = {sizes[-2]} to {sizes[-1]}"
+    return Finding(claim, _flat(nmse, nats, sizes[-1] >= ENOUGH), sentence, number=number)
 
 
 def _harder(found: Curves, pairs: Sequence[Pair], shape: str, n: int, measure: Measure) -> Estimate:

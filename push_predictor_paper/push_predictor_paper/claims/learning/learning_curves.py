@@ -1,4 +1,4 @@
-"""NMSE and NLPD against training size, per surface and per shape (paper, section V-A, figures 7 and 8)."""
+"""NMSE and NLPD against training size, per surface and per shape (paper, section VI-A, figures 7 and 8)."""
 
 from __future__ import annotations
 

@@ -108,6 +108,7 @@ def gain_finding(variants: Variants) -> Finding:
         f"−0.07). {_pushes(variants)}. Rule: holds if the interval by push lies below zero at every size, in part if "
         "at some, does not hold if at none and above zero at one.",
         "beyond the paper",
+        number=f"{gains['push'][-1].text('+.3f')} nats at n = {variants.sizes[-1]}",
     )
 
 
@@ -123,6 +124,7 @@ def rule_finding(variants: Variants) -> Finding:
         f"{_pushes(variants)}. {RULE} The claim holds if a variant is accepted, in part if the random split alone "
         "accepts one, and does not hold if every variant is worse with its whole interval by push.",
         "beyond the paper",
+        number=f"{len(chosen)} of {len(OTHERS)} variants accepted",
     )
 
 

@@ -59,6 +59,7 @@ def agreement_findings(found: Likenesses, pushes: int) -> tuple[Finding, Finding
         _verdict(mean, MEAN_ALIKE),
         f"Correlation of VHGP and repetitions over {pushes} pushes, mean over draws of training windows: "
         f"{_correlations(mean)}; {_errors(mean)}. {_rule(MEAN_ALIKE)}",
+        number=f"correlation: {_least(mean)}",
     )
     second = Finding(
         "The model's map of the standard deviation agrees to a certain degree with that of the repetitions",
@@ -66,6 +67,7 @@ def agreement_findings(found: Likenesses, pushes: int) -> tuple[Finding, Finding
         f"Correlation of VHGP and repetitions over {pushes} pushes, mean over draws of training windows: "
         f"{_correlations(sd)}; {_errors(sd)}. The GP has one noise level for all pushes: {_correlations(plain)}. "
         f"{_rule(SD_ALIKE)}",
+        number=f"correlation: {_least(sd)}",
     )
     return first, second
 
@@ -120,6 +122,12 @@ def _rule(asked: float) -> str:
 
 def _correlations(outputs: tuple[Likeness, ...]) -> str:
     return ", ".join(f"{name} {like.correlation.text()}" for name, like in zip(NAMES, outputs, strict=True))
+
+
+def _least(outputs: tuple[Likeness, ...]) -> str:
+    """The correlation of the output that agrees least."""
+    name, like = min(zip(NAMES, outputs, strict=True), key=lambda pair: pair[1].correlation.value)
+    return f"{name} {like.correlation.text()}"
 
 
 def _errors(outputs: tuple[Likeness, ...]) -> str:

@@ -161,7 +161,8 @@ def _finding(peaks: Peaks, k: int, pushes: int) -> Finding:
         f"({' or '.join(map(place_text, named))} in our signs) reaches {repeated.reach.text(PART)} of the largest by "
         f"repetitions, {learned.reach.text(PART)} by the VHGP. {_rule(k)}"
     )
-    return Finding(CLAIMS[k], verdict, sentence)
+    number = f"{scaled(repeated.value, SCALES[k]).text()} {UNITS[k]} at {place_text(repeated.place)}"
+    return Finding(CLAIMS[k], verdict, sentence, number=number)
 
 
 def _verdict(found: Peak, k: int) -> Verdict:
@@ -201,6 +202,7 @@ def _handedness_finding(peaks: Peaks) -> Finding:
         f"by repetitions, {learned} deg by the VHGP over draws of training windows. Rule: holds if both intervals lie "
         "above zero, in part if one does, does not hold if both lie below. Geometry suggests it: the force has a "
         "longer lever about the centre.",
+        number=f"{repeated} deg",
     )
 
 

@@ -37,6 +37,7 @@ def shape_finding(
         f"{UNLIKE:g}; does not hold if all lie below {UNLIKE:g}. In part also if it holds, or holds in part, only by "
         "repetitions or only by VHGPs. The simulator's surfaces share one mechanism of noise, so this holds partly "
         "by construction.",
+        number=f"correlation {_ranges(found)}",
     )
 
 

@@ -31,6 +31,7 @@ def size_finding(ratios: tuple[Ratios, ...], grid: RepeatedGrid) -> Finding:
         f"Rule, by intervals: holds if those of dx, dy and rotation lie within that range and the share above "
         f"{MOSTLY:.0%}; does not hold if all three lie outside and the share below {HALF:.0%}; in part if one of the "
         f"three lies within, or the share above {HALF:.0%}. The size follows from our simulator's assumptions.",
+        number=", ".join(f"{n} {part.overall.text('.0%')}" for n, part in zip(NAMES[:3], ratios[:3], strict=True)),
     )
 
 
@@ -59,6 +60,7 @@ def span_finding(reach: Mapping[str, tuple[Span, ...]], counts: Mapping[str, int
         f"noise is small there. Rule: an order of magnitude means a ratio of {SOME:.1f} to {MOST:.0f}. Holds if the "
         f"interval of the widest output lies within, over all pushes and over those within {in_degrees(WIDE)}; in "
         "part if over one of the two; does not hold if it lies outside over both.",
+        number=f"ratio {widest(reach['all']).text('.1f')}",
     )
 
 

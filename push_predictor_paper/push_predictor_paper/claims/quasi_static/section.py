@@ -89,7 +89,8 @@ def _course(facts: Facts) -> Finding:
         f"{slow_equal[1].text('+.3f')}. {facts.judged_on} Rule: holds if both of the first pair lie above 0, in part "
         "if one does, does not hold if none does and one lies below."
     )
-    return Finding(CLAIM_COURSE, helps_then_harms(gain, harm), sentence)
+    number = f"NMSE {gain.text('+.3f')} and {harm.text('+.3f')}"
+    return Finding(CLAIM_COURSE, helps_then_harms(gain, harm), sentence, number=number)
 
 
 def _against(curve: Array, turn: int) -> tuple[Estimate, Estimate]:
@@ -112,7 +113,7 @@ def _turn(facts: Facts) -> Finding:
         "the first lies within 50 to 80 mm/s, in part if only the value does, does not hold if the interval lies "
         "outside."
     )
-    return Finding(CLAIM_TURN, turns_there(turn), sentence)
+    return Finding(CLAIM_TURN, turns_there(turn), sentence, number=f"up to {_speeds(turn)}")
 
 
 def _direct(facts: Facts, departures: Sequence[Estimate]) -> Finding:
@@ -127,7 +128,8 @@ def _direct(facts: Facts, departures: Sequence[Estimate]) -> Finding:
         f"{NOTABLE:.0%} of that. Holds if it is notable at all speeds above 80 mm/s and at none up to 50; in part if "
         "at all above, but perhaps at some up to 50; does not hold if at some speed above it is not."
     )
-    return Finding(CLAIM_DIRECT, breaks_beyond(by_speed, error.value), sentence)
+    number = f"{departures[-1].text('.3f')} at {speed_text(facts.speeds[-1])}"
+    return Finding(CLAIM_DIRECT, breaks_beyond(by_speed, error.value), sentence, number=number)
 
 
 def _speed_as_input(facts: Facts) -> Finding:
@@ -140,7 +142,7 @@ def _speed_as_input(facts: Facts) -> Finding:
         f"{speed_text(judged.speeds[0])} alone. {facts.judged_on} Rule: holds if the first lies below 0, does not "
         "hold if above."
     )
-    return Finding(CLAIM_INPUT, lower(difference), sentence)
+    return Finding(CLAIM_INPUT, lower(difference), sentence, number=f"NMSE {difference.text('+.3f')}")
 
 
 def _picture(study: Study, facts: Facts, departures: Sequence[Estimate]) -> Picture:

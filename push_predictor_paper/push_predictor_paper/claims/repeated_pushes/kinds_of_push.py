@@ -92,6 +92,7 @@ def _growth_finding(kinds: Kinds) -> Finding:
         f"all {len(kinds.paths)} pushes a tenth lies below {middle[0]:.2f}, half below {middle[1]:.2f}, a tenth above "
         f"{middle[2]:.2f}. Rule: holds if the first interval lies below 1 and the second above; in part if one does; "
         "does not hold if neither does and one lies on the other side.",
+        number=f"growth {narrow.text()} and {wide.text()}",
     )
 
 
@@ -109,6 +110,7 @@ def _apart_finding(kinds: Kinds) -> Finding:
         f"{_counts(kinds, True)} repetitions that did not choose them, resampled for the interval. Rule: holds if both "
         f"intervals lie above {APART:.0f}; in part if both lie above 1; does not hold if one contains 1 and ends below "
         f"{APART:.0f}.",
+        number=f"{ratios[0].text()} times as far apart",
     )
 
 
@@ -130,6 +132,7 @@ def _modes_finding(kinds: Kinds) -> Finding:
         f"Two equal modes {FAR:.0f} of their sd apart would be found in {power:.0%} of cases at {repetitions} "
         f"repetitions. Rule: holds if that p is at most {LEVEL}; does not hold if it is larger, although such modes "
         f"are found in {POWER:.0%} of cases; else not decided.",
+        number=f"{count} of {len(kinds.p)} pushes",
     )
 
 

@@ -104,6 +104,7 @@ def _modes_finding(at: Mapping[str, Shape], power_far: float) -> Finding:
         f"equal modes {FAR:.0f} of their sd apart would be found in {power_far:.0%} of cases, with correction. Rule: "
         "holds if a push has several modes in the first window, in part if only at the end; does not hold if none "
         f"has, although modes that far apart are found in {POWER:.0%} of cases.",
+        number=f"{counts['window']} of {len(at['window'].dip)} pushes",
     )
 
 
@@ -119,6 +120,7 @@ def _gaussian_finding(of: Shape, weights: Array) -> Finding:
         f"instead of one change the log density of held-out repetitions by {gain.text('+.3f')} nats an outcome. Rule: "
         "holds if a push is not Gaussian; in part if none, but the share's interval lies above 5 %; does not hold if "
         "none and the interval ends below 10 %.",
+        number=f"{certain} of {len(of.normal)} pushes",
     )
 
 
@@ -140,6 +142,7 @@ def _good_finding(at: Shape, loss: Array, weights: Array, study: Study) -> Findi
         f"{mean_over_pushes(loss, weights).text()}. VHGP of {study.plan.size} windows of other pushes, the first of "
         f"{study.plan.seeds} draws; first window. Rule, where there are several modes: holds if the interval ends "
         f"below {GOOD}, in part if below {POOR} (the cost of an sd twice too wide), does not hold if it lies above.",
+        number=f"loss {given.text()} nats",
     )
 
 

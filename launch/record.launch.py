@@ -1,0 +1,81 @@
+"""Start push_recorder, which writes the streams of a rig into a bag.
+
+ros2 launch push_predictor record.launch.py bag:=monday rig:=rig.yaml slider_topic:=/vicon/block/block
+
+docs/how_to/record.md describes it.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
+
+TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame")
+PATHS = ("bag", "rig")
+ARGUMENTS = (
+    ("namespace", "", "Namespace of the node."),
+    ("params_file", "", "YAML file with parameters, such as config/push_recorder.yaml. Other arguments override it."),
+    ("use_sim_time", "false", "The log time is that of /clock, as of a replay or a simulation."),
+    ("log_level", "info", "debug, info, warn, error or fatal."),
+    (
+        "enclave",
+        "",
+        "SROS 2: the enclave of the node, such as /push_predictor/push_recorder (docs/how_to/security.md).",
+    ),
+    ("bag", "", "Bag to write: a folder, or FILE.mcap."),
+    ("force", "false", "Replace a bag that exists."),
+    ("rig", "", "push_rig YAML file to record. Empty: the record on topic rig."),
+    ("slider_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the slider's pose. Empty: slider/pose."),
+    ("pusher_topic", "", "TOPIC, TOPIC.FIELD or /tf:FRAME of the tip's pose. Empty: pusher/pose."),
+    ("wrench_topic", "", "TOPIC or TOPIC.FIELD of the wrench. Empty: pusher/wrench, if it is published."),
+    ("wrench_frame", "", "Axes of the wrench, saved for its readers: world, tip or a frame of tf."),
+    ("wrench_bias", "", "What readers do with the sensor's bias and weight: free_motion or none."),
+    ("world_frame", "", "Frame of all poses, saved for their readers, which turn others into it by tf."),
+    ("covariate_topics", "", "Further topics to record, separated by commas."),
+    ("duration", "", "Seconds after the first message at which the node ends. Empty: at Ctrl-C."),
+)
+
+
+def generate_launch_description() -> LaunchDescription:
+    declared = [DeclareLaunchArgument(name, default_value=value, description=text) for name, value, text in ARGUMENTS]
+    discovery = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return LaunchDescription(
+        [
+            *declared,
+            SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", discovery),
+            OpaqueFunction(function=_nodes),
+        ]
+    )
+
+
+def _nodes(context: LaunchContext) -> list[Node]:
+    given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
+    enclave = ["--enclave", given["enclave"]] if given["enclave"] else []
+    files = [given["params_file"]] if given["params_file"] else []
+    return [
+        Node(
+            package="push_predictor",
+            executable="push_recorder",
+            name="push_recorder",
+            namespace=given["namespace"],
+            parameters=[*files, _parameters(given)],
+            arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
+            output="screen",
+            sigterm_timeout="30",  # a large bag needs time to be completed
+        )
+    ]
+
+
+def _parameters(given: dict[str, str]) -> dict[str, Any]:
+    """The arguments that were given: others keep the value of params_file."""
+    found: dict[str, Any] = {name: given[name] for name in TEXTS if given[name]}
+    found |= {name: os.path.abspath(os.path.expanduser(given[name])) for name in PATHS if given[name]}
+    found |= {name: True for name in ("force", "use_sim_time") if given[name].lower() in ("true", "1", "yes")}
+    if given["covariate_topics"]:
+        found["covariate_topics"] = [topic.strip() for topic in given["covariate_topics"].split(",")]
+    return found | ({"duration": float(given["duration"])} if given["duration"] else {})

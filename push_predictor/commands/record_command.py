@@ -1,0 +1,73 @@
+"""push_predictor record: write the streams of a rig into a bag, without rosbag2."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from push_predictor.commands.common.options import add_command, add_out, add_rig, add_topics, topics_of
+from push_predictor.commands.common.output import check_output, write_json
+from push_predictor.errors import PushPredictorError
+
+if TYPE_CHECKING:
+    from push_predictor.online.recorder.progress import Progress
+
+NOTHING = "No message arrived. No bag was written."
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the sub-command `record`."""
+    parser = add_command(
+        commands,
+        "record",
+        "Record the topics of a rig into an MCAP bag. Shows the push windows found so far, the share of contact, gaps "
+        "and what is missing. Ctrl-C ends the recording.",
+        "push_predictor record --rig rig.yaml --slider-topic /vicon/block/block --out monday",
+    )
+    add_out(parser, "the bag, a folder or FILE.mcap")
+    add_rig(parser)
+    add_topics(parser, saves=True)
+    parser.add_argument(
+        "--duration", type=float, default=0.0, metavar="T", help="duration in s: end this long after the first message"
+    )
+    parser.add_argument(
+        "--use-sim-time", action="store_true", help="the log time is that of /clock, as of a replay or a simulation"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Record until Ctrl-C. Raises PushPredictorError without ROS, SystemExit where the recording fails."""
+    check_output("--out", options.out, force=options.force, folder=options.out.suffix != ".mcap")
+    try:
+        summary = _recorded(options)
+    except KeyboardInterrupt:  # before the node handles signals
+        summary = None
+    if not write_json(options, summary.to_json() if summary else {"recording": None}):
+        print(summary.to_text() if summary else NOTHING)
+
+
+def _recorded(options: argparse.Namespace) -> Progress | None:
+    try:
+        from push_predictor.nodes.push_recorder import record
+    except ImportError as error:
+        raise PushPredictorError(f"ROS 2 is needed to record ({error}); see push_predictor doctor") from None
+    status, summary = record(["--ros-args", *_parameters(options)])
+    if status:
+        sys.exit(status)
+    return summary
+
+
+def _parameters(options: argparse.Namespace) -> Iterator[str]:
+    """The options as arguments of the node."""
+    topics = topics_of(options)
+    values: dict[str, object] = {"bag": str(options.out), "force": options.force, "duration": options.duration}
+    values |= {"slider_topic": topics.slider, "pusher_topic": topics.pusher, "wrench_topic": topics.wrench}
+    values |= {"wrench_frame": topics.wrench_frame, "wrench_bias": topics.wrench_bias, "world_frame": topics.world}
+    values |= {"rig": "" if options.rig is None else str(options.rig), "use_sim_time": options.use_sim_time}
+    values |= {"covariate_topics": list(topics.covariates) or [""]}
+    for name, value in values.items():
+        yield from ("-p", f"{name}:={json.dumps(value)}")

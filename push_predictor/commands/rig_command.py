@@ -1,0 +1,192 @@
+"""push_predictor rig: write a rig file from the sizes of a shape, or corrected from a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from push_predictor.commands.common.options import add_command, add_out, add_rig, add_topics, save_topics_of, topics_of
+from push_predictor.commands.common.output import check_data, check_output, write_json, write_text
+from push_predictor.commands.common.progress import progress
+from push_predictor.errors import RequestError
+
+if TYPE_CHECKING:
+    from push_predictor.recordings.rig import Rig
+    from push_predictor.recordings.rigs.estimate import RigEstimate
+
+MEASURED = {
+    "tip_radius": "the radius of the pusher's round tip in metres",
+    "surface": "a name of the surface, for example plywood",
+    "mass": "the slider's mass in kilograms",
+}
+SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
+PICTURES = ".svg"
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the sub-command `rig`."""
+    parser = add_command(
+        commands,
+        "rig",
+        "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
+        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place and size.",
+        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --mass 0.8 --out rig.yaml",
+    )
+    _add_shapes(parser)
+    _add_measured(parser)
+    _add_recording(parser)
+    add_out(parser, "the rig file, FILE.yaml")
+    parser.add_argument("--picture", type=Path, metavar="FILE.svg", help="draw outline, axes and tip to scale")
+    parser.set_defaults(run=run)
+
+
+def _add_shapes(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "shape of the slider, seen from above",
+        "The origin is the centroid. x and y are the axes of the tracked frame.",
+    )
+    one = group.add_mutually_exclusive_group()
+    one.add_argument("--square", type=float, metavar="SIDE")
+    one.add_argument("--rectangle", type=float, nargs=2, metavar=("X", "Y"), help="sizes along x and along y")
+    one.add_argument("--circle", type=float, metavar="DIAMETER", help="the diameter, not the radius")
+    one.add_argument("--ellipse", type=float, nargs=2, metavar=("X", "Y"), help="full axes along x and along y")
+    one.add_argument(
+        "--polygon",
+        type=Path,
+        metavar="FILE",
+        help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
+        "of [x, y]. From CAD: export the corners of the base as CSV",
+    )
+    group.add_argument(
+        "--keep-origin", action="store_true", help="the polygon's origin is that of the tracked frame: do not move it"
+    )
+    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the polygon's file name")
+
+
+def _add_measured(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("what else was measured")
+    group.add_argument("--tip-radius", type=float, metavar="R", help="radius of the pusher's round tip, m")
+    group.add_argument("--surface", metavar="NAME", help="name of the surface")
+    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg")
+    group.add_argument("--contact-friction", type=float, metavar="MU", help="pusher on slider, if it is known")
+    group.add_argument("--surface-friction", type=float, metavar="MU", help="slider on surface, if it is known")
+    group.add_argument(
+        "--support-point",
+        type=float,
+        nargs=3,
+        action="append",
+        metavar=("X", "Y", "SHARE"),
+        help="a foot of the slider, m, and its share of the load, if known; may be repeated",
+    )
+
+
+def _add_recording(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "estimate from a recording",
+        "Give the rig to correct by a shape or by --rig; otherwise it is the recorded one.",
+    )
+    group.add_argument(
+        "--from",
+        dest="recording",
+        type=Path,
+        metavar="RECORDING",
+        help="estimate yaw, place and size of the outline, tip radius and clock lag from at least 8 pushes",
+    )
+    add_rig(parser)
+    add_topics(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the rig file. Raises RequestError or RigError that names the option or file."""
+    check_output("--out", options.out, force=options.force)
+    check_output("--picture", options.picture, force=options.force)
+    if options.picture is not None and options.picture.suffix != PICTURES:
+        raise RequestError("--picture", str(options.picture), f"a file that ends with {PICTURES}")
+    shape = next((name for name in SHAPES if getattr(options, name) is not None), None)
+    _check_call(options, shape)
+    rig, notes = (None, ()) if shape is None else _measured(options, shape)
+    estimate = None if options.recording is None else _estimate(options, rig)
+    rig = estimate.corrected if estimate is not None else rig
+    assert rig is not None, "a call without shape and recording is refused"
+    _write(options, rig)
+    content = {"rig": str(options.out), "notes": list(notes), "record": rig.to_record()}
+    if not write_json(options, content if estimate is None else content | estimate.record()):
+        lines = [f"note: {note}" for note in notes] + ([] if estimate is None else estimate.lines)
+        print("\n".join(_summary(options, rig) + lines))
+
+
+def _check_call(options: argparse.Namespace, shape: str | None) -> None:
+    """Raise RequestError for options that are missing, or that nothing would use."""
+    if options.recording is None:
+        if shape is None:
+            raise RequestError(
+                "shape", None, f"one of {', '.join(f'--{name}' for name in SHAPES)}, or --from RECORDING"
+            )
+        if options.rig is not None:
+            raise RequestError("--rig", str(options.rig), "it only with --from RECORDING")
+    if shape is not None and options.rig is not None:
+        raise RequestError("--rig", str(options.rig), f"either it or --{shape}")
+    if options.keep_origin and shape != "polygon":
+        raise RequestError("--keep-origin", True, "it only with --polygon")
+    for name, meaning in MEASURED.items():
+        if shape is not None and getattr(options, name) is None:
+            raise RequestError(f"--{name.replace('_', '-')}", None, meaning)
+    for name in (*MEASURED, "name", "contact_friction", "surface_friction", "support_point"):
+        if shape is None and getattr(options, name) is not None:
+            raise RequestError(f"--{name.replace('_', '-')}", getattr(options, name), "it only with a shape")
+
+
+def _estimate(options: argparse.Namespace, rig: Rig | None) -> RigEstimate:
+    """The rig corrected from the recording."""
+    from push_predictor.recordings.read import read_recording, require_rig
+    from push_predictor.recordings.rig import load_rig
+    from push_predictor.recordings.rigs.estimate import estimate_rig
+
+    check_data([options.recording])
+    given = load_rig(options.rig) if options.rig is not None else rig
+    with progress("rig"):
+        recording = read_recording(options.recording, rig=given, topics=topics_of(options))
+        estimate = estimate_rig(recording, require_rig(recording))
+        save_topics_of(options, [options.recording])
+    return estimate
+
+
+def _measured(options: argparse.Namespace, shape: str) -> tuple[Rig, tuple[str, ...]]:
+    """The rig of the given sizes, and notes on what was changed."""
+    import numpy as np
+
+    from push_predictor.geometry.shapes import ellipse, rectangle
+    from push_predictor.recordings.rigs.new_rig import length_of, new_rig
+    from push_predictor.recordings.rigs.polygon_file import read_polygon
+
+    moved = np.zeros(2)
+    notes: tuple[str, ...] = ()
+    if shape == "polygon":
+        polygon = read_polygon(options.polygon, options.keep_origin)
+        outline, moved, notes = polygon.outline, polygon.moved, polygon.notes
+    else:
+        given = getattr(options, shape)
+        sizes = [length_of(f"--{shape}", size) for size in (given if isinstance(given, list) else [given, given])]
+        outline = ellipse(sizes[0] / 2.0, sizes[1] / 2.0) if shape in ("circle", "ellipse") else rectangle(*sizes)
+    points = None if options.support_point is None else np.array(options.support_point) + [*moved, 0.0]
+    name = options.name or (options.polygon.stem if shape == "polygon" else shape)
+    measured = (options.tip_radius, options.surface, options.mass)
+    return new_rig(name, outline, *measured, points, options.contact_friction, options.surface_friction), notes
+
+
+def _write(options: argparse.Namespace, rig: Rig) -> None:
+    from push_predictor.recordings.rig import save_rig
+
+    save_rig(rig, options.out)
+    if options.picture is not None:
+        from push_predictor.reporting.rig_picture import rig_svg
+
+        write_text(options.picture, rig_svg(rig))
+
+
+def _summary(options: argparse.Namespace, rig: Rig) -> list[str]:
+    from push_predictor.recordings.rigs.summary import rig_lines
+
+    picture = [] if options.picture is None else [f"picture: {options.picture}"]
+    return [f"{options.out}: {rig.shape} on {rig.surface}", *rig_lines(rig), *picture]

@@ -1,0 +1,63 @@
+"""The three sentences that begin the page of a check."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from push_predictor.recordings.checks.checked import CheckedData
+from push_predictor.recordings.checks.coverage import Coverage
+from push_predictor.recordings.checks.finding import Finding
+
+ORDER = ("refused", "warning", "note")
+LABELS = {"refused": "refused", "warning": "check first", "note": "sound"}
+
+
+def answer_of(checked: CheckedData) -> tuple[list[str], str]:
+    """What was found, what to do, what was pushed; and a label: refused, check first, or sound."""
+    worst = min(checked.findings, key=lambda finding: ORDER.index(finding.severity), default=None)
+    label = "sound" if worst is None else LABELS[worst.severity]
+    return [with_minus(text) for text in (_found(checked, worst), _to_do(checked, worst), _pushed(checked))], label
+
+
+def with_minus(text: str) -> str:
+    """The text with minus signs in place of the hyphens before numbers."""
+    return re.sub(r"(?<![\w-])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def _found(checked: CheckedData, worst: Finding | None) -> str:
+    if worst is None or worst.severity == "note":
+        return "No mistake was found."
+    if worst.severity == "refused":
+        return f"These data cannot be used. {worst.sentence}"
+    count = sum(finding.severity == "warning" for finding in checked.findings)
+    return f"{'A mistake is' if count == 1 else f'{count} mistakes are'} probable. {worst.sentence}"
+
+
+def _to_do(checked: CheckedData, worst: Finding | None) -> str:
+    if worst is None:
+        return "The data can be used as they are."
+    if worst.severity == "note":
+        return f"The data can be used as they are. To learn more: {worst.advice[0].lower()}{worst.advice[1:]}"
+    return worst.advice
+
+
+def _pushed(checked: CheckedData) -> str:
+    if checked.coverage is None:
+        return "Pushes are searched for once this is corrected."
+    return coverage_sentence(checked.coverage)
+
+
+def coverage_sentence(coverage: Coverage) -> str:
+    """The pushes, with sides, speeds, angles and the share of sliding contacts where they are known."""
+    pushes = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
+    windows = f"{coverage.windows} window{'' if coverage.windows == 1 else 's'}"
+    counts = coverage.side_counts
+    sides = "" if counts is None else f" on {np.count_nonzero(counts)} of {len(counts)} {coverage.side}s"
+    slow, fast = (f"{1e3 * speed:.3g}" for speed in coverage.speeds)
+    low, high = (f"{np.degrees(angle):.0f}" for angle in coverage.angles)
+    sliding = coverage.sliding
+    slides = "" if sliding is None else f"; the contact slides in {100.0 * sliding:.0f} % of the steps"
+    ranges = f"at {slow} to {fast} mm/s and {low} to {high} degrees"
+    return f"The data contain {pushes} ({windows}){sides}, {ranges}{slides}."

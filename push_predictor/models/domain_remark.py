@@ -1,0 +1,47 @@
+"""In words, why a push lies outside the domain of a model's training data."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from push_predictor.models.mechanisms import Push
+from push_predictor.models.push_model import PushModel
+from push_predictor.models.request import UNITS
+from push_predictor.types import BoolArray
+
+OUT_OF_DOMAIN = "out of domain"
+
+
+def domain_remark(model: PushModel, push: Push, in_domain: BoolArray) -> str:
+    """What a client should know of n predicted pushes, of which in_domain (n,) are in the domain; empty if all are.
+
+    The text begins with OUT_OF_DOMAIN, and names what is outside for the first push that is.
+    """
+    if in_domain.all():
+        return ""
+    first, count = int(np.argmin(in_domain)), len(in_domain)
+    reason = _reason(model, push, first)
+    if count == 1:
+        return f"{OUT_OF_DOMAIN}: {reason}"
+    outside = int(np.count_nonzero(~in_domain))
+    return f"{OUT_OF_DOMAIN}: {outside} of {count} pushes, first push {first}: {reason}"
+
+
+def _reason(model: PushModel, push: Push, row: int) -> str:
+    velocity, contact, angle = push.inputs[row].tolist()
+    limits = model.input_limits
+    outside = []
+    for name, value, (low, high) in (("velocity", velocity, limits.velocity), ("angle", angle, limits.angle)):
+        if not low <= value <= high:
+            outside.append(_outside(name, value, f"{low:.4g} to {high:.4g}"))
+    given = {name: column[row : row + 1] for name, column in push.covariates.items()}
+    alone = model.predictor.completed(Push(push.inputs[row : row + 1], push.duration[row : row + 1], given))
+    for name, known in model.covariate_ranges.items():
+        if not known.contains(alone.covariates[name])[0]:
+            outside.append(_outside(f"covariate {name}", float(alone.covariates[name][0]), str(known)))
+    return "; ".join(outside) or f"contact {contact:.4g}, beyond those of the training pushes"
+
+
+def _outside(name: str, value: float, accepted: str) -> str:
+    unit = f" {UNITS[name.removeprefix('covariate ')]}" if name.removeprefix("covariate ") in UNITS else ""
+    return f"{name} {value:.4g}{unit}, training covers {accepted}{unit}"

@@ -1,0 +1,104 @@
+"""A subscription that follows its publishers: it is made again when their type or QoS changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from push_predictor.nodes.parameters import given_value
+from push_predictor.nodes.polling import PolledGroup, Taken, take_all
+from push_predictor.nodes.qos import DEPTH, common_profile
+from push_predictor.nodes.replay.topics import message_class
+
+
+class FollowingSubscription:
+    """A subscription to serialized messages with the reliability that all publishers of the topic offer.
+
+    depth: of its queue. earlier: also take what was sent before, if all publishers keep it. overridable: parameters
+    qos_overrides.TOPIC.subscription.* apply, and a reliability given there is kept. Call `publishers` and `follow` in
+    the executor's thread, one method at a time, and `taken` before `follow`. lost: messages that were overwritten
+    before they were taken, or sent while the subscription was made again.
+    """
+
+    def __init__(
+        self, node: Node, topic: str, depth: int = DEPTH, *, earlier: bool = True, overridable: bool = False
+    ) -> None:
+        self._node, self._topic, self._group = node, topic, PolledGroup()
+        self._depth, self._earlier = depth, earlier
+        self.name = node.resolve_topic_name(topic)  # after remapping
+        self.lost = 0
+        self._overriding = _overriding(node, self.name) if overridable else None
+        self._subscription: Subscription | None = None
+        self._profile: tuple[Any, ...] | None = None
+        self._last: int | None = None  # number of the last message
+
+    @property
+    def reliability(self) -> ReliabilityPolicy | None:
+        """That of the subscription, None without one."""
+        return self._subscription.qos_profile.reliability if self._subscription is not None else None
+
+    def publishers(self) -> list[TopicEndpointInfo]:
+        """The present publishers of the topic, of any type."""
+        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self._topic)
+        return found
+
+    def follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        """Subscribe to this type as these publishers offer it, reliable without any.
+
+        Raises PushPredictorError if the type is not installed.
+        """
+        offered = [publisher.qos_profile for publisher in publishers]
+        profile = common_profile(offered, self._depth, self._earlier)
+        wanted = kind, profile.durability, profile.reliability
+        if wanted == self._profile:
+            return
+        found = message_class(kind)
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription, self._profile = None, None
+        try:
+            self._subscription = self._node.create_subscription(
+                found,
+                self._topic,
+                _not_called,
+                profile,
+                callback_group=self._group,
+                qos_overriding_options=self._overriding,
+                raw=True,
+            )
+        except rclpy_implementation.RCLError:
+            return  # the executor still has the one of another type: try again at the next call
+        self._profile = wanted
+
+    def taken(self) -> Iterator[Taken]:
+        """The arrived messages."""
+        if self._subscription is None:
+            return
+        for message in take_all(self._subscription):
+            self._note_loss(message.number)
+            yield message
+
+    def _note_loss(self, number: int) -> None:
+        """Count the messages that are missing between two: a publisher numbers its messages."""
+        last, self._last = self._last, number
+        if last is not None and number > last + 1 and self._node.count_publishers(self.name) == 1:
+            self.lost += number - last - 1
+
+
+def _overriding(node: Node, name: str) -> QoSOverridingOptions:
+    """History and depth may be overridden; reliability is fixed only if a parameter gives it."""
+    policies = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH]
+    if given_value(node, f"qos_overrides.{name}.subscription.reliability") is not None:
+        policies.append(QoSPolicyKind.RELIABILITY)
+    return QoSOverridingOptions(policies)
+
+
+def _not_called(message: object) -> None:
+    """The callback that a subscription must have: `taken` takes the messages instead."""

@@ -1,0 +1,108 @@
+"""The node push_recorder: writes the streams of a rig into an MCAP bag, and reports what is missing."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Sequence
+from time import monotonic
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from msg_adapters.diagnostics import diagnostic_array
+from push_predictor.nodes.recorder.parameters import read_options
+from push_predictor.nodes.recorder.status import recorder_status
+from push_predictor.nodes.recorder.subscriptions import RecorderSubscriptions
+from push_predictor.nodes.runtime import Stop, run
+from push_predictor.nodes.validator.rig_source import RigSource
+from push_predictor.online.recorder.live_line import LiveLine
+from push_predictor.online.recorder.live_recording import LiveRecording
+from push_predictor.online.recorder.progress import Progress
+
+PERIOD = 0.02  # s between two looks at what has arrived
+SHOWN = 1.0  # s between two updates of the line
+
+
+class PushRecorder(Node):
+    """Records until SIGINT, SIGTERM or the end of the duration. summary: of the recording, once it is closed.
+
+    Raises PushPredictorError for a bad parameter, and later if the bag cannot be written.
+    """
+
+    def __init__(self, stop: Stop) -> None:
+        super().__init__("push_recorder")
+        self.summary: Progress | None = None
+        self._stop, self._options = stop, read_options(self)
+        self._rigs = RigSource(self, self._options.rig)
+        options = self._options
+        self._recording = LiveRecording(options.bag, options.topics, monotonic(), options.with_wrench)
+        self._topics = RecorderSubscriptions(self, self._recording)
+        self._line = LiveLine(self.get_logger().info, self.get_logger().warning)
+        self._publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._working = threading.Lock()  # close() is called by another thread
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # goes on while /clock stands still
+        self.create_timer(PERIOD, self._work, clock=steady)
+        self.create_timer(SHOWN, self._show, clock=steady)
+        self.create_timer(self._options.diagnostics_period, self._publish, clock=steady)
+
+    def close(self) -> None:
+        """Write what has arrived, and complete the bag. Raises RecordingError if it cannot be written."""
+        with self._working:
+            self._line.clear()
+            try:
+                if self._stop.error is None:
+                    self._move()
+            finally:
+                self.summary = self._recording.close(monotonic())
+
+    def _work(self) -> None:
+        with self._working:
+            if self.summary is not None:
+                return
+            self._move()
+            self._topics.look()
+            if 0.0 < self._options.duration <= self._recording.seconds:
+                self._stop.request()
+
+    def _move(self) -> None:
+        self._rigs.work()
+        if self._rigs.rig is not None:
+            self._recording.set_rig(self._rigs.rig)
+        self._topics.drain()
+
+    def _show(self) -> None:
+        with self._working:
+            if self.summary is None:
+                self._recording.work(monotonic())
+                self._line.show(self._recording.progress(monotonic()), monotonic())
+
+    def _publish(self) -> None:
+        with self._working:
+            status = recorder_status(self.get_fully_qualified_name(), self._recording.progress(monotonic()))
+        self._publisher.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
+
+
+def record(args: Sequence[str] | None = None) -> tuple[int, Progress | None]:
+    """Run the node until SIGINT or SIGTERM; returns the exit status, and the summary if a node was made."""
+    made: list[PushRecorder] = []
+
+    def make(stop: Stop) -> PushRecorder:
+        made.append(PushRecorder(stop))
+        return made[0]
+
+    status = run("push_recorder", make, args)
+    return status, made[0].summary if made else None
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node, and print the summary; returns the exit status."""
+    status, summary = record(args)
+    if summary is not None:
+        print(summary.to_text())
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

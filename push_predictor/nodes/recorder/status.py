@@ -1,0 +1,20 @@
+"""The health of a push_recorder as a diagnostic status."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from msg_adapters.diagnostics import Level, diagnostic_status
+from push_predictor.online.recorder.progress import Progress
+
+
+def recorder_status(name: str, progress: Progress) -> DiagnosticStatus:
+    """WARN while something is missing. The message has the problems, the values the figures of every stream."""
+    values: dict[str, object] = {"state": "recording" if progress.started else "waiting for messages"}
+    values |= {"bag": progress.path, "seconds": progress.seconds, "messages": sum(progress.messages.values())}
+    values |= {"windows": progress.windows, "pushes": progress.pushes, "share of contact": progress.contact}
+    for each in progress.streams:
+        values |= {f"{each.name} samples": each.samples, f"{each.name} rate": each.rate}
+        values[f"{each.name} largest gap"] = each.largest_gap
+    level = Level.WARN if progress.problems else Level.OK
+    return diagnostic_status(name, level, " ".join(progress.problems.values()) or str(values["state"]), values)

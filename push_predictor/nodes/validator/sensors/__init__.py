@@ -1,0 +1,4 @@
+"""The streams of `push_validator`: a topic of any type with a pose or wrench, or a frame of tf.
+
+Imported by `nodes.validator.sensor_subscriber` only.
+"""

@@ -1,0 +1,97 @@
+"""The checks of a recording in a process of their own: samples must not wait for a fit of some tenths of a second."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from push_predictor.errors import PushPredictorError
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+
+NICENESS = 5  # the samples come first; on a busy machine a lower priority would never be served
+PENDING = "not checked yet"
+
+
+class CheckProcess:
+    """Checks one recording at a time. Call `work` often, from one thread.
+
+    findings: refusals and warnings of the last check that ended. result: in words, what it found. strict: a warning is
+    an error too.
+    """
+
+    def __init__(self, strict: bool = False) -> None:
+        self._failing = ("refused", "warning") if strict else ("refused",)
+        self._process: BaseProcess | None = None
+        self._connection: Connection | None = None
+        self.findings: tuple[Finding, ...] = ()
+        self.result = PENDING
+
+    @property
+    def busy(self) -> bool:
+        """Whether a check runs."""
+        return self._process is not None
+
+    @property
+    def failed(self) -> bool:
+        """Whether a finding is an error."""
+        return any(finding.severity in self._failing for finding in self.findings)
+
+    @property
+    def problems(self) -> list[str]:
+        """The findings in words."""
+        return [finding.text for finding in self.findings]
+
+    def start(self, data: Recording | Path, rig: Rig | None) -> None:
+        """Check a recording, or that of a path, if no check runs. rig: None for that of the recording."""
+        if self.busy:
+            return
+        # spawned: a fork would inherit the threads' locks of the middleware
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_check, args=(theirs, data, rig), daemon=True, name="check")
+        self._process.start()
+        theirs.close()
+
+    def work(self) -> None:
+        """Take the result if it is there."""
+        if self._connection is None or not self._connection.poll():
+            return
+        try:
+            reply: Sequence[Finding] | str = self._connection.recv()
+        except (EOFError, OSError):
+            reply = "the process of the check ended"
+        self.stop()
+        if isinstance(reply, str):
+            self.result = f"not checked: {reply}"
+            return
+        self.findings = tuple(finding for finding in reply if finding.severity != "note")
+        self.result = ", ".join(finding.name for finding in self.findings) or "sound"
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.terminate()
+            self._process.join()
+        if self._connection is not None:
+            self._connection.close()
+        self._process, self._connection = None, None
+
+
+def _check(connection: Connection, data: Recording | Path, rig: Rig | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the node ends this process
+    os.nice(NICENESS)
+    from push_predictor.recordings.checks.check import check_recording
+    from push_predictor.recordings.read import read_recording, require_rig
+
+    try:
+        recording = read_recording(data, rig=rig) if isinstance(data, Path) else data
+        connection.send(check_recording(recording, rig or require_rig(recording)))
+    except (PushPredictorError, OSError) as error:
+        connection.send(" ".join(str(error).split()))

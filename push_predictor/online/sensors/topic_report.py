@@ -1,0 +1,110 @@
+"""The report about a live topic: type, reliability, rate, frame, jitter of the stamps, latency, what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.types import IntArray
+
+FEWEST = 10  # stamps from which rate and jitter are computed
+SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another clock
+SD = 1.4826  # standard deviations of a Gaussian in one median absolute deviation
+
+
+@dataclass(frozen=True)
+class StampFigures:
+    """Of recent messages: rate in Hz; jitter: standard deviation of a stamp, s; latency from stamp to receipt, s.
+
+    latency is None if it is not known, and other_clock is set if the stamps are of another clock than that of this
+    machine, as in a replay.
+    """
+
+    rate: float
+    jitter: float
+    latency: float | None = None
+    other_clock: bool = False
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """What is known of a topic. stream: slider, pusher or wrench; kind: the message type; reliability: '' without one.
+
+    refused: whether the topic cannot be used as it is. figures: None before enough messages came.
+    """
+
+    stream: str
+    topic: str
+    kind: str
+    reliability: str
+    frames: tuple[str, ...] = ()
+    figures: StampFigures | None = None
+    problem: str = ""
+    refused: bool = False
+    note: str = ""
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What has to change for the line to be logged again: not its figures."""
+        return self.topic, self.kind, self.reliability, self.frames, self.problem, self.note, self.figures is None
+
+    @property
+    def line(self) -> str:
+        """The report in one line."""
+        parts = [self.topic, self.kind, self.reliability]
+        parts += [f"frame_id {' and '.join(map(repr, self.frames))}"] if self.frames else []
+        if self.figures is not None:
+            parts += [f"{self.figures.rate:.1f} Hz", f"stamp jitter {1e3 * self.figures.jitter:.2g} ms"]
+            parts += [_latency(self.figures)]
+        text = f"{self.stream}: {', '.join(filter(None, parts))}"
+        return " ".join([f"{text}.", *filter(None, (self.problem, self.note))])
+
+
+def stamp_figures(stamp: IntArray, received: IntArray | None) -> StampFigures | None:
+    """The figures of stamps (n,) and times of receipt (n,) in ns of messages, in order; None for too few.
+
+    received: None if it is not known.
+    """
+    if len(stamp) < FEWEST:
+        return None
+    period = np.diff(stamp) * 1e-9
+    usual = float(np.median(period[period > 0.0])) if np.any(period > 0.0) else 0.0
+    if not usual:
+        return None
+    # The median ignores gaps. A difference has the noise of two stamps.
+    jitter = SD * float(np.median(np.abs(period - usual))) / np.sqrt(2.0)
+    if received is None:
+        return StampFigures(1.0 / usual, float(jitter))
+    latency = 1e-9 * float(np.median(received - stamp))
+    other = abs(latency) > SAME_CLOCK
+    return StampFigures(1.0 / usual, float(jitter), None if other else latency, other)
+
+
+class ReportLog:
+    """Which reports are news: a report is logged when it differs from the one before, and stays so for a second look.
+
+    A refusal is logged at once.
+    """
+
+    def __init__(self) -> None:
+        self._logged: dict[str, tuple[object, ...]] = {}
+        self._seen: dict[str, tuple[object, ...]] = {}
+
+    def news(self, reports: Iterable[TopicReport]) -> list[TopicReport]:
+        """The reports to log now."""
+        found = []
+        for report in reports:
+            stable = self._seen.get(report.stream) == report.key
+            self._seen[report.stream] = report.key
+            if (stable or report.refused) and self._logged.get(report.stream) != report.key:
+                self._logged[report.stream] = report.key
+                found.append(report)
+        return found
+
+
+def _latency(figures: StampFigures) -> str:
+    if figures.other_clock:
+        return "stamps of another clock"
+    return "" if figures.latency is None else f"latency {1e3 * figures.latency:.2g} ms"

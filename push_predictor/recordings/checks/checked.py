@@ -1,0 +1,61 @@
+"""A recording or push table with all that was found about it: mistakes, and the coverage of the domain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from push_predictor.recordings.checks.check import check_recording, check_table
+from push_predictor.recordings.checks.coverage import Coverage, coverage_findings, coverage_of
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.load import known_rig
+from push_predictor.recordings.read import read_recording, require_rig
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.recordings.table import PushTable
+from push_predictor.recordings.table_file import is_recording, read_table
+from push_predictor.recordings.topics import Topics
+from push_predictor.recordings.windows.finder import find_windows
+from push_predictor.recordings.windows.push_window import windows_to_table
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedData:
+    """Findings about mistakes first, then about coverage. recording: None for a push table.
+
+    coverage and table (of windows): None for refused data; coverage also without a push. rig: None for a table without
+    one.
+    """
+
+    name: str
+    findings: tuple[Finding, ...]
+    coverage: Coverage | None
+    recording: Recording | None
+    rig: Rig | None
+    table: PushTable | None = None
+
+
+def checked_data(path: Path, rig: Rig | None = None, topics: Topics = Topics()) -> CheckedData:
+    """Check the recording or push table of a path. Raises RecordingError, TableError or RigError."""
+    if not is_recording(path):
+        return _checked_table(path.name, read_table(path), rig or known_rig(path))
+    return checked_recording(read_recording(path, rig=rig, topics=topics))
+
+
+def checked_recording(recording: Recording) -> CheckedData:
+    """Check a recording, and the coverage of its windows if nothing is refused. Raises RigError without a rig."""
+    rig = require_rig(recording)
+    found = check_recording(recording, rig)
+    if any(finding.severity == "refused" for finding in found):
+        return CheckedData(recording.name, found, None, recording, rig)
+    table = windows_to_table(find_windows(recording, rig))
+    coverage = coverage_of(table, rig.outline, rig.pusher_radius)
+    return CheckedData(recording.name, (*found, *coverage_findings(coverage)), coverage, recording, rig, table)
+
+
+def _checked_table(name: str, table: PushTable, rig: Rig | None) -> CheckedData:
+    found = check_table(table, rig)
+    if any(finding.severity == "refused" for finding in found):
+        return CheckedData(name, found, None, None, rig)
+    coverage = coverage_of(table) if rig is None else coverage_of(table, rig.outline, rig.pusher_radius)
+    return CheckedData(name, (*found, *coverage_findings(coverage)), coverage, None, rig, table)

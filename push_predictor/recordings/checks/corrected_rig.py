@@ -1,0 +1,63 @@
+"""The rig with what the checks found about its outline and tip corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import mirror_image, transformed, transformed_points
+from push_predictor.recordings.checks.finding import Finding
+from push_predictor.recordings.checks.frames import MIRRORS
+from push_predictor.recordings.checks.outline_findings import LENGTH_ALLOWANCE
+from push_predictor.recordings.rig import Rig
+
+CORRECTED = ("outline_mirrored", "outline_turned", "outline_shifted", "outline_size", "tip_radius")
+CENTRED_WITHIN = 0.5 * LENGTH_ALLOWANCE
+PREVENTS = (*MIRRORS, "outline_unchecked", "outline_misfit")
+
+
+def corrected_rig(rig: Rig, findings: Sequence[Finding]) -> Rig:
+    """The rig whose outline and tip radius are those that the findings of `check_recording` estimate.
+
+    Support points move with the outline. Other findings, such as mirrored frames and a clock lag, are faults of the
+    recording: they change nothing here. Without a finding, the rig is the same.
+    """
+    found = {finding.name: finding.values for finding in findings if finding.name in CORRECTED}
+    if not found:
+        return rig
+    if "outline_mirrored" in found:
+        rig = _mirrored(rig)
+    outline = rig.outline
+    yaw = found["outline_turned"]["yaw"].value if "outline_turned" in found else 0.0
+    shift = found.get("outline_shifted")
+    moved = (0.0, 0.0) if shift is None else _centring(outline, shift["x"].value, shift["y"].value)
+    size = found["outline_size"]["scale"].value if "outline_size" in found else 1.0
+    radius = found["tip_radius"]["radius"].value if "tip_radius" in found else rig.pusher_radius
+    points = rig.support_points
+    if points is not None:
+        places = transformed_points(outline, points[:, :2], yaw, moved, size)
+        points = np.column_stack([places, points[:, 2]])
+    corrected = transformed(outline, yaw, moved, size)
+    return replace(rig, outline=corrected, pusher_radius=radius, support_points=points)
+
+
+def _centring(outline: Outline, x: float, y: float) -> tuple[float, float]:
+    """The shift, exactly to the origin if it ends near it: a symmetric outline must not lose its symmetry to noise."""
+    there = outline.centroid + [x, y]
+    if np.hypot(*there) > CENTRED_WITHIN:
+        return x, y
+    x, y = (-outline.centroid).tolist()
+    return x, y
+
+
+def _mirrored(rig: Rig) -> Rig:
+    points = None if rig.support_points is None else rig.support_points * [1.0, -1.0, 1.0]
+    return replace(rig, outline=mirror_image(rig.outline), support_points=points)
+
+
+def prevents_correction(findings: Sequence[Finding]) -> list[str]:
+    """Names of findings with which no rig can be estimated: they must be corrected in the recording first."""
+    return [finding.name for finding in findings if finding.severity == "refused" or finding.name in PREVENTS]

@@ -1,0 +1,178 @@
+"""The part of the domain that pushes cover: their number, sides, speeds, angles and the share of sliding contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.checks.finding import Finding, Severity, Value
+from push_predictor.recordings.table import PushTable
+from push_predictor.types import Array, IntArray
+
+FEWEST_PUSHES, GOOD_PUSHES = 8, 30  # fewer than the first give a warning, fewer than the second a note
+NARROWEST_ANGLES, GOOD_ANGLES = np.radians(30.0), np.radians(60.0)  # range of the middle 90 %
+ONE_SPEED = 1.5  # ratio of the speeds of the middle 90 %
+LEAST_SLIDING, GOOD_SLIDING = 0.05, 0.15  # share of steps in which the contact slides
+SLIP = 0.2  # of the tip's path: a contact that moves farther along the edge slides
+LARGEST_SLIP = 1.5  # of the tip's path: rows with more are not consecutive
+FEWEST_STEPS = 20  # from one window of a push to the next
+MOST_SIDES = 12  # an outline with more vertices is divided into quarters
+MIDDLE = (5.0, 95.0)  # percentiles
+NAMED = 4  # sides
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """What a push table covers.
+
+    side_counts (k,): windows on each side, counter-clockwise from the outline's first vertex, or on each quarter of the
+    perimeter; None without an outline. side: "side" or "quarter". alike: the number of sides after which the outline
+    repeats, 0 for a circle. speeds m/s and angles rad: middle 90 %. sliding: share of the steps from one window of a
+    push to the next in which the contact slides along the edge, None if they are few.
+    """
+
+    pushes: int
+    windows: int
+    side_counts: IntArray | None
+    side: str
+    alike: int
+    speeds: tuple[float, float]
+    angles: tuple[float, float]
+    sliding: float | None
+
+    def record(self) -> dict[str, object]:
+        """The entry in the JSON."""
+        return {
+            "pushes": self.pushes,
+            "windows": self.windows,
+            "windows_by_side": None if self.side_counts is None else self.side_counts.tolist(),
+            "speeds": list(self.speeds),
+            "angles": list(self.angles),
+            "sliding_share": self.sliding,
+        }
+
+
+def coverage_of(table: PushTable, outline: Outline | None = None, radius: float = 0.0) -> Coverage | None:
+    """The coverage of a table, None without a row. radius: of the tip, m."""
+    if not len(table):
+        return None
+    counts, side, alike = (None, "side", 0) if outline is None else _sides(table, outline)
+    return Coverage(
+        len(table.pushes),
+        len(table),
+        counts,
+        side,
+        alike,
+        _middle(table.inputs[:, 0]),
+        _middle(table.inputs[:, 2]),
+        None if outline is None else _sliding(table, outline, radius),
+    )
+
+
+def coverage_findings(coverage: Coverage | None) -> list[Finding]:
+    """What the pushes lack for a model that learns from them alone, and what to record next."""
+    if coverage is None:
+        sentence = "No push was found: nothing can be learnt."
+        return [Finding("no_pushes", "warning", sentence, "Check topics, outline and clocks, and record pushes.")]
+    found = [_pushes(coverage), _missing_sides(coverage), _speeds(coverage), _angles(coverage), _slides(coverage)]
+    return [finding for finding in found if finding is not None]
+
+
+def _sides(table: PushTable, outline: Outline) -> tuple[IntArray, str, int]:
+    """Windows on each side, the name of a side, and the number of sides after which the outline repeats."""
+    order = outline.rotational_symmetry
+    if outline.semi_axes is None and len(outline.vertices) <= MOST_SIDES:
+        count, side, index = len(outline.vertices), "side", outline.edge(table.inputs[:, 1])[0]
+    else:
+        count, side, index = 4, "quarter", np.floor(4.0 * table.inputs[:, 1]).astype(np.int64)
+    repeats = order and count % order == 0
+    alike = 0 if order == 0 else count // order if repeats else count
+    return np.bincount(index, minlength=count), side, alike
+
+
+def _sliding(table: PushTable, outline: Outline, radius: float) -> float | None:
+    """Share of sliding steps. A contact that sticks moves along the edge only as the slider rolls around the tip."""
+    path = table.inputs[:-1, 0] * table.duration[:-1]
+    step = np.diff(table.inputs[:, 1])
+    slip = np.abs(outline.perimeter * (step - np.round(step)) + radius * table.outcomes[:-1, 2]) / path
+    used = (table.push_id[1:] == table.push_id[:-1]) & (slip < LARGEST_SLIP)
+    if (time := table.covariates.get("elapsed_time")) is not None:
+        used &= np.abs(np.diff(time) - table.duration[:-1]) < 0.1 * table.duration[:-1]  # windows end to end
+    return float(np.mean(slip[used] > SLIP)) if np.sum(used) >= FEWEST_STEPS else None
+
+
+def _middle(values: Array) -> tuple[float, float]:
+    low, high = np.percentile(values, MIDDLE)
+    return float(low), float(high)
+
+
+def _severity(value: float, least: float, good: float) -> Severity | None:
+    return "warning" if value < least else "note" if value < good else None
+
+
+def _pushes(coverage: Coverage) -> Finding | None:
+    severity = _severity(coverage.pushes, FEWEST_PUSHES, GOOD_PUSHES)
+    if severity is None:
+        return None
+    count = f"{coverage.pushes} push{'' if coverage.pushes == 1 else 'es'}"
+    sentence = f"The data contain {count}: a learnt model needs {GOOD_PUSHES} or more."
+    advice = f"Record at least {GOOD_PUSHES - coverage.pushes} more pushes of 20 mm or longer."
+    return Finding("few_pushes", severity, sentence, advice, {"pushes": Value(coverage.pushes, "1")})
+
+
+def _missing_sides(coverage: Coverage) -> Finding | None:
+    """A warning only if no side of the same kind was pushed: a model folds the outline's rotational symmetry."""
+    counts = coverage.side_counts
+    if counts is None or not coverage.alike or np.all(counts):
+        return None
+    kinds = counts.reshape(-1, coverage.alike).sum(axis=0)
+    missing = np.flatnonzero(counts == 0) + 1
+    pushed = np.flatnonzero(counts) + 1
+    severity: Severity = "note" if np.all(kinds) else "warning"
+    sentence = f"Pushed: {_listed(coverage.side, pushed)} of {len(counts)}, counter-clockwise from the first vertex."
+    advice = f"Push {_listed(coverage.side, missing)} too"
+    why = "." if severity == "warning" else ": the outline is checked better, and differences of sides are found."
+    return Finding("few_sides", severity, sentence, advice + why, {"pushed": Value(len(pushed), "1")})
+
+
+def _listed(side: str, numbers: IntArray) -> str:
+    shown = [str(number) for number in numbers.tolist()]
+    if len(shown) == 1:
+        return f"{side} {shown[0]}"
+    if len(shown) > NAMED:
+        return f"{len(shown)} {side}s"
+    return f"{side}s {', '.join(shown[:-1])} and {shown[-1]}"
+
+
+def _speeds(coverage: Coverage) -> Finding | None:
+    low, high = coverage.speeds
+    if high > ONE_SPEED * low:
+        return None
+    sentence = f"Nearly all pushes have one speed, {_millimetres(low)} to {_millimetres(high)} mm/s."
+    advice = "Record further speeds, 10 to 100 mm/s for example, if you want to predict them."
+    return Finding("one_speed", "note", sentence, advice, {"low": Value(low, "m/s"), "high": Value(high, "m/s")})
+
+
+def _millimetres(speed: float) -> str:
+    return f"{1e3 * speed:.3g}"
+
+
+def _angles(coverage: Coverage) -> Finding | None:
+    low, high = coverage.angles
+    severity = _severity(high - low, NARROWEST_ANGLES, GOOD_ANGLES)
+    if severity is None:
+        return None
+    sentence = f"The push angles span {np.degrees(low):.0f} to {np.degrees(high):.0f} degrees only (middle 90 %)."
+    advice = "Record pushes at -60 to 60 degrees to the inward normal."
+    return Finding("few_angles", severity, sentence, advice, {"low": Value(low, "rad"), "high": Value(high, "rad")})
+
+
+def _slides(coverage: Coverage) -> Finding | None:
+    share = coverage.sliding
+    if share is None or (severity := _severity(share, LEAST_SLIDING, GOOD_SLIDING)) is None:
+        return None
+    sentence = f"The contact slides along the edge in {100.0 * share:.0f} % of the steps only."
+    advice = "Record pushes at angles beyond 40 degrees, and longer ones: there the contact slides."
+    return Finding("few_sliding", severity, sentence, advice, {"share": Value(share, "1")})

@@ -1,0 +1,138 @@
+"""Options: one meaning for each name in all commands, no abbreviations, old spellings with a warning."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+
+import pytest
+from repository import REPOSITORY
+
+from push_predictor.cli import build_parser, main
+from push_predictor.commands.common.old_spellings import REPLACED, current_spelling
+
+
+def parsers(parser: argparse.ArgumentParser, words: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The words of every command that has no sub-commands."""
+    nested = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    for action in nested:
+        for name, child in action.choices.items():
+            yield from parsers(child, (*words, name))
+    if not nested:
+        yield words
+
+
+def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
+    parser = build_parser()
+    for word in words:
+        (nested,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+        parser = nested.choices[word]
+    return parser
+
+
+CALLS = list(parsers(build_parser()))
+TAKES_A_MODEL = ("predict", "suggest", "evaluate", "validate", "trace", "report validation", "doctor")
+
+
+def meaning(action: argparse.Action) -> tuple[object, ...]:
+    """What a name stands for: kind of value, and the first phrase of its help."""
+    phrase = re.split(r"[:;.(]", action.help or "")[0].strip()
+    return (type(action), action.type, action.metavar, action.nargs, tuple(action.choices or ()), phrase)
+
+
+def test_an_option_has_the_same_meaning_in_every_command() -> None:
+    meanings: dict[str, dict[tuple[object, ...], str]] = defaultdict(dict)
+    for words in CALLS:
+        for action in parser_of(words)._actions:
+            for option in action.option_strings:
+                meanings[option].setdefault(meaning(action), " ".join(words))
+    assert {"--json", "--out", "--seed", "--rig", "--travel"} <= meanings.keys()
+    different = {option: found for option, found in meanings.items() if len(found) > 1}
+    assert not different
+
+
+@pytest.mark.parametrize("words", CALLS, ids=" ".join)
+def test_a_model_file_is_an_argument_and_never_an_option(words: tuple[str, ...]) -> None:
+    actions = {action.metavar: action for action in parser_of(words)._actions}
+    assert ("MODEL" in actions) is (" ".join(words) in TAKES_A_MODEL)
+    if "MODEL" in actions:
+        assert not actions["MODEL"].option_strings
+        if words != ("report", "validation"):  # KIND comes first there
+            first = next(action for action in parser_of(words)._actions if not action.option_strings)
+            assert first.metavar == "MODEL"
+    assert not any("--model" in action.option_strings for action in parser_of(words)._actions)
+
+
+@pytest.mark.parametrize("words", [(), *CALLS], ids=" ".join)
+def test_no_option_may_be_abbreviated(words: tuple[str, ...]) -> None:
+    assert not parser_of(words).allow_abbrev
+
+
+@pytest.mark.parametrize("words", CALLS, ids=" ".join)
+def test_the_command_line_page_has_every_option_of_a_command(words: tuple[str, ...]) -> None:
+    text = (REPOSITORY / "docs" / "reference" / "command_line.md").read_text()
+    sections = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))
+    known = sections[words[0]] + sections["Conventions"]
+    options = {option for action in parser_of(words)._actions for option in action.option_strings}
+    missing = [option for option in options - {"-h", "--help"} if not re.search(rf"`{option}\b(?!-)", known)]
+    assert not missing
+
+
+# --- old spellings ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "option"),
+    [
+        ("train d --model gp --out m", "train d --kind gp --out m", "train --model"),
+        ("train d --model=gp --out m", "train d --kind=gp --out m", "train --model"),
+        ("trace a b --model m --alpha 0.1", "trace m a b --alpha 0.1", "trace --model"),
+        ("trace --model m a b", "trace m a b", "trace --model"),
+        ("trace a --model=m", "trace m a", "trace --model"),
+        ("trace --alpha 0.1 --model m a b", "trace m --alpha 0.1 a b", "trace --model"),
+        ("report validation --model a b --out d", "report validation a b --out d", "report --model"),
+        ("report validation --out d --model a b", "report validation a b --out d", "report --model"),
+        ("doctor --model m", "doctor m", "doctor --model"),
+        ("suggest m --speed 0.01 0.02", "suggest m --speed-range 0.01 0.02", "suggest --speed"),
+        ("suggest m --angle -0.5 0.5", "suggest m --angle-range -0.5 0.5", "suggest --angle"),
+    ],
+)
+def test_an_old_spelling_is_read_as_the_new_one_with_a_warning(old: str, new: str, option: str) -> None:
+    words, warnings = current_spelling(old.split())
+    assert words == new.split()
+    (warning,) = warnings
+    assert warning.startswith(f"`{option}` is now `") and warning.endswith("The old spelling still works.")
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "",
+        "--version",
+        "train d --kind gp",
+        "trace m d",
+        "predict m --angle 0.1",
+        "simulate --speed 0.02",
+        "train d --kind gp --model gp",
+        "trace m -- --model",
+    ],
+)
+def test_other_calls_stay_as_they_are(call: str) -> None:
+    assert current_spelling(call.split()) == (call.split(), [])
+
+
+def test_every_new_spelling_is_known_to_the_parser() -> None:
+    for command, replaced in REPLACED.items():
+        words = next(words for words in CALLS if words[0] == command)
+        known = {option for action in parser_of(words)._actions for option in action.option_strings}
+        for old, new in replaced.items():
+            assert old not in known and (new in known or "MODEL" in new)
+
+
+def test_the_command_line_warns_of_an_old_spelling_and_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trace", "absent.csv", "--model", "absent.pushmodel"]) == 1
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert first == "warning: `trace --model` is now `trace MODEL`. The old spelling still works."
+    assert last.startswith("push_predictor trace: absent.csv")

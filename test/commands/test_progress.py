@@ -1,0 +1,203 @@
+"""Progress: a bar with percent and time left in a terminal, lines otherwise, nothing of short work."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from repository import REPOSITORY
+
+from push_predictor.cli import main
+from push_predictor.commands.common import progress as module
+from push_predictor.commands.common.progress import Course, JobProgress, progress, time_left
+from push_predictor.errors import RequestError
+from push_predictor.watch import Watch, part_of, watched
+
+WORK = """
+import sys, time
+{before}
+from push_predictor.commands.common import progress as module
+module.PATIENCE = module.REDRAW = 0.02
+with module.progress("train gp") as watch:
+    watch("train gp: dx", 0.25)
+    time.sleep(0.5)
+    print("the result")
+"""
+
+
+# --- what is shown ----------------------------------------------------------------------------------------------------
+
+
+def test_the_time_left_supposes_that_the_rest_goes_as_fast() -> None:
+    assert time_left(0.25, 10.0, 10.0) == pytest.approx(30.0)
+    assert time_left(0.25, 10.0, 14.0) == pytest.approx(26.0)  # 4 s later, no news
+    assert time_left(1.0, 10.0, 10.0) is None
+
+
+def test_no_time_left_is_shown_of_a_start_or_of_an_estimate_that_was_too_short() -> None:
+    assert time_left(0.0, 10.0, 10.0) is None
+    assert time_left(0.01, 10.0, 10.0) is None
+    assert time_left(0.5, 10.0, 20.5) is None
+
+
+def test_the_text_has_elapsed_time_percent_time_left_and_stage(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock[0])
+    course = Course("train gp")
+    assert course.text(103.0) == "3 s" and course.fraction is None
+    course.watch("train gp: mechanics as mean", 0.0)
+    assert course.text(103.0) == "3 s, 0 %, mechanics as mean"
+    clock[0] = 110.0
+    course.watch("train gp: dx", 0.25)
+    assert course.text(112.0) == "12 s, 25 %, about 28 s left, dx"
+    clock[0] = 120.0
+    course.watch("the same again", 0.2)  # never back, and the estimate remains that of the earlier fraction
+    assert course.text(120.0) == "20 s, 25 %, about 20 s left, the same again"
+    course.watch("end", 1.5)
+    assert course.fraction == 1.0
+
+
+def test_stages_with_batches_of_jobs_give_one_fraction() -> None:
+    seen: list[tuple[str, float]] = []
+    jobs = JobProgress(lambda stage, fraction: seen.append((stage, fraction)))
+    jobs.stage(1, 2, "recordings")
+    jobs.begin("simulate", 2)
+    jobs.advance()
+    jobs.advance()
+    jobs.stage(2, 2, "noise")
+    assert seen == [
+        ("1/2 recordings", 0.0),
+        ("1/2 recordings: simulate 0 of 2", 0.0),
+        ("1/2 recordings: simulate 1 of 2", 0.25),
+        ("1/2 recordings: simulate 2 of 2", 0.5),
+        ("2/2 noise", 0.5),
+    ]
+
+
+def test_items_in_turn_report_their_share_of_a_part_of_the_work() -> None:
+    seen: list[tuple[str, float]] = []
+    watch = part_of(lambda stage, fraction: seen.append((stage, fraction)), 0.5, 0.9)
+    assert list(watched("ab", watch, "file")) == ["a", "b"]
+    assert [stage for stage, _ in seen] == ["file 1 of 2", "file 2 of 2", "file"]
+    assert [fraction for _, fraction in seen] == pytest.approx([0.5, 0.7, 0.9])
+
+
+# --- what reports ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def seen(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, float]]:
+    """What the commands report: task, stage, fraction."""
+    found: list[tuple[str, str, float]] = []
+
+    def watch(course: Course, stage: str, fraction: float) -> None:
+        found.append((course.task, stage, fraction))
+
+    monkeypatch.setattr(Course, "watch", watch)
+    return found
+
+
+def fractions(seen: list[tuple[str, str, float]], task: str) -> list[float]:
+    found = [fraction for name, _, fraction in seen if name == task]
+    assert found == sorted(found) and found[0] >= 0.0 and found[-1] <= 1.0
+    return found
+
+
+def test_commands_report_what_is_done(tmp_path: Path, seen: list[tuple[str, str, float]]) -> None:
+    bag, model = str(tmp_path / "bag"), str(tmp_path / "m.pushmodel")
+    shape = ["--shape", "rect1", "--surface", "abs", "--speed", "0.02"]
+    assert main(["simulate", *shape, "--pushes", "12", "--out", bag]) == 0
+    assert main(["train", bag, "--kind", "gp", "--mean", "zero", "--out", model]) == 0
+    assert main(["suggest", model, "--count", "3", "--out", str(tmp_path / "s.csv")]) == 0
+    assert main(["validate", model, bag]) == 0
+    assert fractions(seen, "simulate") == pytest.approx([0.6, 0.6])
+    assert fractions(seen, "train gp")[-1] == 1.0
+    assert fractions(seen, "suggest") == pytest.approx([0.0, 0.6, 0.6 + 0.4 / 3, 0.6 + 0.8 / 3, 1.0])
+    assert fractions(seen, "validate") == pytest.approx([0.0, 0.2, 0.6, 1.0])
+
+
+def test_a_report_and_a_trace_report_what_is_done(
+    tmp_path: Path, seen: list[tuple[str, str, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reported(*arguments: object) -> tuple[Path, list[object]]:
+        assert callable(arguments[-1])
+        arguments[-1]("figures", 0.5)
+        return tmp_path, []
+
+    def traced(*arguments: object, watch: Watch, **options: object) -> None:
+        watch("motion", 0.15)
+        raise RequestError("covariates", "x", "y")  # the rest is tested elsewhere
+
+    monkeypatch.setattr("push_predictor.evaluation.offline.report_recording", reported)
+    monkeypatch.setattr("push_predictor.residuals.trace.trace_data", traced)
+    monkeypatch.setattr("push_predictor.models.store.model_file.load_model", lambda path: None)
+    (tmp_path / "new.csv").touch()
+    page = ["report", "validation", "m", "--recording", "bag", "--out", str(tmp_path / "r")]
+    assert main(page) == 0
+    assert main(["trace", "m", str(tmp_path / "new.csv")]) == 1
+    assert [(task, fraction) for task, _, fraction in seen] == [("report", 0.5), ("trace", 0.15)]
+
+
+# --- where it is shown ------------------------------------------------------------------------------------------------
+
+
+def test_lines_are_printed_while_the_work_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = io.StringIO()
+    monkeypatch.setattr(module, "PATIENCE", 0.01)
+    monkeypatch.setattr(sys, "stderr", lines)
+    with progress("read") as watch:
+        while "read: 0 s\n" not in lines.getvalue():
+            time.sleep(0.01)
+        watch("second half", 0.5)
+        while "50 %" not in lines.getvalue():
+            time.sleep(0.01)
+    printed = lines.getvalue()
+    assert re.fullmatch(r"(read: 0 s(, 50 %(, about \d+ s left)?, second half)?\n)+", printed)
+    time.sleep(0.05)
+    assert lines.getvalue() == printed
+
+
+def test_short_work_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("read") as watch:
+        watch("all", 0.9)
+    assert capsys.readouterr().err == ""
+
+
+def in_terminal(before: str, folder: Path) -> tuple[str, str]:
+    """What the work prints on stdout, a file, and on stderr, a terminal."""
+    master, terminal = pty.openpty()
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), "TERM": "xterm", "COLUMNS": "100"}
+    with (folder / "out").open("w") as out:
+        code = WORK.format(before=before)
+        process = subprocess.Popen([sys.executable, "-c", code], stdout=out, stderr=terminal, env=environment)
+        os.close(terminal)
+        shown = b""
+        try:
+            while part := os.read(master, 4096):
+                shown += part
+        except OSError:  # the other end was closed
+            pass
+        assert process.wait() == 0, shown.decode()
+    os.close(master)
+    return (folder / "out").read_text(), shown.decode()
+
+
+def test_a_terminal_shows_a_bar_with_percent_and_leaves_stdout_alone(tmp_path: Path) -> None:
+    pytest.importorskip("rich")
+    out, shown = in_terminal("", tmp_path)
+    assert out == "the result\n"
+    assert "train gp" in shown and "━" in shown and "25 %" in shown and "dx" in shown
+    assert "train gp: 0 s" not in shown
+
+
+def test_a_terminal_without_rich_shows_lines(tmp_path: Path) -> None:
+    out, shown = in_terminal("sys.modules['rich'] = sys.modules['rich.console'] = None", tmp_path)
+    assert out == "the result\n"
+    assert re.search(r"train gp: 0 s, 25 %, (about \d+ s left, )?dx", shown) and "━" not in shown

@@ -1,0 +1,231 @@
+"""Every service refuses bad input with the code of its reason, and answers the rest: the handlers, without a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import drifting_models
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Vector3
+from std_msgs.msg import Header
+from synthetic import square_pushes
+
+from msg_adapters.predictions import refuse
+from push_predictor import errors
+from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.errors import FrameError, PushPredictorError, RequestError
+from push_predictor.geometry.spatial import SAME_FRAME, SpatialPose
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.store.model_registry import ModelRegistry
+from push_predictor.models.train import train_model
+from push_predictor.nodes.server.model_services import handle_load_model
+from push_predictor.nodes.server.prediction_services import (
+    MAX_PUSHES,
+    handle_predict_push,
+    handle_predict_push_batch,
+)
+from push_predictor.nodes.server.rollout_service import handle_rollout_pushes
+from push_predictor.nodes.server.slider_pose_service import handle_predict_slider_pose
+from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
+from push_predictor_interfaces.msg import PushStep
+from push_predictor_interfaces.srv import (
+    LoadModel,
+    PredictPush,
+    PredictPushBatch,
+    PredictSliderPose,
+    RolloutPushes,
+    SuggestPushes,
+)
+
+NAN = float("nan")
+PUSH = {"velocity": 0.02, "contact": 0.1, "angle": 0.1, "duration": 0.2}
+
+
+class WorldOnly:
+    """The frames of a server without tf."""
+
+    def pose_in_world(self, header: Any) -> SpatialPose:
+        if header.frame_id != "world":
+            raise FrameError("header.frame_id", header.frame_id, "'world'")
+        return SAME_FRAME
+
+
+def never_cancelled() -> None:
+    """Let the request continue."""
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModelRegistry]:
+    """A GP, and one whose effect needs the elapsed time."""
+    place = tmp_path_factory.mktemp("models")
+    gp = train_model(*square_pushes(60), "gp", name="gp")
+    save_model(gp, place / "a_gp.model")
+    table = drifting_models.pushes(20, 0)
+    base = train_model(table, gp.rig, "analytical", name="drifting")
+    save_model(drifting_models.extended(base, drifting_models.slippery(0.1)), place / "drifting.model")
+    loaded = ModelRegistry()
+    assert loaded.load_all([str(place)]) == []
+    yield loaded
+
+
+def push(**change: Any) -> PredictPush.Request:
+    return PredictPush.Request(**{**PUSH, **change})
+
+
+def batch(**change: Any) -> PredictPushBatch.Request:
+    usual = {"velocity": [0.02, 0.02], "contact": [0.1, 0.2], "angle": [0.1, 0.2], "duration": 0.2}
+    return PredictPushBatch.Request(**{**usual, **change})
+
+
+def pose(frame: str = "world", **change: Any) -> PredictSliderPose.Request:
+    usual = {
+        "slider": Pose(orientation=Quaternion(w=1.0)),
+        "pusher": Point(x=-0.045 - 0.00475, y=0.01),
+        "pusher_velocity": Vector3(x=0.02),
+        "duration": 0.2,
+    }
+    return PredictSliderPose.Request(header=Header(frame_id=frame), **{**usual, **change})
+
+
+def steps(*changes: dict[str, float], frame: str = "world", **others: Any) -> RolloutPushes.Request:
+    slider = PoseWithCovariance(pose=Pose(orientation=Quaternion(w=1.0)))
+    pushes = [PushStep(**{**PUSH, **change}) for change in changes]
+    return RolloutPushes.Request(header=Header(frame_id=frame), slider=slider, steps=pushes, **others)
+
+
+HANDLERS: dict[type, Callable[[ModelRegistry, Any, Any], None]] = {
+    PredictPush: handle_predict_push,
+    PredictPushBatch: partial(handle_predict_push_batch, never_cancelled),
+    PredictSliderPose: partial(handle_predict_slider_pose, WorldOnly()),
+    RolloutPushes: partial(handle_rollout_pushes, never_cancelled, WorldOnly()),
+    SuggestPushes: partial(handle_suggest_pushes, never_cancelled),
+    LoadModel: handle_load_model,
+}
+ELAPSED = {"covariate_names": ["elapsed_time"], "covariate_values": [NAN]}
+BAD = [
+    (PredictPush, push(angle=NAN), "INVALID_REQUEST"),
+    (PredictPush, push(duration=-0.2), "INVALID_REQUEST"),
+    (PredictPush, push(push_residual=[1.0]), "INVALID_REQUEST"),
+    (PredictPush, push(model="nobody"), "UNKNOWN_MODEL"),
+    (PredictPush, push(model="drifting"), "INVALID_COVARIATES"),
+    (PredictPush, push(model="drifting", **ELAPSED), "INVALID_COVARIATES"),
+    (PredictPush, push(covariate_names=["a", "a"], covariate_values=[1.0, 1.0]), "INVALID_COVARIATES"),
+    (PredictPushBatch, batch(angle=[0.1, 2.0]), "INVALID_REQUEST"),
+    (PredictPushBatch, batch(angle=[0.1]), "INVALID_REQUEST"),
+    (PredictPushBatch, batch(model="nobody"), "UNKNOWN_MODEL"),
+    (PredictPushBatch, batch(covariate_names=["a"]), "INVALID_COVARIATES"),
+    (PredictPushBatch, batch(velocity=np.full(MAX_PUSHES + 1, 0.02)), "TOO_LARGE"),
+    (PredictSliderPose, pose(duration=NAN), "INVALID_REQUEST"),
+    (PredictSliderPose, pose(model="nobody"), "UNKNOWN_MODEL"),
+    (PredictSliderPose, pose(frame="camera"), "INVALID_FRAME"),
+    (PredictSliderPose, pose(pusher=Point(x=-0.2)), "NO_CONTACT"),
+    (PredictSliderPose, pose(pusher_velocity=Vector3(x=-0.02)), "NO_CONTACT"),
+    (
+        PredictSliderPose,
+        pose(covariate_names=["slider_x"], covariate_values=[1.0]),
+        "INVALID_COVARIATES",
+    ),
+    (RolloutPushes, steps({"contact": 1.0}), "INVALID_REQUEST"),
+    (RolloutPushes, steps({}, model="nobody"), "UNKNOWN_MODEL"),
+    (RolloutPushes, steps({}, frame=""), "INVALID_FRAME"),
+    (RolloutPushes, steps({}, model="drifting"), "INVALID_COVARIATES"),
+    (
+        RolloutPushes,
+        steps({}, {}, {}, model="drifting", **{**ELAPSED, "covariate_values": [1.0, 2.0]}),
+        "INVALID_COVARIATES",
+    ),
+    (RolloutPushes, steps({}, covariate_names=["slider_x"], covariate_values=[1.0]), "INVALID_COVARIATES"),
+    (RolloutPushes, steps({}, particles=100_001), "TOO_LARGE"),
+    (RolloutPushes, steps({"duration": 1000.0}), "TOO_LARGE"),
+    (SuggestPushes, SuggestPushes.Request(count=0), "INVALID_REQUEST"),
+    (SuggestPushes, SuggestPushes.Request(count=1, speed=[0.1]), "INVALID_REQUEST"),
+    (SuggestPushes, SuggestPushes.Request(count=1, model="nobody"), "UNKNOWN_MODEL"),
+    (SuggestPushes, SuggestPushes.Request(count=1, covariate_names=["a"]), "INVALID_COVARIATES"),
+    (LoadModel, LoadModel.Request(), "INVALID_REQUEST"),
+    (LoadModel, LoadModel.Request(path="/no/such.model"), "INVALID_FILE"),
+]
+
+
+@pytest.mark.parametrize(("service", "request_", "name"), BAD)
+def test_bad_input_is_refused_with_a_code_that_the_response_declares(
+    registry: ModelRegistry, service: Any, request_: Any, name: str
+) -> None:
+    with pytest.raises(PushPredictorError) as caught:
+        HANDLERS[service](registry, request_, service.Response())
+    code = error_code(caught.value)
+    assert code.name == name, caught.value
+    assert getattr(service.Response, name) == code
+
+
+def test_good_input_has_no_error(registry: ModelRegistry) -> None:
+    for service, good in ((PredictPush, push()), (PredictPushBatch, batch()), (PredictSliderPose, pose())):
+        HANDLERS[service](registry, good, response := service.Response())
+        assert response.success and response.error_code == response.NONE == 0 and response.message == ""
+
+
+def test_a_push_outside_the_domain_is_answered_and_the_message_states_it(registry: ModelRegistry) -> None:
+    fast = {"pusher_velocity": Vector3(x=0.2)}
+    for service, request in ((PredictPush, push(velocity=0.2)), (PredictSliderPose, pose(**fast))):
+        HANDLERS[service](registry, request, response := service.Response())
+        assert response.success and response.error_code == response.NONE and not response.in_domain
+        assert response.message.startswith("out of domain: velocity 0.2 m/s, training covers ")
+    HANDLERS[PredictPushBatch](registry, batch(velocity=[0.02, 0.2]), response := PredictPushBatch.Response())
+    assert response.message.startswith("out of domain: 1 of 2 pushes, first push 1: velocity 0.2 m/s")
+    HANDLERS[RolloutPushes](registry, steps({"velocity": 0.2}), response := RolloutPushes.Response())
+    assert response.success and response.message.startswith("out of domain: 100 % of the samples")
+
+
+def test_duration_zero_means_the_models_own_window(registry: ModelRegistry) -> None:
+    own = registry.get("gp").model.usual_duration
+    for service, ask in (
+        (PredictPush, lambda duration: push(duration=duration)),
+        (PredictPushBatch, lambda duration: batch(duration=duration)),
+        (PredictSliderPose, lambda duration: pose(duration=duration)),
+        (RolloutPushes, lambda duration: steps({}, {"duration": duration})),
+    ):
+        zero, given = service.Response(), service.Response()
+        HANDLERS[service](registry, ask(0.0), zero)
+        HANDLERS[service](registry, ask(own), given)
+        assert zero.success and zero == given
+
+
+def test_the_stamp_after_a_push_of_duration_zero_is_a_window_later(registry: ModelRegistry) -> None:
+    request = pose(duration=0.0)
+    request.header.stamp.sec = 100
+    HANDLERS[PredictSliderPose](registry, request, response := PredictSliderPose.Response())
+    assert response.slider_after.header.stamp.nanosec == round(1e9 * registry.get("gp").model.usual_duration)
+
+
+def test_a_rollout_takes_covariates_for_each_step_or_for_all(registry: ModelRegistry) -> None:
+    def after(*values: float) -> list[PoseWithCovariance]:
+        named = {"covariate_names": ["elapsed_time"], "covariate_values": list(values)}
+        response = RolloutPushes.Response()
+        HANDLERS[RolloutPushes](registry, steps({"angle": 0.5}, {"angle": 0.5}, model="drifting", **named), response)
+        return list(response.poses)
+
+    assert after(900.0) == after(900.0, 900.0)
+    assert after(900.0, 0.0)[0] == after(900.0)[0] != after(0.0)[0]
+    assert after(900.0, 0.0)[1] != after(900.0)[1]
+
+
+def test_a_refusal_carries_message_and_code() -> None:
+    response = refuse(PredictPush.Response(success=True, mean=[1.0, 1.0, 1.0]), "why", ErrorCode.NO_PREDICTION)
+    assert (response.success, response.message) == (False, "why") and not response.mean.any()
+    assert response.error_code == PredictPush.Response.NO_PREDICTION
+
+
+def test_every_error_of_the_package_has_a_code() -> None:
+    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, PushPredictorError)]
+    for kind in kinds:
+        one = kind("field", 1, "accepted") if issubclass(kind, RequestError) else kind("why")
+        assert error_code(one) not in (ErrorCode.NONE, ErrorCode.INTERNAL_ERROR)
+    assert error_code(ValueError("why")) is ErrorCode.INTERNAL_ERROR
+    assert error_code(PermissionError("why")) is ErrorCode.INVALID_FILE
+
+
+def test_a_nested_field_keeps_the_code_of_its_error(registry: ModelRegistry) -> None:
+    with pytest.raises(errors.CovariateError, match=r"steps\[0\]\.covariate elapsed_time: 'missing'"):
+        HANDLERS[RolloutPushes](registry, steps({}, model="drifting"), RolloutPushes.Response())

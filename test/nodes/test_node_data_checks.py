@@ -1,0 +1,39 @@
+"""push_replay and push_validator report the mistakes of what they play and receive, on /diagnostics and in the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from mistakes import force_turned
+from ros_harness import free_domain, node_process, ros_context
+from validator_bench import HEXAGON, Status, replaying
+
+from push_predictor.models.store.model_file import save_model
+from push_predictor.models.train import train_model
+from push_predictor.recordings.load import load_data, load_rig_for
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.write import write_recording
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> None:
+    """As a warning by the one, as an error by the other, which is strict."""
+    write_recording(tmp_path / "wrong", force_turned(read_recording(HEXAGON), np.pi))
+    model = train_model(load_data([HEXAGON]), load_rig_for([HEXAGON]), "analytical", name="analytical")
+    save_model(model, tmp_path / "analytical.pushmodel")
+    domain = free_domain()
+    params = {"model": tmp_path / "analytical.pushmodel", "diagnostics_period": 0.2, "strict": True}
+    with ros_context(domain) as node, node_process("push_validator", domain=domain, params=params) as validator:
+        received, played = Status(node), Status(node, "push_replay")
+        received.wait_for_first()
+        with replaying(domain, recording=tmp_path / "wrong") as replay:
+            for status in (received, played):
+                status.wait_for_message("change the sign", 120.0)
+            assert (received.values["data check"], played.values["data_check"]) == ("wrench_sign", "wrench_sign")
+            assert (received.all[-1][0], played.all[-1][0]) == (DiagnosticStatus.ERROR, DiagnosticStatus.WARN)
+            assert replay.text().count("change the sign") == 1
+        assert validator.text().count("change the sign") >= 1

@@ -1,0 +1,211 @@
+"""The validator's sensor topics: subscriptions follow type and reliability of the publishers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import time_ns
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PoseStamped, PoseWithCovariance, TransformStamped
+from nav_msgs.msg import Odometry
+from planar_messages import pose_message
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from ros_harness import free_domain, ros_context, wait_until
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker
+
+from msg_adapters.stamps import ns_to_stamp
+from push_predictor.errors import RequestError
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
+from push_predictor.recordings.topics import Topics
+
+pytestmark = pytest.mark.slow
+
+SECOND = 10**9
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+RELIABLE = QoSProfile(depth=10)
+
+
+@pytest.fixture
+def domain() -> int:
+    return free_domain()
+
+
+@pytest.fixture
+def listener(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
+
+
+@pytest.fixture
+def talker(domain: int) -> Iterator[Node]:
+    with ros_context(domain, namespace="cell") as node:
+        yield node
+
+
+@contextmanager
+def subscriber(node: Node, *arguments: Any) -> Iterator[SensorSubscriber]:
+    sensors = SensorSubscriber(node, *arguments)
+    try:
+        yield sensors
+    finally:
+        sensors.close()
+
+
+@contextmanager
+def offered(node: Node, topic: str, profile: QoSProfile, kind: type = PoseStamped) -> Iterator[Publisher]:
+    """A publisher that is destroyed at once on leaving; an executor waiting for its events would delay that."""
+    silent = PublisherEventCallbacks(use_default_callbacks=False)
+    publisher = node.create_publisher(kind, topic, profile, event_callbacks=silent)
+    yield publisher
+    node.destroy_publisher(publisher)
+
+
+def received(
+    sensors: SensorSubscriber, publisher: Publisher, make: Callable[[int], Any], stream: str = "slider"
+) -> Any:
+    """Publish, one message a turn, until one of them is received; returns what was taken of the stream last."""
+    sensors.take()
+    turns = iter(range(10**9))
+    taken: list[Any] = []
+
+    def arrived() -> bool:
+        publisher.publish(make(next(turns)))
+        sensors.look()
+        taken.append(getattr(sensors.take(), stream))
+        return len(taken[-1]) > 0
+
+    assert wait_until(arrived), "no message was received"
+    return taken[-1]
+
+
+def pose_at(k: int) -> PoseStamped:
+    return pose_message(SECOND + k, 0.1, -0.2, 0.0, 0.5)
+
+
+def reliabilities(node: Node, topic: str) -> list[ReliabilityPolicy]:
+    return [info.qos_profile.reliability for info in node.get_subscriptions_info_by_topic(topic)]
+
+
+def test_best_effort_publishers_are_heard_and_reliable_ones_stay_reliable(listener: Node, talker: Node) -> None:
+    topic = "/cell/slider/pose"
+    with subscriber(listener, Topics(), "world") as sensors:
+        assert wait_until(lambda: reliabilities(talker, topic) == [ReliabilityPolicy.RELIABLE]), "before any publisher"
+        with offered(talker, topic, BEST_EFFORT) as lossy:
+            assert received(sensors, lossy, pose_at).x[0] == 0.1
+            with offered(talker, topic, RELIABLE) as sure:
+                assert received(sensors, sure, pose_at).y[0] == -0.2
+                assert reliabilities(talker, topic) == [ReliabilityPolicy.BEST_EFFORT], "what both publishers offer"
+        with offered(talker, topic, RELIABLE) as sure:
+            received(sensors, sure, pose_at)
+
+            def reliable() -> bool:
+                sensors.look()
+                return reliabilities(talker, topic) == [ReliabilityPolicy.RELIABLE]
+
+            assert wait_until(reliable)
+
+
+def transform_at(k: int) -> TransformStamped:
+    message = TransformStamped()
+    message.header.stamp, message.header.frame_id = ns_to_stamp(SECOND + k), "world"
+    message.transform.translation.x, message.transform.rotation.w = 0.3, 1.0
+    return message
+
+
+def odometry_at(k: int) -> Odometry:
+    message = Odometry()
+    message.header.stamp, message.header.frame_id = ns_to_stamp(SECOND + k), "world"
+    message.pose.pose.position.y, message.pose.pose.orientation.w = 0.4, 1.0
+    return message
+
+
+def marker_at(k: int) -> Marker:
+    message = Marker(pose=pose_at(k).pose)
+    message.header = pose_at(k).header
+    return message
+
+
+def test_the_type_is_that_of_the_publishers_or_a_named_field_of_it(listener: Node, talker: Node) -> None:
+    topics = Topics("/vicon/block", "tip.pose", "ft/sensor")
+    with subscriber(listener, topics, "world") as sensors:
+        with offered(talker, "/vicon/block", BEST_EFFORT, TransformStamped) as tracker:
+            stream = received(sensors, tracker, transform_at)
+            assert (stream.x[0], stream.stamp[0] // SECOND) == (0.3, 1)
+        with offered(talker, "/vicon/block", RELIABLE, Odometry) as tracker:
+            received(sensors, tracker, odometry_at)
+            assert received(sensors, tracker, odometry_at).y[-1] == 0.4, "another type from now on"
+        with offered(talker, "tip", RELIABLE, Marker) as robot:
+            assert received(sensors, robot, marker_at, "pusher").x[0] == 0.1
+        with offered(talker, "tip", RELIABLE, PoseWithCovariance) as robot:
+            begin = time_ns()
+            stream = received(sensors, robot, lambda k: PoseWithCovariance(pose=pose_at(k).pose), "pusher")
+            assert stream.x[-1] == 0.1 and begin <= stream.stamp[-1] <= time_ns(), "dated by its sending"
+
+        def gone() -> bool:
+            sensors.look()
+            sensors.inspect()
+            return "/cell/tip.pose: No publisher." in sensors.problems()
+
+        assert wait_until(gone), "the name after remapping"
+        assert not any("/cell/ft/sensor" in text for text in sensors.problems()), "the wrench is optional"
+        wrench = "wrench: /cell/ft/sensor, geometry_msgs/msg/WrenchStamped, reliable. No publisher: contact is found"
+        assert str(sensors.figures()["wrench topic"]).startswith(wrench)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (JointState, "slider_topic '/cell/slider/pose': /cell/slider/pose is of type 'sensor_msgs/msg/JointState'"),
+        (Marker, "give one of its fields: /cell/slider/pose.pose"),
+    ],
+)
+def test_a_type_without_a_pose_is_refused_by_name(listener: Node, talker: Node, kind: type, words: str) -> None:
+    with subscriber(listener, Topics(), "world") as sensors, offered(talker, "slider/pose", RELIABLE, kind):
+
+        def refused() -> bool:
+            sensors.look()
+            sensors.inspect()
+            return sensors.refused
+
+        assert wait_until(refused)
+        (problem,) = [text for text in sensors.problems() if "slider" in text]
+        assert words in problem
+
+
+def test_another_frame_is_named(listener: Node, talker: Node) -> None:
+    topics = Topics(world="table")
+    with subscriber(listener, topics, "world") as sensors, offered(talker, "slider/pose", RELIABLE) as tracker:
+
+        def other_frame() -> bool:
+            tracker.publish(pose_at(0))
+            sensors.look()
+            sensors.inspect()
+            return any("frame_id 'world' is not accepted, give 'table'" in text for text in sensors.problems())
+
+        assert wait_until(other_frame)
+
+
+@pytest.mark.parametrize(
+    "topics", [Topics(slider="1 pose"), Topics(pusher="~/pose"), Topics(wrench="/tf:tool0"), Topics(slider="/tf:")]
+)
+def test_rejects_what_is_no_source(listener: Node, topics: Topics) -> None:
+    with pytest.raises(RequestError, match=r"_topic: .* is not accepted, give a topic"):
+        SensorSubscriber(listener, topics, "world")
+
+
+def test_tf_without_its_package_is_refused_by_name(listener: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("tf2_msgs", "tf2_msgs.msg"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with subscriber(listener, Topics(slider="/tf:block", pusher="/tf:tool0"), "world") as sensors:
+        assert sensors._tf["/tf"].buffer.world == "", "the root of the tree"
+    with subscriber(listener, Topics(pusher="/tf:tool0"), "world") as sensors:
+        assert sensors._tf["/tf"].buffer.world == sensors.world == "world", "as the headers of the slider"
+        sensors.inspect()
+        assert sensors.refused and any("/tf:tool0: type tf2_msgs/msg/TFMessage is not" in t for t in sensors.problems())

@@ -1,0 +1,203 @@
+"""The player services without a node process: refusals with their code, and the types of rosbag2 where installed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from push_predictor.nodes.replay.controls import ReplayControls
+from push_predictor_interfaces import srv
+
+NAMES = {
+    "burst": srv.Burst,
+    "get_rate": srv.GetRate,
+    "is_paused": srv.IsPaused,
+    "pause": srv.Pause,
+    "play": srv.Play,
+    "play_next": srv.PlayNext,
+    "resume": srv.Resume,
+    "seek": srv.Seek,
+    "set_rate": srv.SetRate,
+    "stop": srv.Stop,
+    "toggle_paused": srv.TogglePaused,
+}
+
+
+class FakeNode:
+    """Records the services that are created on it, and what is logged."""
+
+    def __init__(self) -> None:
+        self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
+        self.logged: list[str] = []
+
+    def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+        self.services[name] = (kind, callback)
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=self.logged.append, error=self.logged.append)
+
+
+class FakePlayer:
+    """A paused player with three messages left, that plays already."""
+
+    def __init__(self) -> None:
+        self.paused, self.rate, self.left, self.sought = True, 1.0, 3, 0
+
+    def play(self, what: Any) -> bool:
+        return False
+
+    def pause(self) -> None:
+        self.paused = True
+
+    def resume(self) -> None:
+        self.paused = False
+
+    def set_rate(self, rate: float) -> bool:
+        self.rate = rate if rate > 0.0 else self.rate
+        return rate > 0.0
+
+    def play_next(self) -> bool:
+        return self.burst(1) == 1
+
+    def burst(self, count: int) -> int:
+        done = min(count or self.left, self.left) if self.paused else 0
+        self.left -= done
+        return done
+
+    def seek(self, time: int) -> None:
+        if time < 0:
+            raise OSError("disk")
+        self.sought = time
+
+    def stop(self) -> None:
+        raise ZeroDivisionError
+
+
+class Desk:
+    """Controls of a fake player, and a function that calls them."""
+
+    def __init__(self, restamps: bool = False) -> None:
+        self.node, self.player = FakeNode(), FakePlayer()
+        ReplayControls(self.node, self.player, restamps)  # type: ignore[arg-type]  # fakes
+
+    def call(self, name: str, **fields: Any) -> Any:
+        kind, callback = self.node.services[f"~/{name}"]
+        return callback(kind.Request(**fields), kind.Response())
+
+
+@pytest.fixture(autouse=True)
+def without_rosbag2(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide rosbag2_interfaces, installed or not."""
+    monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", None)
+
+
+def test_every_service_has_a_private_name() -> None:
+    assert {name: kind for name, (kind, _) in Desk().node.services.items()} == {f"~/{n}": k for n, k in NAMES.items()}
+
+
+def test_an_accepted_control_has_no_error() -> None:
+    desk = Desk()
+    for response in (desk.call("set_rate", rate=2.0), desk.call("play_next"), desk.call("seek")):
+        assert response.success and response.error_code == response.NONE and response.message == ""
+    assert desk.call("get_rate").rate == 2.0 and desk.call("is_paused").paused
+    response = desk.call("burst", num_messages=2)
+    assert response.actually_burst == 2 and response.error_code == response.NONE
+
+
+@pytest.mark.parametrize(
+    ("restamps", "rate", "message"),
+    [
+        (False, -1.0, "rate: -1.0 is not accepted, give a finite number above 0"),
+        (True, 2.0, "1.0, which restamp requires"),
+    ],
+)
+def test_a_bad_rate_is_refused_with_its_reason(restamps: bool, rate: float, message: str) -> None:
+    desk = Desk(restamps)
+    response = desk.call("set_rate", rate=rate)
+    assert not response.success and message in response.message and response.error_code == response.INVALID_REQUEST
+    assert desk.player.rate == 1.0 and desk.node.logged == [response.message]
+
+
+def test_a_second_playback_is_busy() -> None:
+    response = Desk().call("play")
+    assert not response.success and response.error_code == response.BUSY and "~/stop" in response.message
+
+
+def test_the_code_of_an_empty_burst_states_whether_pause_would_help() -> None:
+    desk = Desk()
+    assert desk.call("burst").actually_burst == 3
+    for response in (desk.call("play_next"), desk.call("burst")):
+        assert response.error_code == response.NOTHING_LEFT
+    desk.call("resume")
+    for response in (desk.call("play_next"), desk.call("burst")):
+        assert response.error_code == response.NOT_PAUSED and "pause" in response.message
+
+
+def test_an_unforeseen_failure_does_not_leave_the_callback() -> None:
+    desk = Desk()
+    assert desk.call("stop") == srv.Stop.Response()
+    assert "ZeroDivisionError" in desk.node.logged[-1]
+
+
+# --- rosbag2's types ----------------------------------------------------------------------------------------------
+
+
+def of_rosbag2(kind: type) -> Any:
+    """A stand-in for rosbag2's type: the fields of this project's type without message and error_code."""
+
+    class Request(kind.Request):  # type: ignore[name-defined]
+        """The fields are the same."""
+
+    names = [n for n in kind.Response.get_fields_and_field_types() if n not in ("message", "error_code")]  # type: ignore[attr-defined]
+
+    class Response:
+        """Only the fields that rosbag2 has."""
+
+        __slots__ = names
+
+        def __init__(self, **fields: Any) -> None:
+            for name in names:
+                setattr(self, name, fields.pop(name, 0))
+            assert not fields
+
+    return SimpleNamespace(Request=Request, Response=Response)
+
+
+@pytest.fixture
+def rosbag2(without_rosbag2: None, monkeypatch: pytest.MonkeyPatch) -> Desk:
+    """Controls where rosbag2_interfaces is installed: a stand-in, because the ROS wheels lack that package."""
+    types = ModuleType("rosbag2_interfaces.srv")
+    for kind in NAMES.values():
+        setattr(types, kind.__name__, of_rosbag2(kind))
+    monkeypatch.setitem(sys.modules, "rosbag2_interfaces", ModuleType("rosbag2_interfaces"))
+    monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", types)
+    return Desk()
+
+
+def test_rosbag2s_types_have_names_of_their_own(rosbag2: Desk) -> None:
+    assert set(rosbag2.node.services) == {f"~/{n}" for n in NAMES} | {f"~/rosbag2/{n}" for n in NAMES}
+    types = sys.modules["rosbag2_interfaces.srv"]
+    for name, kind in NAMES.items():
+        assert rosbag2.node.services[f"~/rosbag2/{name}"][0] is getattr(types, kind.__name__)
+        assert rosbag2.node.services[f"~/{name}"][0] is kind
+
+
+def test_rosbag2s_services_control_the_same_player(rosbag2: Desk) -> None:
+    assert rosbag2.call("rosbag2/set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
+    assert rosbag2.call("rosbag2/burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
+    assert rosbag2.call("rosbag2/play_next").success
+    rosbag2.call("rosbag2/resume")
+    assert not rosbag2.player.paused and not rosbag2.call("is_paused").paused
+
+
+def test_a_refusal_needs_only_the_fields_of_rosbag2(rosbag2: Desk) -> None:
+    assert rosbag2.call("rosbag2/set_rate", rate=-1.0).success is False
+    assert rosbag2.call("rosbag2/play").success is False
+    rosbag2.call("rosbag2/resume")
+    assert rosbag2.call("rosbag2/burst").actually_burst == 0
+    rosbag2.call("rosbag2/stop")  # fails, and is logged
+    assert "ZeroDivisionError" in rosbag2.node.logged[-1]

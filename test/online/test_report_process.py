@@ -1,0 +1,46 @@
+"""The report of a live validation: it opens with the judgement of the live alarm."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from push_predictor.online import report_process
+
+FIRED = {"fired": True}
+
+
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    """The signal handlers of this process, which the function of the report's process replaces."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("handlers")
+def test_report_has_the_alarm_of_the_live_validation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(report_process, "report_windows", lambda *_, **named: given.update(named))
+    report_process._write([], None, [], tmp_path, FIRED)  # type: ignore[arg-type]
+    assert given == {"alarm": FIRED}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("alarm", "expected"), [(SimpleNamespace(json=FIRED), FIRED), (None, None)])
+def test_validator_passes_its_alarm_to_the_report(tmp_path: Path, alarm: Any, expected: object) -> None:
+    from push_predictor.nodes.validator.result_writer import ResultWriter
+
+    started: list[object] = []
+    live = SimpleNamespace(names=[], windows=[1], predicted=lambda: [1])
+    run: Any = SimpleNamespace(validation=live, alarm=alarm, write=lambda folder: [folder / "validation.json"])
+    writer = ResultWriter(str(tmp_path), SimpleNamespace(info=lambda text: None))
+    writer.report = SimpleNamespace(start=lambda *arguments: started.extend(arguments))  # type: ignore[assignment]
+    assert not writer.write(run, with_report=True)
+    assert started == [live, tmp_path, expected]

@@ -1,0 +1,146 @@
+"""The checks of the samples so far, in a process of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+from mistakes import force_turned, late, scaled
+from repository import REPOSITORY
+
+from push_predictor.online.check_process import CheckProcess
+from push_predictor.online.sample_check import FIRST, MOST, SampleCheck
+from push_predictor.online.stream_sync import Samples
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.replay.report import ReplayReport
+
+HEXAGON = REPOSITORY / "bags" / "hexagon_delrin"
+SECOND = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def hexagon() -> Recording:
+    return read_recording(HEXAGON)
+
+
+def rig_of(recording: Recording) -> Rig:
+    assert recording.rig is not None
+    return recording.rig
+
+
+def portions(recording: Recording, seconds: float = 1.0) -> Iterator[Samples]:
+    """The streams in portions of that length."""
+    assert recording.wrench is not None
+    streams = (recording.slider, recording.pusher, recording.wrench)
+    begin, end = min(int(s.stamp[0]) for s in streams), max(int(s.stamp[-1]) for s in streams)
+    for start in range(begin, end + 1, round(seconds * SECOND)):
+        parts = [(s.stamp >= start) & (s.stamp < start + seconds * SECOND) for s in streams]
+        yield Samples(
+            *(type(s)(*(getattr(s, f.name)[p] for f in fields(s))) for s, p in zip(streams, parts, strict=True))
+        )
+
+
+def wait(check: CheckProcess, work: object) -> None:
+    deadline = monotonic() + 300.0
+    while check.busy and monotonic() < deadline:
+        work()  # type: ignore[operator]
+        sleep(0.01)
+    assert not check.busy
+
+
+def checked(recording: Recording, *strict: bool) -> list[CheckProcess]:
+    """The check of a recording, strict or not, at the same time."""
+    several = [SampleCheck(rig_of(recording), each) for each in strict]
+    for samples in several:
+        for portion in portions(recording):
+            samples.add(portion)
+        samples.work()
+    for samples in several:
+        wait(samples.check, samples.work)
+    return [samples.check for samples in several]
+
+
+def test_sound_samples_are_sound(hexagon: Recording) -> None:
+    (check,) = checked(hexagon, True)
+    assert (check.result, check.problems, check.failed) == ("sound", [], False)
+
+
+def test_a_warning_is_an_error_only_if_strict(hexagon: Recording) -> None:
+    wrong = force_turned(hexagon, np.pi)
+    check, strict = checked(wrong, False, True)
+    assert check.result == strict.result == "wrench_sign"
+    assert "change the sign" in check.problems[0]
+    assert not check.failed and strict.failed
+
+
+def test_refused_samples_are_an_error(hexagon: Recording) -> None:
+    (check,) = checked(scaled(hexagon, "slider", 1e3), False)
+    assert check.failed
+
+
+class Started:
+    """In place of the process: what it was asked to check."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.recordings: list[Recording] = []
+        monkeypatch.setattr(CheckProcess, "start", lambda _, recording, rig: self.recordings.append(recording))
+
+
+def test_checks_come_as_the_samples_double(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    for repeat in range(5):
+        for portion in portions(late(hexagon, 0.0) if not repeat else shifted(hexagon, 30.0 * repeat)):
+            samples.add(portion)
+            samples.work()
+    sizes = [len(recording.slider) for recording in started.recordings]
+    assert len(sizes) == 3 and FIRST <= sizes[0] < 1.2 * FIRST
+    assert sizes[1] >= 3 * FIRST and sizes[2] >= 7 * FIRST
+
+
+def test_old_samples_are_forgotten(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    for repeat in range(40):
+        samples.add(next(portions(shifted(hexagon, 30.0 * repeat), 40.0)))
+    samples.work()
+    (recording,) = started.recordings
+    assert MOST - len(hexagon.slider) < len(recording.slider) <= MOST
+    assert recording.slider.stamp[-1] == hexagon.slider.stamp[-1] + 39 * 30 * SECOND
+
+
+def test_a_clock_that_is_set_back_begins_again(hexagon: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    started, samples = Started(monkeypatch), SampleCheck(rig_of(hexagon))
+    samples.add(next(portions(shifted(hexagon, 30.0), 40.0)))
+    samples.add(next(portions(hexagon, 40.0)))
+    samples.work()
+    assert len(started.recordings[0].slider) == len(hexagon.slider)
+
+
+def test_a_path_that_cannot_be_read_is_reported_as_not_checked(tmp_path: Path) -> None:
+    check = CheckProcess()
+    check.start(tmp_path / "missing.mcap", None)
+    wait(check, check.work)
+    assert check.result.startswith("not checked: ") and "missing.mcap" in check.result and not check.failed
+
+
+def test_a_replay_reports_what_the_check_found() -> None:
+    report = ReplayReport("bag", "playing", 1.0, 0, 0.0, 0.0, 0.0, 0.0, 0, None, problems=["wrong"], check="units_rig")
+    assert report.warnings == ["wrong"] and report.values["data_check"] == "units_rig"
+
+
+def shifted(recording: Recording, seconds: float) -> Recording:
+    """The recording that much later."""
+    assert recording.wrench is not None
+    later = round(seconds * SECOND)
+    slider, pusher, wrench = recording.slider, recording.pusher, recording.wrench
+    return replace(
+        recording,
+        slider=replace(slider, stamp=slider.stamp + later),
+        pusher=replace(pusher, stamp=pusher.stamp + later),
+        wrench=replace(wrench, stamp=wrench.stamp + later),
+    )

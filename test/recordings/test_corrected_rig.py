@@ -1,0 +1,231 @@
+"""A wrong outline or tip radius is found on the recordings in bags/, and the corrected rig gives no finding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from repository import REPOSITORY
+
+from push_predictor.errors import RecordingError
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.outline import Outline
+from push_predictor.geometry.shapes import mirror_image, transformed
+from push_predictor.recordings.checks.check import check_recording
+from push_predictor.recordings.checks.corrected_rig import corrected_rig, prevents_correction
+from push_predictor.recordings.checks.finding import Finding, Value
+from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.checks.outline_findings import half_size
+from push_predictor.recordings.read import read_recording
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.rigs.estimate import estimate_rig
+from push_predictor.recordings.streams import Recording
+from push_predictor.simulation.pushes import random_pushes
+from push_predictor.simulation.rig_simulator import simulate
+from push_predictor.simulation.slider import Slider
+from push_predictor.simulation.spec import SimulationSpec
+
+BAGS = sorted(path.name for path in (REPOSITORY / "bags").iterdir() if path.is_dir())
+ROUND = "circle_pu"
+ONE_SIDE = "square_abs_repeats"  # which cannot separate a wrong size from a shift
+MILLIMETRE, TWO_DEGREES = 0.001, np.radians(2.0)
+CORNERS = np.array([[-0.05, -0.03], [0.07, -0.03], [-0.02, 0.06]])  # of a slider without mirror symmetry
+
+
+@cache
+def bag(name: str) -> Recording:
+    return read_recording(REPOSITORY / "bags" / name)
+
+
+@cache
+def scalene() -> Recording:
+    return triangle_pushes(12)
+
+
+def triangle_pushes(count: int) -> Recording:
+    """Pushes of a triangle whose sides differ."""
+    slider = Slider("scalene", Outline(CORNERS - CORNERS.mean(axis=0)), 0.8)
+    plan = random_pushes(count, (0.02,), 0.02, np.random.default_rng(1))
+    return simulate(SimulationSpec(slider, "abs", plan, seed=1))
+
+
+def rig_of(recording: Recording) -> Rig:
+    assert recording.rig is not None
+    return recording.rig
+
+
+def wrong(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), more: float = 0.0) -> Rig:
+    """The rig with its outline turned, shifted, and larger by `more` m a side."""
+    return replace(rig, outline=transformed(rig.outline, yaw, shift, 1.0 + more / half_size(rig)))
+
+
+def found(recording: Recording, rig: Rig) -> dict[str, Mapping[str, Value]]:
+    return {finding.name: finding.values for finding in check_recording(recording, rig)}
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name != ROUND])
+def test_an_outline_turned_by_two_degrees_is_found(name: str) -> None:
+    values = found(bag(name), wrong(rig_of(bag(name)), yaw=TWO_DEGREES))["outline_turned"]
+    assert values["yaw"].value == pytest.approx(-TWO_DEGREES, abs=0.002)
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_an_outline_shifted_by_a_millimetre_is_found(name: str) -> None:
+    shift = (MILLIMETRE, 0.0) if name == ONE_SIDE else (0.0, MILLIMETRE)  # along its side no contact shows a shift
+    values = found(bag(name), wrong(rig_of(bag(name)), shift=shift))["outline_shifted"]
+    assert (values["x"].value, values["y"].value) == pytest.approx((-shift[0], -shift[1]), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name != ONE_SIDE])
+@pytest.mark.parametrize("more", [MILLIMETRE, -MILLIMETRE])
+def test_an_outline_too_large_or_too_small_by_a_millimetre_a_side_is_found(name: str, more: float) -> None:
+    rig = rig_of(bag(name))
+    values = found(bag(name), wrong(rig, more=more))["outline_size"]
+    assert (1.0 + more / half_size(rig)) * values["scale"].value == pytest.approx(1.0, abs=0.004)
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_the_corrected_rig_gives_no_finding(name: str) -> None:
+    rig = rig_of(bag(name))
+    altered = wrong(rig, -0.1, (0.003, -0.002), 0.0 if name == ONE_SIDE else 0.002)
+    corrected = corrected_rig(altered, check_recording(bag(name), altered))
+    assert check_recording(bag(name), corrected) == ()
+    assert (corrected.outline.semi_axes is None) == (rig.outline.semi_axes is None)
+    if name != ONE_SIDE:
+        assert corrected.outline.rotational_symmetry == rig.outline.rotational_symmetry
+        assert corrected.outline.area == pytest.approx(rig.outline.area, rel=0.005)
+
+
+@pytest.mark.parametrize("name", [ROUND, "ellipse_plywood", "square_abs_test"])
+def test_a_tracked_frame_off_the_centre_is_in_the_corrected_outline(name: str) -> None:
+    slider = bag(name).slider
+    move = rotate(np.array([0.004, -0.003]), slider.heading)
+    turned = wrap_angle(slider.heading + 0.08)
+    off = replace(bag(name), slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=turned))
+    corrected = corrected_rig(rig_of(off), check_recording(off, rig_of(off)))
+    expected = rotate(np.array([-0.004, 0.003]), np.array(-0.08))
+    assert corrected.outline.centroid == pytest.approx(expected, abs=1e-4)
+    assert check_recording(off, corrected) == ()
+
+
+def test_a_mirrored_outline_is_found_and_corrected() -> None:
+    rig = rig_of(scalene())
+    assert found(scalene(), rig) == {}
+    altered = replace(rig, outline=mirror_image(rig.outline))
+    findings = check_recording(scalene(), altered)
+    assert [finding.name for finding in findings] == ["outline_mirrored"]
+    corrected = corrected_rig(altered, findings)
+    np.testing.assert_allclose(corrected.outline.vertices, rig.outline.vertices, atol=1e-12)
+    assert corrected.support_points is not None and altered.support_points is not None
+    np.testing.assert_allclose(corrected.support_points, altered.support_points * [1.0, -1.0, 1.0])
+
+
+def test_few_pushes_show_no_mirrored_outline() -> None:
+    few = triangle_pushes(5)
+    rig = rig_of(few)
+    altered = replace(rig, outline=mirror_image(rig.outline))
+    assert list(found(few, altered)) == ["outline_unchecked"]
+
+
+@pytest.mark.parametrize("more", [2e-5, -2e-5])
+def test_an_almost_square_outline_is_not_turned_by_a_quarter(more: float) -> None:
+    rig = rig_of(bag("square_abs_test"))
+    measured = replace(rig, outline=Outline(rig.outline.vertices * [1.0 + more, 1.0 - more]))
+    assert measured.outline.rotational_symmetry == 2
+    assert found(bag("square_abs_test"), measured) == {}
+
+
+def test_an_outline_mirrored_and_turned_is_corrected() -> None:
+    rig = rig_of(scalene())
+    altered = replace(rig, outline=transformed(mirror_image(rig.outline), 0.2, (0.002, 0.0)))
+    estimate = estimate_rig(scalene(), altered)
+    assert {"outline_mirrored", "outline_turned"} <= {finding.name for finding in estimate.findings}
+    np.testing.assert_allclose(estimate.corrected.outline.vertices, rig.outline.vertices, atol=2e-4)
+    assert estimate.fit.gap < 1e-4
+
+
+def test_a_mirrored_frame_of_a_slider_without_symmetry_is_no_mirrored_outline() -> None:
+    assert "frame_mirrored" in found(mirrored(scalene(), -1.0, -1.0), rig_of(scalene()))
+
+
+def test_a_wrong_tip_is_separated_from_a_wrong_size_on_an_ellipse() -> None:
+    rig = rig_of(bag("ellipse_plywood"))
+    altered = replace(rig, pusher_radius=rig.pusher_radius + 0.0015)
+    findings = check_recording(bag("ellipse_plywood"), altered)
+    assert [finding.name for finding in findings] == ["tip_radius"]
+    corrected = corrected_rig(altered, findings)
+    assert corrected.pusher_radius == pytest.approx(rig.pusher_radius, abs=1e-4)
+    assert corrected.outline.area == pytest.approx(rig.outline.area)
+
+
+@pytest.mark.parametrize("name", [ROUND, "hexagon_delrin"])
+def test_a_wrong_tip_of_a_regular_slider_is_reported_with_its_rival(name: str) -> None:
+    rig = rig_of(bag(name))
+    (finding,) = check_recording(bag(name), replace(rig, pusher_radius=rig.pusher_radius + 0.0015))
+    assert finding.name == "outline_size"
+    assert "correct the tip radius by -1.5 mm: these contacts do not separate the two" in finding.advice
+
+
+def test_the_clocks_are_no_part_of_the_rig() -> None:
+    slider = bag("square_abs_test").slider
+    late = replace(bag("square_abs_test"), slider=replace(slider, stamp=slider.stamp + 50_000_000))
+    estimate = estimate_rig(late, rig_of(late))
+    assert estimate.corrected is rig_of(late)
+    (lag,) = (line for line in estimate.lines if "lag of the slider" in line)
+    assert "not part of the rig: correct the clocks" in lag
+    assert 45.0 < float(lag.split()[4]) < 55.0
+
+
+def finding_of(name: str, **values: float) -> Finding:
+    return Finding(name, "warning", "", "", {key: Value(value, "1") for key, value in values.items()})
+
+
+def test_a_correction_scales_and_turns_about_the_centroid_and_moves_the_feet() -> None:
+    feet = np.array([[0.03, 0.0, 0.5], [-0.03, 0.0, 0.5]])
+    outline = Outline(CORNERS - CORNERS.mean(axis=0) + [0.02, 0.0])
+    rig = Rig("scalene", outline, 0.005, "abs", 0.8, feet)
+    turned = corrected_rig(rig, [finding_of("outline_turned", yaw=np.pi / 2.0), finding_of("outline_size", scale=2.0)])
+    assert turned.outline.centroid == pytest.approx([0.02, 0.0])
+    assert turned.outline.vertices[0] == pytest.approx([0.02 + 0.06, -0.1])
+    assert turned.support_points is not None
+    np.testing.assert_allclose(turned.support_points, [[0.02, 0.02, 0.5], [0.02, -0.1, 0.5]], atol=1e-12)
+
+
+def test_a_shift_that_ends_near_the_origin_ends_at_the_origin() -> None:
+    rig = wrong(rig_of(bag("square_abs_test")), shift=(0.003, 0.0))
+    near = corrected_rig(rig, [finding_of("outline_shifted", x=-0.0031, y=0.0001)])
+    assert near.outline.centroid == pytest.approx([0.0, 0.0], abs=1e-15)
+    far = corrected_rig(rig, [finding_of("outline_shifted", x=-0.0035, y=0.0)])
+    assert far.outline.centroid == pytest.approx([-0.0005, 0.0])
+
+
+def test_without_a_finding_the_rig_is_the_same() -> None:
+    rig = rig_of(bag(ROUND))
+    assert corrected_rig(rig, []) is rig
+    assert corrected_rig(rig, [finding_of("clocks_apart", lag=0.1)]) is rig
+
+
+def test_a_mistake_that_hides_the_outline_prevents_an_estimate() -> None:
+    rig = rig_of(bag(ROUND))
+    assert prevents_correction(check_recording(mirrored(bag(ROUND), -1.0, -1.0), rig)) == ["frame_mirrored"]
+    with pytest.raises(RecordingError, match=r"no rig can be estimated \(topics_swapped\): Slider and pusher"):
+        estimate_rig(swapped(bag(ROUND)), rig)
+
+
+def test_an_outline_that_no_correction_fits_prevents_an_estimate() -> None:
+    assert prevents_correction([finding_of("outline_shifted", x=0.1, y=0.0), finding_of("outline_misfit")])
+    assert not prevents_correction([finding_of("outline_shifted", x=0.1, y=0.0), finding_of("clocks_apart")])
+
+
+def test_an_estimate_states_what_the_contacts_do_not_show() -> None:
+    estimate = estimate_rig(bag(ONE_SIDE), rig_of(bag(ONE_SIDE)))
+    lines = {line[2:20].strip(): line[20:].strip() for line in estimate.lines[1:]}
+    assert lines["shift along y"] == "not determined by these contacts"
+    assert lines["size"] == lines["tip radius"] == "taken as given"
+    assert lines["shift along x"].endswith("unchanged")
+    record = estimate.record()["estimates"]
+    assert isinstance(record, dict)
+    assert record["y"] is None and record["yaw"]["unit"] == "rad" and abs(record["x"]["value"]) < 1e-4

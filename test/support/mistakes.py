@@ -1,0 +1,101 @@
+"""The usual mistakes of a laboratory's recording, made in a sound one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from push_predictor.geometry.frames import rotate, wrap_angle
+from push_predictor.geometry.outline import Outline
+from push_predictor.recordings.checks.frames import mirrored, swapped
+from push_predictor.recordings.rig import Rig
+from push_predictor.recordings.streams import PoseStream, Recording
+from push_predictor.types import Array
+
+Mistake = Callable[[Recording], Recording]
+
+
+def outline_altered(rig: Rig, yaw: float = 0.0, shift: tuple[float, float] = (0.0, 0.0), size: float = 1.0) -> Rig:
+    """The rig with an outline turned, then shifted, then scaled; for polygons."""
+    return replace(rig, outline=Outline(size * (rotate(rig.outline.vertices, np.array(yaw)) + shift)))
+
+
+def tracked(recording: Recording, yaw: float, shift: tuple[float, float]) -> Recording:
+    """The recording of a tracked frame whose origin is at `shift` in the slider's, turned by `yaw` against it."""
+    slider = recording.slider
+    move = rotate(np.array(shift), slider.heading)
+    heading = wrap_angle(slider.heading + yaw)
+    return replace(recording, slider=replace(slider, x=slider.x + move[:, 0], y=slider.y + move[:, 1], heading=heading))
+
+
+def scaled(recording: Recording, stream: str, factor: float) -> Recording:
+    """Positions of a stream in another unit."""
+    poses: PoseStream = getattr(recording, stream)
+    return replace(recording, **{stream: replace(poses, x=factor * poses.x, y=factor * poses.y)})
+
+
+def heading_in_degrees(recording: Recording) -> Recording:
+    """Degrees given to a function that makes quaternions of radians."""
+    heading = wrap_angle(np.degrees(np.unwrap(recording.slider.heading)))
+    return replace(recording, slider=replace(recording.slider, heading=heading))
+
+
+def stamps_scaled(recording: Recording, factor: float) -> Recording:
+    """The slider's stamps in another unit."""
+    slider = recording.slider
+    stamp = slider.stamp[0] + ((slider.stamp - slider.stamp[0]) * factor).astype(np.int64)
+    return replace(recording, slider=replace(slider, stamp=stamp))
+
+
+def late(recording: Recording, seconds: float) -> Recording:
+    """The slider's stamps are that much late."""
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, stamp=slider.stamp + round(seconds * 1e9)))
+
+
+def another_body(recording: Recording) -> Recording:
+    """A body that spins half a metre away."""
+    slider = recording.slider
+    return replace(recording, slider=replace(slider, x=slider.x + 0.5, heading=np.linspace(0.0, 10.0, len(slider))))
+
+
+def w_first(recording: Recording) -> Recording:
+    """A quaternion whose w is read as x: the heading is that of (w, x, y, z) taken as (x, y, z, w)."""
+    return replace(recording, slider=replace(recording.slider, heading=0.0 * recording.slider.heading))
+
+
+def force_turned(recording: Recording, angle: Array | float) -> Recording:
+    """The force along axes that are turned by minus the angle (rad), of the whole or of each sample."""
+    wrench = recording.wrench
+    assert wrench is not None
+    force = rotate(np.column_stack([wrench.fx, wrench.fy]), np.asarray(angle))
+    return replace(recording, wrench=replace(wrench, fx=force[:, 0], fy=force[:, 1]))
+
+
+def force_in_slider_frame(recording: Recording) -> Recording:
+    """The force along the slider's axes instead of the world's."""
+    wrench, slider = recording.wrench, recording.slider
+    assert wrench is not None
+    return force_turned(recording, -np.interp(wrench.stamp, slider.stamp, np.unwrap(slider.heading)))
+
+
+# {name: (the mistake, finding, severity)}
+MISTAKES: Mapping[str, tuple[Mistake, str, str]] = {
+    "slider in mm": (lambda r: scaled(r, "slider", 1e3), "units_length_slider", "refused"),
+    "pusher in mm": (lambda r: scaled(r, "pusher", 1e3), "units_length_pusher", "refused"),
+    "both in mm": (lambda r: scaled(scaled(r, "pusher", 1e3), "slider", 1e3), "units_length_slider", "refused"),
+    "heading in degrees": (heading_in_degrees, "units_heading", "refused"),
+    "stamps in ms": (lambda r: stamps_scaled(r, 1e3), "units_time_slider", "refused"),
+    "w first": (w_first, "quaternion_order", "refused"),
+    "topics exchanged": (swapped, "topics_swapped", "refused"),
+    "another body": (another_body, "another_body", "refused"),
+    "mirrored": (lambda r: mirrored(r, -1.0, -1.0), "frame_mirrored", "warning"),
+    "clockwise heading": (lambda r: mirrored(r, 1.0, -1.0), "heading_clockwise", "warning"),
+    "turned": (lambda r: tracked(r, np.radians(4.0), (0.0, 0.0)), "outline_turned", "warning"),
+    "shifted": (lambda r: tracked(r, 0.0, (0.002, 0.0)), "outline_shifted", "warning"),
+    "clocks apart": (lambda r: late(r, 0.05), "clocks_apart", "warning"),
+    "wrench of the wrong sign": (lambda r: force_turned(r, np.pi), "wrench_sign", "warning"),
+    "wrench along other axes": (lambda r: force_turned(r, np.pi / 2.0), "wrench_frame", "warning"),
+}
