@@ -1,3 +1,17 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A push whose mechanics differ a little from the base model's, where the difference may change along the path.
 
 The ellipsoidal limit surface (f / fmax)^2 + (m / mmax)^2 = 1 becomes f' W f / fmax^2 + ... with a symmetric W near the
