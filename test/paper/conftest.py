@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The figures of single sections are drawn coarsely: test_paper_report lays all of them out as a reader sees them."""
+"""The figures are drawn coarsely. test_report draws and lays out figures as a reader sees them."""
 
 from __future__ import annotations
 

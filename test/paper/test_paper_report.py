@@ -12,21 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`push_predictor report paper --quick`: every claim of the paper, with one command; resumed when asked again."""
+"""`push_predictor report paper --quick`: every claim of the paper, with one command; resumed when asked again.
+
+The pushes are drawn from a formula: test_paper_data shows what the simulated ones are.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+import paper_studies
 import pytest
 from markupsafe import escape
 from push_predictor_paper.plan import FULL, QUICK, Plan
-from push_predictor_paper.report import report_paper
+from push_predictor_paper.report import gather, report_paper
 from push_predictor_paper.work import Work
 
 from push_predictor.cli import main
@@ -40,8 +45,8 @@ VERDICTS = {"holds", "holds in part", "does not hold", "not decided"}
 
 
 SMALL = replace(
-    QUICK, speeds=(0.02, 0.05, 0.1), pushes=50, reference_pushes=70, sizes=(20, 100), contacts=3, angle_step=0.75,
-    repetitions=12, other_repetitions=12, speed_pushes=6, informed=False,
+    QUICK, speeds=(0.02, 0.05, 0.1), pushes=30, reference_pushes=72, sizes=(20, 60), contacts=3, angle_step=0.75,
+    repetitions=12, other_repetitions=11, speed_pushes=4, informed=False,
 )  # fmt: skip
 
 CELL = re.compile(r'<th scope="row">(.*?)</th>|<td[^>]*>(.*?)(?:<span class="interval">(.*?)</span>)?</td>')
@@ -64,13 +69,32 @@ def report(out: Path, cache: Path) -> Stages:
     return stages
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small() -> Iterator[None]:
+    """Recordings from a formula, and variants compared at the size that the plan has."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("push_predictor_paper.data.corpus.learning_set", paper_studies.learning_set)
+        patch.setattr("push_predictor_paper.data.repetitions.repeat_push", paper_studies.repeat_push)
+        for module in ("fits.variants", "claims.learning.variants"):
+            patch.setattr(f"push_predictor_paper.{module}.SIZES", SMALL.sizes[-1:])
+        yield
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("paper")
-    with pytest.MonkeyPatch.context() as coarse:
-        coarse.setattr("push_predictor.reporting.canvas.LAYOUTS", 1)  # every label is fitted once
-        assert report(out, out / "work").titles[0] == "recordings"
+    assert report(out, out / "work").titles[0] == "recordings"
     return out
+
+
+def test_study_has_the_sets_and_repetitions_of_the_plan(tmp_path: Path) -> None:
+    study = gather(SMALL, Work(tmp_path / "work", cores=1), tmp_path, None, None)
+    assert {pair: len(found.table.pushes) for pair, found in study.simulated.sets.items()} == {
+        ("rect1", "plywood"): 72, ("rect1", "abs"): 30, ("ellip1", "plywood"): 30, ("ellip1", "abs"): 30,
+    }  # fmt: skip
+    assert study.simulated.reference == ("rect1", "plywood") and study.measured == ()
+    commanded = {surface: [cell.commanded for cell in grid.cells] for surface, grid in study.grids.items()}
+    assert commanded == {"plywood": [12] * 15, "abs": [11] * 15}
 
 
 @pytest.mark.slow
@@ -177,7 +201,6 @@ def test_second_report_reads_the_cache_and_is_the_same(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Pictures are not rendered again: the cache does not contain them."""
-    monkeypatch.setattr("push_predictor.reporting.canvas.LAYOUTS", 0)
     monkeypatch.setattr(
         "matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", lambda canvas, image: image.write(b"")
     )

@@ -80,17 +80,37 @@ def made_up_corpus(pushes: int = 40, windows: int = 3, speeds: tuple[float, ...]
 
 def made_up_grid(plan: Plan = PLAN, surface: str = "plywood", seed: int = 0) -> RepeatedGrid:
     """Repetitions drawn from `truth`, with straight paths to two and a half times the first window's outcome."""
-    rng, rig = np.random.default_rng(seed), rig_of("rect1", surface)
-    cells = []
-    for fraction in plan.grid_fractions.tolist():
-        for angle in plan.grid_angles.tolist():
-            contact = float(contact_on_first_side(rig.outline, np.array(fraction)))
-            inputs = np.tile([GRID_SPEED, contact, angle], (plan.repetitions, 1))
-            mean, sd = truth(inputs)
-            outcomes = mean + sd * rng.standard_normal(mean.shape)
-            paths = outcomes[:, None, :] * np.linspace(0.0, 2.5, PATH_POINTS)[None, :, None]
-            cells.append(Repetitions(fraction, angle, plan.repetitions, inputs, outcomes, paths))
+    rig = rig_of("rect1", surface)
+    places = [(fraction, angle) for fraction in plan.grid_fractions.tolist() for angle in plan.grid_angles.tolist()]
+    rng = np.random.default_rng(seed)
+    cells = [made_up_repetitions(rng, rig, fraction, angle, plan.repetitions) for fraction, angle in places]
     return RepeatedGrid("rect1", surface, rig, plan.grid_fractions, plan.grid_angles, tuple(cells))
+
+
+def made_up_repetitions(
+    rng: np.random.Generator, rig: Rig, fraction: float, angle: float, repetitions: int
+) -> Repetitions:
+    """One push of the grid, drawn from `truth`."""
+    contact = float(contact_on_first_side(rig.outline, np.array(fraction)))
+    inputs = np.tile([GRID_SPEED, contact, angle], (repetitions, 1))
+    mean, sd = truth(inputs)
+    outcomes = mean + sd * rng.standard_normal(mean.shape)
+    paths = outcomes[:, None, :] * np.linspace(0.0, 2.5, PATH_POINTS)[None, :, None]
+    return Repetitions(fraction, angle, repetitions, inputs, outcomes, paths)
+
+
+def learning_set(plan: Plan, shape: str, surface: str, keep: Path | None) -> PushSet:
+    """Replace the function of the same name in data.corpus: drawn from `truth` instead of simulated."""
+    pair = (shape, surface)
+    return PushSet(made_up_table(plan.pushes_of(pair), 4, plan.speeds, PAIRS.index(pair)), rig_of(*pair))
+
+
+def repeat_push(
+    plan: Plan, shape: str, surface: str, number: int, fraction: float, angle: float, again: int, keep: Path | None
+) -> Repetitions:
+    """Replace the function of the same name in data.repetitions: drawn from `truth` instead of simulated."""
+    rng = np.random.default_rng([PAIRS.index((shape, surface)), number])
+    return made_up_repetitions(rng, rig_of(shape, surface), fraction, angle, again)
 
 
 def made_up_study(folder: Path, plan: Plan = PLAN) -> Study:
