@@ -25,7 +25,7 @@ import pytest
 import ros_harness as harness
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from synthetic import square_pushes, square_rig
+from synthetic import square_pushes
 
 from push_predictor.design.batch import Suggested, suggest_pushes
 from push_predictor.design.limits import Limits
@@ -34,7 +34,6 @@ from push_predictor.models.store.model_file import load_model, save_model
 from push_predictor.models.store.model_registry import ModelRegistry
 from push_predictor.models.train import train_model
 from push_predictor.nodes.server.suggest_service import handle_suggest_pushes
-from push_predictor.recordings.table import empty_table
 from push_predictor_interfaces.srv import ListModels, SuggestPushes
 
 Ask = Callable[..., SuggestPushes.Response]
@@ -44,11 +43,10 @@ LIMITS = {"speed": [0.02, 0.04], "angle": [-0.3, 0.5], "travel": 0.02, "excluded
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A GP of the square, a prior model of it, and an analytical model, which learns nothing."""
+    """Two GPs of the square, and an analytical model, which learns nothing."""
     place = tmp_path_factory.mktemp("models")
-    for kind in ("gp", "analytical"):
-        save_model(train_model(*square_pushes(60), kind, name=kind), place / f"{kind}.model")
-    save_model(train_model(empty_table(), square_rig(), "prior", name="prior"), place / "prior.model")
+    for name, kind, seed in (("gp", "gp", 0), ("other", "gp", 1), ("analytical", "analytical", 0)):
+        save_model(train_model(*square_pushes(60, seed), kind, name=name), place / f"{name}.model")
     return place
 
 
@@ -76,10 +74,10 @@ def test_response_equals_the_librarys_pushes(ask: Ask, folder: Path) -> None:
 
 def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> None:
     limits = Limits((0.02, 0.04), (-0.3, 0.5), 0.02, ((0.2, 0.4), (0.9, 0.1)), 0.05)
-    expected = suggest_pushes(load_model(folder / "prior.model"), 4, limits, seed=2**63)
-    response = ask(model="prior", count=4, transfer_speed=0.05, seed=2**63, **LIMITS)
+    expected = suggest_pushes(load_model(folder / "other.model"), 4, limits, seed=2**63)
+    response = ask(model="other", count=4, transfer_speed=0.05, seed=2**63, **LIMITS)
     assert_equal(response, expected)
-    assert list(response.contact) != list(ask(model="prior", count=4, seed=2**63, **LIMITS).contact)
+    assert list(response.contact) != list(ask(model="other", count=4, seed=2**63, **LIMITS).contact)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +98,7 @@ def test_limits_and_seed_are_those_of_the_request(ask: Ask, folder: Path) -> Non
         ({"transfer_speed": np.nan}, "transfer_speed: nan"),
         ({"covariate_names": ["elapsed_time"]}, "covariate_values length: 0"),
         ({"model": "analytical"}, "model: 'analytical' is not accepted, give one with something to learn"),
-        ({"model": "other"}, "model: 'other' is not accepted, give one of analytical, gp, prior"),
+        ({"model": "none"}, "model: 'none' is not accepted, give one of analytical, gp, other"),
     ],
 )
 def test_rejects_bad_request_by_field_and_value(ask: Ask, fields: dict[str, Any], message: str) -> None:
@@ -128,7 +126,7 @@ def test_others_answer_during_a_long_request_which_ends_when_the_node_is_deactiv
 
 def test_a_long_request_ends_with_the_node(folder: Path) -> None:
     registry = ModelRegistry()
-    registry.load(folder / "prior.model")
+    registry.load(folder / "gp.model")
     asked: list[int] = []
 
     def check_cancelled() -> None:
