@@ -169,6 +169,14 @@ def test_every_panel_that_is_configured_is_placed_once():
     assert FOXGLOVE.keys() == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
 
 
+def test_every_plot_and_the_scene_have_the_title_that_foxglove_shows():
+    """Foxglove shows foxglovePanelTitle; it ignores the key title."""
+    panels = {name: config for name, config in FOXGLOVE["configById"].items() if name.startswith(("Plot!", "3D!"))}
+    titles = [config.get("foxglovePanelTitle", "") for config in panels.values()]
+    assert len(panels) == 4 and all(titles) and len(set(titles)) == 4
+    assert not any("title" in config for config in panels.values())
+
+
 def test_every_message_path_leads_to_a_field_that_is_published(published):
     assert len(message_paths()) >= 8
     for path in message_paths():

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from mcap.opcode import Opcode
 
 from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.cdr import POSE_STAMPED, WRENCH_STAMPED, Layout, encode
@@ -110,6 +112,36 @@ def test_metadata_yaml_has_the_format_of_rosbag2_jazzy(tmp_path: Path, recording
         assert described["serialization_format"] == "cdr" and described["type_description_hash"].startswith("RIHS01_")
         (qos,) = described["offered_qos_profiles"]
         assert (qos["reliability"], qos["history"], qos["durability"]) == ("reliable", "keep_last", "volatile")
+
+
+def opcodes(data: bytes) -> dict[int, int]:
+    """The opcode of each record of an MCAP file, by its place."""
+    found, place = {}, 8
+    while place < len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, place)
+        found[place] = opcode
+        place += 9 + length
+    return found
+
+
+@pytest.mark.parametrize("live", [False, True])
+@pytest.mark.parametrize("with_rig", [False, True])
+def test_every_group_that_the_summary_points_to_has_records(tmp_path: Path, with_rig: bool, live: bool) -> None:
+    with BagWriter(tmp_path / "a.mcap", live=live) as writer:
+        writer.add_topic("x", FLOAT64.name, FLOAT64.definition)
+        if with_rig:
+            writer.add_metadata("push_rig", {"shape": "square"})
+        writer.write("x", 1, bytes(12))
+    data = (tmp_path / "a.mcap").read_bytes()
+    places = opcodes(data)
+    *_, (footer, last) = places.items()
+    start, _, _ = struct.unpack_from("<QQI", data, footer + 9)
+    assert last == Opcode.FOOTER and places[start] == Opcode.SCHEMA
+    indexed = {Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX} | ({Opcode.METADATA_INDEX} if with_rig else set())
+    assert indexed <= {opcode for place, opcode in places.items() if place > start}
+    for place in (place for place, opcode in places.items() if opcode == Opcode.SUMMARY_OFFSET):
+        opcode, begin, length = struct.unpack_from("<BQQ", data, place + 9)
+        assert length and places[begin] == opcode, f"a group of {Opcode(opcode).name} has no record"
 
 
 # Others read it

@@ -77,7 +77,9 @@ class BagWriter:
                     _remove(self._unfinished)
             raise
         chunk_size = LIVE_CHUNK_SIZE if self._live else CHUNK_SIZE
-        self._writer = Writer(self._stream, chunk_size=chunk_size, compression=self._compression)
+        # The mcap library writes offsets of empty groups too, such as that of the attachments: readers report an error.
+        offsets = {"use_summary_offsets": False}
+        self._writer = Writer(self._stream, chunk_size=chunk_size, compression=self._compression, **offsets)
         self._writer.start(profile="ros2", library="push_predictor")  # a few bytes into the stream's buffer
         return self
 
