@@ -22,6 +22,7 @@ docs/how_to/visualisation.md describes what RViz2 displays.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,17 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from push_predictor.nodes.launch_checks import (
+    argument_problem,
+    end_launch,
+    executable_problem,
+    is_true,
+    start_or_refuse,
+)
+
+TOPICS = {"slider_topic": "slider/pose", "pusher_topic": "pusher/pose", "wrench_topic": "pusher/wrench"}
+SWITCHES = ("use_sim_time", "autostart", "rviz")
+RELIABILITIES = ("", "reliable", "best_effort")
 
 ARGUMENTS = (
     ("namespace", "", "Namespace of all nodes."),
@@ -48,6 +60,8 @@ ARGUMENTS = (
     ("wrench_topic", "", "The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: pusher/wrench."),
     ("wrench_frame", "", "Axes of the wrench: world, or tip for those of the tip's pose. Empty: world."),
     ("world_frame", "", "Frame of the poses, which headers must name. Empty: see docs/reference/push_validator.md."),
+    ("scalar_topics", "", "Further topics with one number each, separated by commas: possible causes of a change."),
+    ("reliability", "", "QoS of these subscriptions: reliable or best_effort. Empty: as the publishers offer it."),
     ("rviz", "false", "Open RViz2 with the package's configuration: slider, pusher and windows from above."),
     ("rviz_config", "", "RViz configuration file. Empty: the installed config/push_predictor.rviz."),
 )
@@ -65,16 +79,30 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def _nodes(context: LaunchContext) -> list[Node]:
+def _nodes(context: LaunchContext) -> list[Any]:
     given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
+    return start_or_refuse(_problem(context, given), lambda: _started(given))
+
+
+def _problem(context: LaunchContext, given: dict[str, str]) -> str:
+    """Why nothing is started, empty if there is no reason."""
+    if problem := argument_problem(__file__, context.argv, given, SWITCHES):
+        return problem
+    if given["reliability"] not in RELIABILITIES:
+        return f"reliability: {given['reliability']!r} is not accepted, give reliable or best_effort"
+    return executable_problem("rviz2", "rviz:=true") if is_true(given["rviz"]) else ""
+
+
+def _started(given: dict[str, str]) -> list[Node]:
     recording = given["recording"] or given["bag"]
     nodes = [
-        _node("predict_server", "push_predictor", given, _server(given)),
-        _node("push_validator", "push_validator", given, _validator(given)),
+        _node("predict_server", "push_predictor", given, _server(given), end_launch()),
+        _node("push_validator", "push_validator", given, _validator(given), end_launch()),
     ]
     if recording:
-        nodes.append(_node("push_replay", "push_replay", given, _replay(given, recording)))
-    if _true(given["rviz"]):
+        finished = end_launch(also_if_done=False)  # the validator goes on: it may be writing the results
+        nodes.append(_node("push_replay", "push_replay", given, _replay(given, recording), finished))
+    if is_true(given["rviz"]):
         nodes.append(_rviz(given))
     return nodes
 
@@ -85,9 +113,24 @@ def _server(given: dict[str, str]) -> dict[str, Any]:
 
 
 def _validator(given: dict[str, str]) -> dict[str, Any]:
-    topics = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "world_frame")
+    texts = (*TOPICS, "wrench_frame", "world_frame")
     paths = {name: _path(given[name]) for name in ("model", "output", "rig") if given[name]}
-    return {**paths, **{name: given[name] for name in topics if given[name]}}
+    scalars = [topic.strip() for topic in given["scalar_topics"].split(",") if topic.strip()]
+    found: dict[str, Any] = {**paths, **{name: given[name] for name in texts if given[name]}, **_qos(given)}
+    return {**found, "scalar_topics": scalars} if scalars else found
+
+
+def _qos(given: dict[str, str]) -> dict[str, str]:
+    """The override of the reliability for each sensor topic; frames of tf have none."""
+    if not given["reliability"]:
+        return {}
+    topics = [given[name] or default for name, default in TOPICS.items()]
+    names = [_full_name(given["namespace"], topic.partition(".")[0]) for topic in topics if ":" not in topic]
+    return {f"qos_overrides.{name}.subscription.reliability": given["reliability"] for name in names}
+
+
+def _full_name(namespace: str, topic: str) -> str:
+    return topic if topic.startswith("/") else f"/{namespace}/{topic}".replace("//", "/")
 
 
 def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
@@ -97,7 +140,9 @@ def _replay(given: dict[str, str], recording: str) -> dict[str, Any]:
     return {**rig, **rate, "recording": _path(recording), "wait_for_subscribers": 30.0}
 
 
-def _node(executable: str, name: str, given: dict[str, str], parameters: dict[str, Any]) -> Node:
+def _node(
+    executable: str, name: str, given: dict[str, str], parameters: dict[str, Any], on_exit: Callable[[Any, Any], Any]
+) -> Node:
     files = [given["params_file"]] if given["params_file"] else []
     enclave = ["--enclave", f"{given['enclaves'].rstrip('/')}/{executable}"] if given["enclaves"] else []
     return Node(
@@ -108,6 +153,7 @@ def _node(executable: str, name: str, given: dict[str, str], parameters: dict[st
         parameters=[*files, {**_switch(given, "use_sim_time", default=False), **parameters}],
         arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
         output="screen",
+        on_exit=on_exit,
     )
 
 
@@ -127,12 +173,8 @@ def _rviz(given: dict[str, str]) -> Node:
 
 def _switch(given: dict[str, str], name: str, default: bool) -> dict[str, bool]:
     """The parameter if it differs from its default, so that params_file can set it otherwise."""
-    value = _true(given[name])
+    value = is_true(given[name])
     return {} if value == default else {name: value}
-
-
-def _true(text: str) -> bool:
-    return text.lower() in ("true", "1", "yes")
 
 
 def _path(text: str) -> str:

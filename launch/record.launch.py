@@ -28,9 +28,11 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from push_predictor.nodes.launch_checks import argument_problem, end_launch, is_true, start_or_refuse
 
 TEXTS = ("slider_topic", "pusher_topic", "wrench_topic", "wrench_frame", "wrench_bias", "world_frame")
 PATHS = ("bag", "rig")
+SWITCHES = ("force", "use_sim_time")
 ARGUMENTS = (
     ("namespace", "", "Namespace of the node."),
     ("params_file", "", "YAML file with parameters, such as config/push_recorder.yaml. Other arguments override it."),
@@ -67,29 +69,33 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def _nodes(context: LaunchContext) -> list[Node]:
+def _nodes(context: LaunchContext) -> list[Any]:
     given = {name: context.launch_configurations[name] for name, _, _ in ARGUMENTS}
+    problem = argument_problem(__file__, context.argv, given, SWITCHES)
+    return start_or_refuse(problem, lambda: [_recorder(given)])
+
+
+def _recorder(given: dict[str, str]) -> Node:
     enclave = ["--enclave", given["enclave"]] if given["enclave"] else []
     files = [given["params_file"]] if given["params_file"] else []
-    return [
-        Node(
-            package="push_predictor",
-            executable="push_recorder",
-            name="push_recorder",
-            namespace=given["namespace"],
-            parameters=[*files, _parameters(given)],
-            arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
-            output="screen",
-            sigterm_timeout="30",  # a large bag needs time to be completed
-        )
-    ]
+    return Node(
+        package="push_predictor",
+        executable="push_recorder",
+        name="push_recorder",
+        namespace=given["namespace"],
+        parameters=[*files, _parameters(given)],
+        arguments=["--ros-args", "--log-level", given["log_level"], *enclave],
+        output="screen",
+        sigterm_timeout="30",  # a large bag needs time to be completed
+        on_exit=end_launch(),
+    )
 
 
 def _parameters(given: dict[str, str]) -> dict[str, Any]:
     """The arguments that were given: others keep the value of params_file."""
     found: dict[str, Any] = {name: given[name] for name in TEXTS if given[name]}
     found |= {name: os.path.abspath(os.path.expanduser(given[name])) for name in PATHS if given[name]}
-    found |= {name: True for name in ("force", "use_sim_time") if given[name].lower() in ("true", "1", "yes")}
+    found |= {name: True for name in SWITCHES if is_true(given[name])}
     if given["covariate_topics"]:
         found["covariate_topics"] = [topic.strip() for topic in given["covariate_topics"].split(",")]
     return found | ({"duration": float(given["duration"])} if given["duration"] else {})

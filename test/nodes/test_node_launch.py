@@ -14,21 +14,17 @@
 
 """The launch files start the nodes with parameters that they declare.
 
-launch and launch_ros cannot be installed together with the ROS wheels. Fakes replace the few names that the file uses,
-and the tests check what the file passes to them.
+Substitutes replace launch and launch_ros, and the tests check what the files pass to them.
 """
 
 from __future__ import annotations
 
-import runpy
-import sys
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
+from fake_launch import actions, install_fake_launch, install_fake_rviz, load_launch_file, started
 from ros_harness import REPOSITORY
 
 from push_predictor.nodes import predict_server
@@ -46,56 +42,26 @@ PARAMETERS = {
 }
 
 
-@dataclass
-class FakeAction:
-    """An action of launch that records its arguments."""
-
-    args: tuple[Any, ...]
-    kwargs: dict[str, Any] = field(default_factory=dict)
-
-
-def fake_action(name: str) -> type[FakeAction]:
-    return type(
-        name, (FakeAction,), {"__init__": lambda self, *args, **kwargs: FakeAction.__init__(self, args, kwargs)}
-    )
-
-
 @pytest.fixture
 def launch_file(launch_packages: None) -> dict[str, Any]:
     """The names that the launch file defines."""
-    return runpy.run_path(str(FILE))
+    return load_launch_file(FILE)
 
 
 @pytest.fixture
 def record_file(launch_packages: None) -> dict[str, Any]:
-    return runpy.run_path(str(RECORD))
+    return load_launch_file(RECORD)
 
 
 @pytest.fixture
 def launch_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    needed = {
-        "launch": ("LaunchContext", "LaunchDescription"),
-        "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable"),
-        "launch_ros": (),
-        "launch_ros.actions": ("Node",),
-    }
-    for module, names in needed.items():
-        made = ModuleType(module)
-        vars(made).update({name: fake_action(name) for name in names})
-        monkeypatch.setitem(sys.modules, module, made)
-
-
-def actions(launch_file: dict[str, Any]) -> list[FakeAction]:
-    return list(launch_file["generate_launch_description"]().args[0])
+    install_fake_launch(monkeypatch)
 
 
 def nodes(launch_file: dict[str, Any], **given: str) -> dict[str, dict[str, Any]]:
     """The arguments of each node for these launch arguments, by executable."""
-    (opaque,) = (action for action in actions(launch_file) if type(action).__name__ == "OpaqueFunction")
-    defaults = {name: value for name, value, _ in launch_file["ARGUMENTS"]}
-    assert given.keys() <= defaults.keys()
-    context = SimpleNamespace(launch_configurations={**defaults, **given})
-    return {node.kwargs["executable"]: node.kwargs for node in opaque.kwargs["function"](context)}
+    assert given.keys() <= {name for name, _, _ in launch_file["ARGUMENTS"]}
+    return {node.kwargs["executable"]: node.kwargs for node in started(launch_file, given)}
 
 
 def parameters(node: dict[str, Any]) -> dict[str, Any]:
@@ -122,6 +88,8 @@ def test_every_argument_is_declared_with_a_default_and_a_description(launch_file
         "wrench_topic",
         "wrench_frame",
         "world_frame",
+        "scalar_topics",
+        "reliability",
         "rviz",
         "rviz_config",
     ]
@@ -154,15 +122,15 @@ def test_the_validator_gets_the_topics_of_a_laboratory(launch_file):
 
 def test_three_nodes_start_with_their_parameters(launch_file):
     given = {"model": "m.pushmodel", "output": "~/result", "rig": "a.rig.yaml", "rate": "10"}
-    started = nodes(launch_file, recording="bags/x", **given)
+    running = nodes(launch_file, recording="bags/x", **given)
     here, home = str(Path.cwd()), str(Path.home())
-    assert parameters(started["predict_server"]) == {"models": [f"{here}/m.pushmodel"]}
-    assert parameters(started["push_validator"]) == {
+    assert parameters(running["predict_server"]) == {"models": [f"{here}/m.pushmodel"]}
+    assert parameters(running["push_validator"]) == {
         "model": f"{here}/m.pushmodel",
         "output": f"{home}/result",
         "rig": f"{here}/a.rig.yaml",
     }
-    assert parameters(started["push_replay"]) == {
+    assert parameters(running["push_replay"]) == {
         "recording": f"{here}/bags/x",
         "rig": f"{here}/a.rig.yaml",
         "play.rate": 10.0,
@@ -182,10 +150,10 @@ def test_nodes_declare_and_accept_every_parameter(launch_file):
 
 
 def test_executables_are_installed_under_their_node_names(launch_file):
-    started = nodes(launch_file, recording="bags/x", namespace="cell", log_level="debug")
+    running = nodes(launch_file, recording="bags/x", namespace="cell", log_level="debug")
     names = {"predict_server": "push_predictor", "push_validator": "push_validator", "push_replay": "push_replay"}
-    assert {executable: node["name"] for executable, node in started.items()} == names
-    for executable, node in started.items():
+    assert {executable: node["name"] for executable, node in running.items()} == names
+    for executable, node in running.items():
         assert (REPOSITORY / "scripts" / "run" / executable).exists()
         assert (node["package"], node["namespace"]) == ("push_predictor", "cell")
         assert node["arguments"] == ["--ros-args", "--log-level", "debug"]
@@ -194,10 +162,10 @@ def test_executables_are_installed_under_their_node_names(launch_file):
 def test_nodes_run_in_their_enclaves_of_the_policy(launch_file, record_file):
     policy = ET.parse(REPOSITORY / "config" / "sros2_policy.xml").getroot()
     enclaves = {enclave.attrib["path"] for enclave in policy.iter("enclave")}
-    started = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
+    running = nodes(launch_file, recording="bags/x", enclaves="/push_predictor/")
     recorder = nodes(record_file, enclave="/push_predictor/push_recorder")["push_recorder"]
-    assert {node["arguments"][-1] for node in [*started.values(), recorder]} == enclaves
-    for executable, node in started.items():
+    assert {node["arguments"][-1] for node in [*running.values(), recorder]} == enclaves
+    for executable, node in running.items():
         assert node["arguments"][-2:] == ["--enclave", f"/push_predictor/{executable}"]
 
 
@@ -214,11 +182,14 @@ def test_parameter_file_applies_where_no_argument_is_given(launch_file):
     assert parameters(nodes(launch_file, autostart="false")["predict_server"]) == {"autostart": False}
 
 
-def test_rviz_is_optional_and_uses_the_installed_configuration(launch_file):
+def test_rviz_is_optional_and_uses_the_installed_configuration(
+    launch_file, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    install_fake_rviz(tmp_path, monkeypatch)
     assert "rviz2" not in nodes(launch_file, bag="/b")
-    started = nodes(launch_file, bag="/b", rviz="true", namespace="cell", use_sim_time="true")
-    assert {"predict_server", "push_validator", "push_replay", "rviz2"} == started.keys()
-    rviz = started["rviz2"]
+    running = nodes(launch_file, bag="/b", rviz="true", namespace="cell", use_sim_time="true")
+    assert {"predict_server", "push_validator", "push_replay", "rviz2"} == running.keys()
+    rviz = running["rviz2"]
     assert (rviz["package"], rviz["namespace"], parameters(rviz)) == ("rviz2", "cell", {"use_sim_time": True})
     flag, config = rviz["arguments"]
     assert (flag, Path(config)) == ("-d", REPOSITORY / "config" / "push_predictor.rviz") and Path(config).exists()

@@ -1,0 +1,222 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Launch files refuse what they cannot obey before anything is started, and end when a node that is needed ends."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from fake_launch import FakeAction, install_fake_launch, install_fake_rviz, load_launch_file, started
+from repository import REPOSITORY
+
+from push_predictor.nodes.launch_checks import end_launch, started_directly
+from push_predictor.nodes.validator.parameters import PARAMETERS
+
+MAIN = REPOSITORY / "launch" / "push_predictor.launch.py"
+RECORD = REPOSITORY / "launch" / "record.launch.py"
+ROS2 = "/opt/ros/jazzy/bin/ros2"
+
+
+@pytest.fixture(autouse=True)
+def launch_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_fake_launch(monkeypatch)
+
+
+def run(
+    file: Path, monkeypatch: pytest.MonkeyPatch, *words: str, given: dict[str, str] | None = None
+) -> list[FakeAction]:
+    """What `ros2 launch push_predictor FILE WORDS` starts."""
+    monkeypatch.setattr(sys, "argv", [ROS2, "launch", "push_predictor", file.name, *words])
+    arguments = given or dict(word.split(":=") for word in words)
+    return started(load_launch_file(file), arguments, words)
+
+
+def refusal(actions: list[FakeAction]) -> str:
+    """The message with which the actions end the launch; they start nothing."""
+    (timer,) = actions
+    assert type(timer).__name__ == "TimerAction" and timer.kwargs["period"] == 0.0
+    (failure,) = timer.kwargs["actions"]
+    with pytest.raises(RuntimeError) as error:
+        failure.kwargs["function"](SimpleNamespace(), *failure.kwargs["args"])
+    return str(error.value)
+
+
+def executables(actions: list[FakeAction]) -> list[str]:
+    return [action.kwargs["executable"] for action in actions]
+
+
+# --- arguments -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("file", "word", "near"),
+    [
+        (MAIN, "recrding:=bags/x", "'recording'"),
+        (MAIN, "slider-topic:=/vicon", "'slider_topic'"),
+        (RECORD, "bags:=monday", "'bag'"),
+        (RECORD, "rviz:=true", "one of namespace, params_file,"),
+    ],
+)
+def test_a_misspelt_argument_is_refused_with_the_nearest_accepted_one(
+    file: Path, word: str, near: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = word.partition(":=")[0]
+    assert f"launch argument {name!r} is not accepted, give {near}" in refusal(run(file, monkeypatch, word))
+
+
+def test_every_unknown_argument_is_named_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = refusal(run(MAIN, monkeypatch, "modell:=m", "modell:=n", "bagg:=b", "rig:=r"))
+    assert found.count("'modell'") == 1 and "'bagg'" in found and "'rig'" not in found
+
+
+def test_arguments_of_launch_itself_are_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("emulate_tty:=true", "sigterm_timeout:=9", "launch-prefix:=nice", "model:=m")
+    assert executables(run(MAIN, monkeypatch, *words)) == ["predict_server", "push_validator"]
+
+
+def test_arguments_of_a_file_that_includes_this_one_are_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    command = [ROS2, "launch", "cell", "cell.launch.py", "robot:=ur5e"]
+    monkeypatch.setattr(sys, "argv", command)
+    given = {"robot": "ur5e", "model": "m"}
+    assert executables(started(load_launch_file(MAIN), given, command[4:])) == ["predict_server", "push_validator"]
+
+
+@pytest.mark.parametrize(
+    ("command", "direct"),
+    [
+        (["ros2", "launch", "push_predictor", "record.launch.py"], True),
+        (["ros2", "launch", "-d", "push_predictor", "record.launch.py", "bag:=x"], True),
+        (["ros2", "launch", str(RECORD)], True),
+        (["ros2", "launch", "other", "record.launch.py"], False),
+        (["ros2", "launch", "/other/record.launch.py"], False),
+        (["ros2", "launch", "push_predictor", "push_predictor.launch.py"], False),
+        (["record.launch.py"], False),
+    ],
+)
+def test_a_file_knows_whether_the_command_line_names_it(command: list[str], direct: bool) -> None:
+    assert started_directly(str(RECORD), command) is direct
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [(MAIN, "rviz"), (MAIN, "autostart"), (MAIN, "use_sim_time"), (RECORD, "force")]
+)
+def test_a_switch_is_true_or_false(file: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert f"{name}: 'ture' is not accepted, give true or false" in refusal(run(file, monkeypatch, f"{name}:=ture"))
+    assert "Node" in {type(action).__name__ for action in run(file, monkeypatch, f"{name}:=False")}
+
+
+# --- RViz ------------------------------------------------------------------------------------------------------------
+
+
+def test_without_rviz_nothing_is_started_and_the_message_states_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    found = refusal(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+    assert "sudo apt install ros-jazzy-rviz2" in found and "rviz:=true" in found
+    assert "rviz2" not in executables(run(MAIN, monkeypatch, "rviz:=false", "bag:=b"))
+    install_fake_rviz(tmp_path, monkeypatch)
+    assert "rviz2" in executables(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+    (tmp_path / "lib/rviz2/rviz2").unlink()  # its files without its program
+    assert "ros-jazzy-rviz2" in refusal(run(MAIN, monkeypatch, "rviz:=true", "bag:=b"))
+
+
+def test_rviz_is_a_dependency_of_the_package() -> None:
+    assert "<exec_depend>rviz2</exec_depend>" in (REPOSITORY / "package.xml").read_text()
+
+
+@pytest.mark.parametrize("file", [MAIN, RECORD], ids=lambda file: file.name)
+def test_the_page_lists_every_argument_with_its_default(file: Path) -> None:
+    page = (REPOSITORY / "docs" / "reference" / "launch.md").read_text()
+    section = page.split(f"\n## `{file.name}`\n")[1].split("\n## ")[0]
+    rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in section.splitlines() if "|" in line]
+    assert [tuple(row) for row in rows[2:]] == list(load_launch_file(file)["ARGUMENTS"])
+
+
+# --- the end of a node -----------------------------------------------------------------------------------------------
+
+
+def exited(status: int, **context: Any) -> tuple[Any, Any]:
+    event = SimpleNamespace(process_name="push_validator-2", returncode=status)
+    return event, SimpleNamespace(**{"is_shutdown": False, **context})
+
+
+@pytest.mark.parametrize("status", [1, 2, -9, -11, 130, -2])
+def test_a_node_that_fails_ends_the_launch_with_a_status_other_than_0(status: int) -> None:
+    for on_exit in (end_launch(), end_launch(also_if_done=False)):
+        with pytest.raises(RuntimeError, match=f"push_validator-2 ended with status {status}"):
+            on_exit(*exited(status))
+
+
+def test_a_node_that_ends_by_itself_ends_the_launch_unless_the_others_go_on_without_it() -> None:
+    ended = end_launch()(*exited(0))
+    assert type(ended).__name__ == "Shutdown" and ended.kwargs["reason"] == "push_validator-2 has ended"
+    assert end_launch(also_if_done=False)(*exited(0)) is None
+
+
+@pytest.mark.parametrize("status", [0, 130, 143, -2, -15])
+def test_nodes_that_end_on_a_signal_of_the_launch_have_not_failed(status: int) -> None:
+    assert end_launch()(*exited(status, is_shutdown=True)) is None
+
+
+@pytest.mark.parametrize("status", [1, -9])
+def test_a_failure_at_the_end_is_shown_too(status: int) -> None:
+    with pytest.raises(RuntimeError):
+        end_launch()(*exited(status, is_shutdown=True))
+
+
+def test_each_node_has_the_end_that_suits_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_fake_rviz(tmp_path, monkeypatch)
+    found = {node.kwargs["executable"]: node.kwargs for node in run(MAIN, monkeypatch, "bag:=b", "rviz:=true")}
+    (recorder,) = run(RECORD, monkeypatch, "bag:=b")
+    assert "on_exit" not in found.pop("rviz2")  # its window may be closed
+    for node in (found["predict_server"], found["push_validator"], recorder.kwargs):
+        assert type(node["on_exit"](*exited(0))).__name__ == "Shutdown"
+    assert found["push_replay"]["on_exit"](*exited(0)) is None
+    for node in found.values():
+        with pytest.raises(RuntimeError):
+            node["on_exit"](*exited(1))
+
+
+# --- live devices ----------------------------------------------------------------------------------------------------
+
+
+def validator(monkeypatch: pytest.MonkeyPatch, *words: str) -> dict[str, Any]:
+    found = {node.kwargs["executable"]: node.kwargs for node in run(MAIN, monkeypatch, *words)}
+    return dict(found["push_validator"]["parameters"][-1])
+
+
+def test_covariates_are_a_list_of_topics(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = validator(monkeypatch, "scalar_topics:=surface/temperature, /room/humidity,")
+    assert given == {"scalar_topics": ["surface/temperature", "/room/humidity"]}
+    (row,) = (row for row in PARAMETERS if row.name == "scalar_topics")
+    assert row.allows(given["scalar_topics"])
+    assert validator(monkeypatch) == {}
+
+
+def test_the_reliability_is_that_of_every_sensor_topic_by_its_full_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("reliability:=best_effort", "namespace:=/cell", "slider_topic:=/vrpn/block/pose", "pusher_topic:=/tf:tip")
+    given = validator(monkeypatch, *words, "wrench_topic:=ft.data.wrench")
+    assert {name: value for name, value in given.items() if name.startswith("qos")} == {
+        "qos_overrides./vrpn/block/pose.subscription.reliability": "best_effort",
+        "qos_overrides./cell/ft.subscription.reliability": "best_effort",
+    }
+    default = validator(monkeypatch, "reliability:=reliable")
+    assert default["qos_overrides./slider/pose.subscription.reliability"] == "reliable"
+    assert "reliability: 'sensor_data' is not accepted" in refusal(run(MAIN, monkeypatch, "reliability:=sensor_data"))
