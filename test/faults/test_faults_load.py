@@ -114,9 +114,10 @@ def test_files_and_threads_of_the_nodes_stay_constant_over_recorded_hours(tmp_pa
     assert done.returncode == 0, text
     hours, rate = map(float, re.findall(r"([\d.]+) recorded hours in \d+ s: rate (\d+)", text)[0])
     assert hours > 0.0 and rate > 1.0 and "behind by" in text
-    for node in ("predict_server", "push_validator", "push_replay", "push_validator, child 1"):
+    for node in ("predict_server", "push_validator", "push_replay", "push_validator, alarm"):
         (line,) = [line for line in text.splitlines() if line.startswith(f"{node} ") and "after warm-up" in line]
-        assert max(map(int, re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", line)[0])) <= 0
+        threads, descriptors = map(int, re.findall(r"threads ([+-]\d+), descriptors ([+-]\d+)", line)[0])
+        assert threads <= 0 and descriptors <= 2  # a check of the samples takes two while it runs
     assert max(map(int, re.findall(r"(\d+) descriptors\n", text))) < 60  # one for each window would exceed it
 
 
