@@ -34,6 +34,7 @@ from push_predictor.residuals.selection.cross_validation import Judged, gains_of
 from push_predictor.types import Array, IntArray
 
 MOST_PLACES = 60  # that are tried near the best of these
+SAME_GAIN = 1e-9  # relative difference of gains that is rounding
 STEPS = 9  # places of a step that are tried, at quantiles of the covariate
 SIMPLEST_FIRST = ("constant", "category", "linear", "logarithmic", "step", "periodic", "periodic, twice around",
                   "quadratic", "map")  # fmt: skip
@@ -58,7 +59,8 @@ def simplest_basis(candidate: Candidate, table: PushTable, z: Array, controls: A
 def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray) -> Judged:
     """The candidate as an effect that begins within these pushes, in the basis that gains most.
 
-    It sets in at once between two windows, or grows from zero at the start, linearly or ever more slowly.
+    It sets in at once between two windows, or grows from zero at the start, linearly or ever more slowly. All are the
+    same for a covariate with two values: it is then a step.
     """
     name = candidate.covariate
     values = table.covariates[name]
@@ -71,7 +73,8 @@ def best_onset(candidate: Candidate, table: PushTable, z: Array, block: IntArray
 
     steps = [judged(DriverBasis("step", (name,), place=place)) for place in step_places(values)]
     step = _moved(max(steps, key=_gain), values, judged)
-    return max([step, *map(judged, growing)], key=_gain)
+    grown = max(map(judged, growing), key=_gain)
+    return grown if grown.gain - step.gain > SAME_GAIN * abs(step.gain) else step
 
 
 def bases_for(candidate: Candidate, table: PushTable) -> list[DriverBasis]:
