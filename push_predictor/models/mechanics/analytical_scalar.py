@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-
-import numpy as np
+from math import inf, isfinite
 
 from push_predictor.geometry.nearest import ContactAt, Nearest, contact_on, nearest_on
 from push_predictor.models.mechanics.analytical import AnalyticalPush
@@ -63,5 +62,5 @@ def scalar_analytical(physics: AnalyticalPush) -> ScalarAnalyticalPush:
 
 
 def _valid(inputs: Array, duration: Array) -> bool:
-    forward = (inputs[:, 0] >= 0.0).all() and (duration >= 0.0).all()
-    return bool(forward and np.isfinite(inputs).all() and np.isfinite(duration).all())
+    rows = all(speed >= 0.0 and isfinite(speed + contact + angle) for speed, contact, angle in inputs.tolist())
+    return rows and all(0.0 <= seconds < inf for seconds in duration.tolist())

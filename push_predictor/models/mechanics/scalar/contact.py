@@ -47,6 +47,30 @@ class LastContact:
 _AT_REST = 0.0, 0.0, 0.0
 
 
+def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> Three:
+    """The same as `driven_scalar` on an ellipsoid, where velocity is linear in the force: in closed form.
+
+    A contact that sticks has the force (1, slope) along and left of the normal. Beyond an edge of the friction cone it
+    slips, with the force of that edge.
+    """
+    nx, ny, normal_arm, left_arm, along, across = touch
+    if along <= 0.0:
+        return _AT_REST
+    coupling = normal_arm * left_arm
+    push = (1.0 + left_arm * left_arm) * along - coupling * across
+    rub = (1.0 + normal_arm * normal_arm) * across - coupling * along
+    if rub > left * push if push > 0.0 else rub > 0.0:
+        push, rub = 1.0, left
+    elif rub < -right * push or push <= 0.0:
+        push, rub = 1.0, -right
+    vx, vy, spin = push * nx - rub * ny, push * ny + rub * nx, push * normal_arm + rub * left_arm
+    toward = vx * nx + vy * ny + spin * normal_arm
+    if toward <= 0.0:
+        return _AT_REST
+    size = along / toward
+    return vx * size, vy * size, spin * size
+
+
 def driven_scalar(
     twist: Twist, touch: ScalarTouch, left: float, right: float, last: LastContact, tolerance: float
 ) -> Three:

@@ -33,10 +33,17 @@ from push_predictor.models.mechanics.motion.fine_sweep import OF_TRAVEL_FINELY
 from push_predictor.models.mechanics.motion.friction_cone import REFERENCE_SPEED, SLOWEST
 from push_predictor.models.mechanics.motion.sweep import FINE, LONGEST_STEP, OF_TRAVEL, SHORTEST_STEP, TOUCHING
 from push_predictor.models.mechanics.parameters import RowValues
-from push_predictor.models.mechanics.scalar.contact import LastContact, ScalarTouch, driven_scalar
+from push_predictor.models.mechanics.scalar.contact import (
+    LastContact,
+    ScalarTouch,
+    driven_on_ellipsoid,
+    driven_scalar,
+)
 from push_predictor.models.mechanics.scalar.surface import (
     ScalarSurface,
     Three,
+    Twist,
+    is_ellipsoid,
     loaded,
     root_of_stretch,
     scalar_surface,
@@ -45,6 +52,7 @@ from push_predictor.types import Array
 
 MOST_SURFACES = 64  # that are kept prepared
 FEW = 16  # pushes: as fast as an array of them
+FRICTION_CHANGES = ("friction_by_angle", "friction_by_speed", "friction_by_load")  # along a push
 
 # At a pose (x, y, heading) and a distance travelled: change of the pose per metre, the gap (m), the approach.
 Rates: TypeAlias = tuple[float, float, float, float, float]
@@ -83,7 +91,7 @@ class ScalarMechanics(FittedMechanics):
 
     def _displacement(self, inputs: Array, duration: Array, covariates: Mapping[str, Array] | None) -> Array:
         given = covariates or {}
-        pushes = list(zip(*np.transpose(inputs).tolist(), np.asarray(duration).tolist(), strict=True))
+        pushes = [(*row, seconds) for row, seconds in zip(inputs.tolist(), duration.tolist(), strict=True)]
         plain = 0 < len(pushes) <= FEW and all(isfinite(sum(push)) for push in pushes)
         if not plain or self.value("inertia") or any(name not in given for name in self.needs):
             return super().displacement(inputs, duration, covariates)
@@ -160,40 +168,57 @@ class _Push:
         self.friction, self.world = model.value("contact_friction"), _world(model)
         none = self.world.stretch == (0.0, 0.0)
         self.stretch = None if none else root_of_stretch(*self.world.stretch, surface.reach)  # without grain
+        # What is the same all along the push is computed once; None if it is not.
+        self.cone = None if any(map(value, FRICTION_CHANGES)) else self._edges(self.friction)
+        self.centre = None if self.world.gradient != (0.0, 0.0) else self._own_centre()
+        same = self.world.grain == self.world.slope == (0.0, 0.0)
+        self.twist = self._loaded(0.0) if same else None
+        self.ellipsoid = self.twist is not None and is_ellipsoid(self.twist)
 
     def displacement(self) -> Three:
         """Displacement in the recorded push frame."""
         accuracy = self.model.mechanics.accuracy
         sweep = _swept if accuracy > FINE else _swept_finely
-        x, y, turn = sweep(self._rate, self.travel, self.surface.length, accuracy)
+        x, y, turn = sweep(self._rate(), self.travel, self.surface.length, accuracy)
         (ox, oy), (ahead_x, ahead_y) = self.origin, self.recorded
         turned_x, turned_y = _turned(ox, oy, turn)
         x, y = x + turned_x - ox, y + turned_y - oy
         return ahead_x * x + ahead_y * y, ahead_x * y - ahead_y * x, turn
 
-    def _rate(self, x: float, y: float, heading: float, done: float) -> Rates:
-        c, s, length = cos(heading), sin(heading), self.surface.length
-        (tip_x, tip_y), (ahead_x, ahead_y) = self.tip, self.ahead
-        from_x, from_y = tip_x + done * ahead_x - x, tip_y + done * ahead_y - y
-        at_x, at_y, nx, ny, distance = self.model.nearest(c * from_x + s * from_y, c * from_y - s * from_x)
-        nx, ny = -nx, -ny
-        vx, vy = c * ahead_x + s * ahead_y, c * ahead_y - s * ahead_x
-        centre_x, centre_y = self._centre(heading)
-        arm_x, arm_y = (at_x - centre_x) / length, (at_y - centre_y) / length
-        touch = ScalarTouch(
-            nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, vx * nx + vy * ny, vy * nx - vx * ny
-        )
-        left, right = self._friction(touch)
-        vx, vy, spin = driven_scalar(self._loaded(heading), touch, left, right, self.last, self.surface.tolerance)
-        spin /= length
-        vx, vy = vx + spin * centre_y, vy - spin * centre_x
-        return c * vx - s * vy, s * vx + c * vy, spin, distance - self.radius, touch.along
+    def _rate(self) -> Rate:
+        """The rate of this push. Its variables are local: they are read some hundred times a push."""
+        (tip_x, tip_y), (ahead_x, ahead_y), radius = self.tip, self.ahead, self.radius
+        nearest, length, tolerance, last = self.model.nearest, self.surface.length, self.surface.tolerance, self.last
+        same_centre, same_cone, same_twist, ellipsoid = self.centre, self.cone, self.twist, self.ellipsoid
+
+        def rate(x: float, y: float, heading: float, done: float) -> Rates:
+            c, s = cos(heading), sin(heading)
+            from_x, from_y = tip_x + done * ahead_x - x, tip_y + done * ahead_y - y
+            at_x, at_y, nx, ny, distance = nearest(c * from_x + s * from_y, c * from_y - s * from_x)
+            nx, ny = -nx, -ny
+            vx, vy = c * ahead_x + s * ahead_y, c * ahead_y - s * ahead_x
+            centre_x, centre_y = same_centre or self._centre(heading)
+            arm_x, arm_y = (at_x - centre_x) / length, (at_y - centre_y) / length
+            along = vx * nx + vy * ny
+            touch = ScalarTouch(nx, ny, arm_x * ny - arm_y * nx, arm_x * nx + arm_y * ny, along, vy * nx - vx * ny)
+            left, right = same_cone or self._friction(touch)
+            if ellipsoid:
+                vx, vy, spin = driven_on_ellipsoid(touch, left, right)
+            else:
+                twist = same_twist or self._loaded(heading)
+                vx, vy, spin = driven_scalar(twist, touch, left, right, last, tolerance)
+            spin /= length
+            vx, vy = vx + spin * centre_y, vy - spin * centre_x
+            return c * vx - s * vy, s * vx + c * vy, spin, distance - radius, along
+
+        return rate
+
+    def _own_centre(self) -> tuple[float, float]:
+        x, y = self.surface.centre
+        return x + self.model.values.get("centre_x", 0.0), y + self.model.values.get("centre_y", 0.0)
 
     def _centre(self, heading: float) -> tuple[float, float]:
-        x, y = self.surface.centre
-        x, y = x + self.model.values.get("centre_x", 0.0), y + self.model.values.get("centre_y", 0.0)
-        if self.world.gradient == (0.0, 0.0):
-            return x, y
+        x, y = self._own_centre()
         gx, gy = _turned(*self.world.gradient, -(self.heading + heading))
         xx, xy, yy = self.surface.square
         return x + xx * gx + xy * gy, y + xy * gx + yy * gy
@@ -207,10 +232,13 @@ class _Push:
             friction += by_speed * log(max(self.speed * abs(touch.across), SLOWEST) / REFERENCE_SPEED)
         if by_load := value("friction_by_load", 0.0):
             friction -= by_load * log(self.surface.gauge(touch.normal_x, touch.normal_y, touch.normal_arm))
-        difference = value("friction_difference", 0.0)
+        return self._edges(friction)
+
+    def _edges(self, friction: float) -> tuple[float, float]:
+        difference = self.model.values.get("friction_difference", 0.0)
         return max(friction + difference, 0.0), max(friction - difference, 0.0)
 
-    def _loaded(self, heading: float) -> Callable[[float, float, float], Three]:
+    def _loaded(self, heading: float) -> Twist:
         """The surface under what acts at this heading; see forward and loaded_surface."""
         world, turn = self.world, self.heading + heading
         stretch, pull = self.stretch, None

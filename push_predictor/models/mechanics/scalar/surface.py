@@ -84,6 +84,11 @@ def scalar_surface(surfaces: PushSurfaces) -> ScalarSurface:
     return ScalarSurface((x, y), length, (xx, xy, yy), of_rows.reach[0], twist, gauge, shape, tolerance)
 
 
+def is_ellipsoid(twist: Twist) -> bool:
+    """Whether the velocity is the load itself, in the units of the surface."""
+    return twist is _ellipsoid
+
+
 def root_of_stretch(a: float, b: float, reach: Array) -> Stretch:
     """See direction_dependence."""
     factor = min(1.0, MOST_STRETCH / max(sqrt(a * a + b * b), MOST_STRETCH))
