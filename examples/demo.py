@@ -14,7 +14,7 @@
 
 """The whole workflow: train, predict, replay, validate online, report, close the residual loop. `make demo` runs this.
 
-Three models are trained on one recording. One node then replays another recording, at ten times its speed, on the
+Three models are trained on one recording. One node then replays another recording, at twenty times its speed, on the
 topics of a motion tracker and a force sensor. A second node predicts. A third finds the pushes in the topics, requests
 predictions and compares them with the outcomes. Last, the rig changes during a replay: the alarm fires, the cause is
 traced, and the extended model is loaded (examples/loop.py).
@@ -23,35 +23,47 @@ traced, and the extended model is loaded (examples/loop.py).
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from examples import loop
+from examples.hidden import make_hidden
 from examples.live_table import LiveTable
-from examples.loop import close_the_loop
 from examples.processes import node
+from examples.stages import Page, Stages
 from push_predictor.evaluation.offline import report_windows, validate_recording
 from push_predictor.evaluation.report.figures.readme import readme_picture
 from push_predictor.evaluation.validation import Comparison, metrics_json
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import load_model
-from push_predictor.recordings.windows.push_window import windows_to_table
+from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 
 ROOT = Path(__file__).resolve().parents[1]
 TRAINING, HELD_OUT = ROOT / "bags" / "square_abs_train", ROOT / "bags" / "square_abs_test"
 OUT = ROOT / "out" / "demo"
 KINDS = ("vhgp", "gp", "analytical")  # the first is the main model
-RATE = 10.0
+RATE = 20.0
 AGREEMENT = 1e-9  # m, rad: room for rounding only
 SEED = 3  # of the hidden change; `python -m examples.demo 7` draws another one
 PATIENCE = 120.0  # s, for the replay and the last predictions
+SHARES = (24.0, 16.0, 12.0, *loop.SHARES)  # s of the stages on two idle cores
+CONTENTS = """You will see
+  - three models learn from a recording of pushes, and predict another one online, in real nodes;
+  - their errors with intervals, and a report with figures;
+  - a rig that changes while it is watched: an alarm, the search for the cause, the extended model,
+    and its error on later pushes.
+The paths of all pages and pictures are printed at the end."""
 
 
 def main(arguments: Sequence[str] = ()) -> int:
@@ -62,35 +74,52 @@ def main(arguments: Sequence[str] = ()) -> int:
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     OUT.mkdir(parents=True, exist_ok=True)
-    begun = time.monotonic()
-    print(f"1. Train {len(KINDS)} models on {TRAINING.relative_to(ROOT)}.")
-    paths = [_trained(kind) for kind in KINDS]
-    domain = os.environ["ROS_DOMAIN_ID"]
-    print(f"2. Replay {HELD_OUT.relative_to(ROOT)} at {RATE:g} times its speed and validate the models online.")
-    print(f"   The nodes run in ROS domain {domain}.")
-    _replay_and_validate(paths)
-    print("3. Compare the online predictions with offline predictions of the same windows.")
-    models = [load_model(path) for path in paths]
-    largest = max(_largest_difference(model, k) for k, model in enumerate(models))
-    agree = largest <= AGREEMENT
-    print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
-    page = _report(models, f"predictions differ by at most {largest:.1e} m or rad")
-    print(f"   Report with pictures: {page}\n", flush=True)
     seed = int(arguments[0]) if arguments else SEED
-    picture = close_the_loop(paths[0], models[0].name, OUT, seed)
-    print(f"\nDone in {time.monotonic() - begun:.0f} s. Report and picture of the residual loop:\n{page}\n{picture}")
+    print(CONTENTS, flush=True)
+    stages = Stages(SHARES)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as beside:
+        stages.begin(f"Train {len(KINDS)} models on {TRAINING.relative_to(ROOT)}.")
+        hidden = beside.submit(make_hidden, OUT, seed)  # simulated in the meantime; no other part reads it yet
+        paths = _trained(KINDS)
+        stages.begin(f"Replay {HELD_OUT.relative_to(ROOT)} at {RATE:g} times its speed and validate the models online.")
+        print(f"   The nodes run in ROS domain {os.environ['ROS_DOMAIN_ID']}.", flush=True)
+        _replay_and_validate(paths)
+        stages.begin("Compare the online predictions with offline predictions of the same windows.")
+        models = [load_model(path) for path in paths]
+        results = [validate_recording(model, HELD_OUT) for model in models]
+        largest = max(_largest_difference(model, k, *results[k]) for k, model in enumerate(models))
+        agree = largest <= AGREEMENT
+        print(f"   They {'agree' if agree else 'DISAGREE'}: the largest difference is {largest:.1e} m or rad.\n")
+        pages = _report(models, results, f"predictions differ by at most {largest:.1e} m or rad")
+        pages += loop.close_the_loop(paths[0], models[0].name, OUT, hidden.result(), stages)
+    print(f"\nDone in {stages.elapsed:.0f} s. Open:")
+    for page, shows in pages:
+        print(f"  {page}   {shows}")
     return 0 if agree else 1
 
 
-def _trained(kind: str) -> Path:
-    """The model file; an earlier run's file is used unless the recording is newer."""
-    path = OUT / f"{kind}.pushmodel"
-    if path.exists() and path.stat().st_mtime > max(part.stat().st_mtime for part in TRAINING.iterdir()):
-        print(f"   {kind}: using {path.relative_to(ROOT)} of an earlier run")
-        return path
-    command = ["train", str(TRAINING), "--kind", kind, "--out", str(path), "--force"]
-    subprocess.run([sys.executable, "-m", "push_predictor.cli", *command], check=True)
-    return path
+def _trained(kinds: Sequence[str]) -> list[Path]:
+    """The model files, trained at the same time; an earlier run's file is used unless the recording is newer."""
+    paths = [OUT / f"{kind}.pushmodel" for kind in kinds]
+    recorded = max(part.stat().st_mtime for part in TRAINING.iterdir())
+    training = {}
+    for kind, path in zip(kinds, paths, strict=True):
+        if path.exists() and path.stat().st_mtime > recorded:
+            print(f"   {kind}: using {path.relative_to(ROOT)} of an earlier run")
+            continue
+        command = ["train", str(TRAINING), "--kind", kind, "--out", str(path), "--force"]
+        training[kind] = subprocess.Popen(
+            [sys.executable, "-m", "push_predictor.cli", *command],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+    for kind, process in training.items():
+        output, _ = process.communicate()
+        print(textwrap.indent(output.rstrip(), "   "), flush=True)
+        if process.returncode != 0:
+            raise SystemExit(f"train --kind {kind} ended with status {process.returncode}")
+    return paths
 
 
 def _replay_and_validate(models: Sequence[Path]) -> None:
@@ -114,25 +143,33 @@ def _replay_and_validate(models: Sequence[Path]) -> None:
             time.sleep(0.1)
 
 
-def _largest_difference(model: PushModel, number: int) -> float:
+def _largest_difference(model: PushModel, number: int, windows: Sequence[PushWindow], offline: Comparison) -> float:
     """Largest difference between online and offline predictions of a model; infinite if the windows differ."""
     suffix = "" if number == 0 else f"_{model.name}"
     online = json.loads((OUT / "online" / f"windows{suffix}.json").read_text())["windows"]
-    windows, offline = validate_recording(model, HELD_OUT)
     if [(w["push_id"], w["window"]) for w in online] != [(w.push_id, w.index) for w in windows]:
         return float("inf")
     return float(np.max(np.abs(np.array([w["predicted"] for w in online]) - offline.mean)))
 
 
-def _report(models: Sequence[PushModel], agreement: str) -> Path:
-    results = [validate_recording(model, HELD_OUT) for model in models]
+def _report(
+    models: Sequence[PushModel], results: Sequence[tuple[list[PushWindow], Comparison]], agreement: str
+) -> list[Page]:
+    """Print the scores and write the report; its pages."""
     comparisons = [comparison for _, comparison in results]
     _print_summary(comparisons)
     windows = results[0][0]
     readme_picture(OUT / "overview.png", models[0], windows_to_table(windows))
     facts = {"online and offline": agreement, "replay rate": f"{RATE:g}"}
     alarm = json.loads((OUT / "online" / "validation.json").read_text())["alarm"]
-    return report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts, alarm)
+    page = report_windows(models, windows, comparisons, OUT / "report", HELD_OUT.name, facts, alarm)
+    print(f"   Report with pictures: {page}\n", flush=True)
+    fitted = [Page(OUT / f"{kind}.ladder.html", f"how the mechanics under {kind} were fitted") for kind in KINDS]
+    return [
+        Page(page, "the scores of the three models, with figures"),
+        Page(OUT / "overview.png", "predictions and outcomes of single pushes"),
+        *(page for page in fitted if page.path.exists()),
+    ]
 
 
 def _print_summary(comparisons: Sequence[Comparison]) -> None:

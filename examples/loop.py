@@ -38,15 +38,17 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
-from examples.hidden import make_hidden
+from examples.hidden import Hidden
 from examples.loop_picture import Story, draw_story, story_of
 from examples.processes import node
+from examples.stages import Page, Stages
 from push_predictor.evaluation.validation import metrics_json
 from push_predictor_interfaces.action import TraceResidual
 from push_predictor_interfaces.msg import PushAlarm
 from push_predictor_interfaces.srv import LoadModel
 
-RATE, RATE_AGAIN = 10.0, 20.0
+RATE, RATE_AGAIN = 20.0, 40.0
+SHARES = (22.0, 22.0, 4.0, 16.0)  # s of the four stages on two idle cores
 BEFORE, AFTER = "changed_online", "after_online"  # folders of the two validations
 REPLAY_PATIENCE, TRACE_PATIENCE, PATIENCE = 200.0, 240.0, 30.0  # s
 
@@ -151,47 +153,56 @@ class Operator:
             return
 
 
-def close_the_loop(model: Path, name: str, out: Path, seed: int) -> Path:
-    """Run the loop, print its steps, and return the path of the picture. Raises SystemExit if a node fails."""
-    print(
-        "4. Replay a second recording. After some pushes the rig changes. No node is informed of the change.",
-        flush=True,
-    )
-    hidden = make_hidden(out, seed)
-    closed = run_loop(model, name, hidden.recorded, hidden.whole, out)
+def close_the_loop(model: Path, name: str, out: Path, hidden: Hidden, stages: Stages) -> list[Page]:
+    """Run the loop, print its steps, and return the pages and pictures. Raises SystemExit if a node fails."""
+    closed = run_loop(model, name, hidden.recorded, hidden.whole, out, stages=stages)
     if closed.traced is None:
         raise SystemExit(f"trace_residual: {closed.failed}")
     print_scores(closed.story)
     truth = json.loads(hidden.truth.read_text())  # not before
     revealed = ", ".join(f"{key} {value}".replace("_", " ") for key, value in truth.items() if key != "right names")
     print(f"   The hidden change was: {revealed}.")
-    return draw_story(out / "loop.png", closed.story, closed.traced.verdict, truth)
+    picture = draw_story(out / "loop.png", closed.story, closed.traced.verdict, truth)
+    return [
+        Page(out / BEFORE / "trace.html", "the traced cause: evidence, rivals, gain"),
+        Page(picture, "the residual loop: alarm, trace, error before and after"),
+    ]
 
 
 def run_loop(
-    model: Path, name: str, recorded: Path, whole: Path, out: Path, rates: tuple[float, float] = (RATE, RATE_AGAIN)
+    model: Path,
+    name: str,
+    recorded: Path,
+    whole: Path,
+    out: Path,
+    rates: tuple[float, float] = (RATE, RATE_AGAIN),
+    stages: Stages | None = None,
 ) -> ClosedLoop:
     """Replay, watch for the alarm, trace, load the extended model, replay again; print what happens.
 
     recorded: the pushes before the trace; whole: those and later ones. rates: of the two replays. out: folder for what
-    the validators write. Raises SystemExit if a node fails.
+    the validators write. stages: of which four begin here. Raises SystemExit if a node fails.
     """
     before, after = out / BEFORE, out / AFTER
+    stages = stages or Stages(SHARES)
     with node("predict_server", {"models": [str(model)]}, "loop_server", out), Operator() as operator:
+        stages.begin("Replay a second recording. After some pushes the rig changes. No node is informed of the change.")
         _replay(model, [], recorded, before, rates[0])
         time.sleep(1.0)  # the alarm may still be in transit
         operator.stop_listening()
         if operator.alarm is None:
             print("   The alarm did not fire. The trace is requested anyway.", flush=True)
+        stages.begin("Trace the cause in the residuals that the validator recorded (action trace_residual).")
         traced, failed = _traced(operator, name, before)
         extended = None if traced is None else traced.extended
         served = None if extended is None else f"{name}_extended"
+        stages.begin("Load the extended model (service load_model).")
         if extended is not None and served is not None:
-            print("   Load the extended model (service load_model) and continue.")
             _print_lines(operator.load(extended, served))
         elif traced is not None:
             print("   There is no extended model: no effect was found that improves the log density.")
         # Replay from the beginning, so that time and push count are as before; only the pushes after the trace count.
+        stages.begin("Continue the recording and compare both models on the pushes after the trace.")
         _replay(model, [served] if served else [], whole, after, rates[1])
     story = story_of(model, extended, served, before, after, operator.alarm)
     return ClosedLoop(story, operator.alarm, traced, failed)
@@ -199,7 +210,6 @@ def run_loop(
 
 def _traced(operator: Operator, name: str, folder: Path) -> tuple[Traced | None, str]:
     """The trace of a validator's folder, or None and the reason."""
-    print("   Trace the cause in the residuals that the validator recorded (action trace_residual).", flush=True)
     try:
         traced = operator.trace(name, folder)
     except TraceFailedError as error:
