@@ -28,6 +28,12 @@ from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.limit_surfaces.surfaces import PowerSurface
 from push_predictor.models.mechanics.parameters import BY_NAME, PARAMETERS
+from push_predictor.models.mechanics.scalar.contact import (
+    LastContact,
+    ScalarTouch,
+    driven_on_ellipsoid,
+    driven_scalar,
+)
 from push_predictor.models.mechanics.scalar.mechanics import FEW, scalar_mechanics
 from push_predictor.types import Array
 
@@ -147,3 +153,19 @@ def test_point_and_normal_of_a_contact_are_those_of_the_outline(shape: str, move
     found = np.array([contact_on(outline)(c) for c in contacts.tolist()])
     expected = np.column_stack([outline.point(contacts), outline.inward_normal(contacts)])
     assert found == pytest.approx(expected, abs=1e-12)
+
+
+def test_contact_on_an_ellipsoid_in_closed_form_is_that_found_by_iteration():
+    """Contacts that stick, slip to either side, and leave."""
+    draw, reached = np.random.default_rng(5), set()
+    for _ in range(400):
+        turn, normal_arm, left_arm, along, across = draw.uniform(-4.0, 4.0, 5)
+        left, right = draw.uniform(0.0, 2.0, 2)
+        touch = ScalarTouch(np.cos(turn), np.sin(turn), normal_arm, left_arm, along, across)
+        closed = driven_on_ellipsoid(touch, left, right)
+        assert closed == pytest.approx(driven_scalar(lambda *load: load, touch, left, right, LastContact(), 1e-13))
+        vx, vy, spin = closed
+        sideways = vy * touch.normal_x - vx * touch.normal_y + spin * left_arm
+        slip = 0 if abs(sideways - across) < 1e-9 else int(np.sign(across - sideways))
+        reached.add(slip if along > 0.0 else "leaving")
+    assert reached == {"leaving", -1, 0, 1}

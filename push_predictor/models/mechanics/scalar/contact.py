@@ -61,13 +61,11 @@ def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> Three:
     rub = (1.0 + normal_arm * normal_arm) * across - coupling * along
     if rub > left * push if push > 0.0 else rub > 0.0:
         push, rub = 1.0, left
-    elif rub < -right * push or push <= 0.0:
+    elif rub < -right * push:
         push, rub = 1.0, -right
     vx, vy, spin = push * nx - rub * ny, push * ny + rub * nx, push * normal_arm + rub * left_arm
-    toward = vx * nx + vy * ny + spin * normal_arm
-    if toward <= 0.0:
-        return _AT_REST
-    size = along / toward
+    # Towards the normal, always: the map from force to velocity is positive definite, and keeps the order of directions.
+    size = along / (vx * nx + vy * ny + spin * normal_arm)
     return vx * size, vy * size, spin * size
 
 
