@@ -64,7 +64,7 @@ def driven_on_ellipsoid(touch: ScalarTouch, left: float, right: float) -> Three:
     elif rub < -right * push:
         push, rub = 1.0, -right
     vx, vy, spin = push * nx - rub * ny, push * ny + rub * nx, push * normal_arm + rub * left_arm
-    # Towards the normal, always: the map from force to velocity is positive definite, and keeps the order of directions.
+    # Always towards the normal: the map from force to velocity is positive definite and keeps the order of directions.
     size = along / (vx * nx + vy * ny + spin * normal_arm)
     return vx * size, vy * size, spin * size
 
