@@ -35,7 +35,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.errors import RigError
+from push_predictor.errors import RequestError, RigError
 from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
@@ -66,6 +66,7 @@ class PushReplay(Node):
         self._ending = threading.Event()
         self._options = options = read_options(self)
         bag = open_bag(options.recording)
+        _check_storage(options.storage, bag)
         self._restamper = Restamper() if options.restamp else None
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.senders))
@@ -144,7 +145,7 @@ class PushReplay(Node):
 
     def _publish(self, message: RawMessage) -> bool:
         untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
-        if self._options.clock_with_topics or untimed:
+        if self._options.triggers_clock(message.topic) or untimed:
             self._publish_clock(message.log_time)
         return self._topics.send(message)
 
@@ -249,6 +250,13 @@ def main() -> int:
     # By default Fast DDS asks subscribers only every 3 s what they lack; a fast replay overwrites it in that time.
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(share_path("config", "fastdds_replay.xml")))
     return run("push_replay", PushReplay)
+
+
+def _check_storage(wanted: str, bag: Bag) -> None:
+    """Raise RequestError if the parameter storage.storage_id does not fit the recording."""
+    if wanted and wanted != bag.storage:
+        accepted = f"{bag.storage!r}, the format of {bag.path}" if bag.storage else f"'': rosbag2 cannot read {bag.path}"
+        raise RequestError("storage.storage_id", wanted, accepted)
 
 
 def _size(path: Path) -> int:
