@@ -77,9 +77,9 @@ class PushReplay(Node):
         self._acknowledged: bool | None = None
         self._checks = CheckProcess(options.strict)
         self._player = self._make_player(options)
-        self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._check(bag)
         self._start_reporting()
+        self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
             thread.start()
@@ -88,6 +88,7 @@ class PushReplay(Node):
         """Stop the playback and publish the last report."""
         self._ending.set()
         self._player.close()
+        self._controls.close()
         self._checks.stop()
         for thread in self._threads:
             thread.join()
@@ -238,10 +239,10 @@ class PushReplay(Node):
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
-        name = f"{self.get_fully_qualified_name().lstrip('/')}: replay"
         level = Level.ERROR if self._checks.failed else Level.WARN if report.warnings else Level.OK
         message = "; ".join(report.warnings) or report.state
-        status = diagnostic_status(name, level, message, report.values, self._options.recording.name)
+        name, recording = self.get_fully_qualified_name(), self._options.recording.name
+        status = diagnostic_status(name, "replay", level, message, report.values, recording)
         self._diagnostics.publish(diagnostic_array(time.time_ns(), status))
 
 
@@ -255,8 +256,8 @@ def main() -> int:
 def _check_storage(wanted: str, bag: Bag) -> None:
     """Raise RequestError if the parameter storage.storage_id does not fit the recording."""
     if wanted and wanted != bag.storage:
-        accepted = f"{bag.storage!r}, the format of {bag.path}" if bag.storage else f"'': rosbag2 cannot read {bag.path}"
-        raise RequestError("storage.storage_id", wanted, accepted)
+        reason = f"the format of {bag.path}" if bag.storage else f"rosbag2 has no name for the format of {bag.path}"
+        raise RequestError("storage.storage_id", wanted, f"{bag.storage!r}, {reason}")
 
 
 def _size(path: Path) -> int:

@@ -431,6 +431,13 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
         ({"rig": "/nowhere.yaml"}, "/nowhere.yaml: the rig cannot be read"),
         ({"play.qos_profile_overrides_path": "/nowhere.yaml"}, "play.qos_profile_overrides_path: '/nowhere.yaml'"),
         ({"qos_overrides./slider/pose.publisher.reliability": "perhaps"}, "reliability"),
+        ({"play.nonsense": 1}, "play.nonsense: 1 is not accepted"),
+        ({"play.delay": 1.0, "play.delay.nsec": 5}, "play.delay: 1.0 is not accepted, give either play.delay in"),
+        ({"storage.uri": "/other.mcap"}, "storage.uri: '/other.mcap' is not accepted, give one recording"),
+        (
+            {"storage.storage_id": "sqlite3"},
+            "storage.storage_id: 'sqlite3' is not accepted, give 'mcap', the format of",
+        ),
     ],
 )
 def test_bad_parameter_ends_in_one_line_and_status_1(

@@ -39,9 +39,9 @@ def _duration(name: str, default: tuple[int, int], description: str) -> tuple[Pa
 
 
 PARAMETERS: tuple[Param, ...] = (
-    Param("recording", "", "MCAP file, or folder of a rosbag2 MCAP bag, to play; required, unless storage.uri is given"),
-    Param("storage.uri", "", "another name of the parameter recording, as rosbag2 has it"),
-    Param("storage.storage_id", "", "format that the recording must have: mcap or sqlite3 (empty: any)"),
+    Param("recording", "", "MCAP file, or folder of a rosbag2 MCAP bag, to play; or give storage.uri"),
+    Param("storage.uri", "", "another name of the parameter recording, that of rosbag2"),
+    Param("storage.storage_id", "", "the format that the recording must have, mcap or sqlite3 (empty: any)"),
     Param("rig", "", "YAML file with the rig; it replaces the push_rig record of the recording"),
     Param("restamp", False, "add one constant offset to all header stamps so that they start now; requires rate 1"),
     Param("spin_us", 0, "busy-wait during the last microseconds before a deadline: less lateness, more CPU", 0, 5000),
@@ -69,7 +69,7 @@ PARAMETERS: tuple[Param, ...] = (
         1000.0,
     ),
     Param("play.clock_publish_on_topic_publish", False, "publish /clock with the log time before each message"),
-    Param("play.clock_trigger_topics", [""], "before messages of these topics alone (empty: of all)"),
+    Param("play.clock_trigger_topics", [""], "topics before whose messages it does so (empty: all)"),
     Param("play.topics_to_filter", [""], "topics to play (empty: all)"),
     Param("play.regex_to_filter", "", "also play topics that match this regular expression"),
     Param("play.exclude_topics_to_filter", [""], "topics not to play"),
