@@ -44,6 +44,7 @@ from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
+from push_predictor.replay.capacity import measure_capacity
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
 from push_predictor.replay.flow_control import FlowControl
 from push_predictor.replay.options import ReplayOptions
@@ -172,11 +173,23 @@ class PushReplay(Node):
 
     def _play(self) -> None:
         reduce_timer_slack()
+        self._log_capacity()
         self._wait_for_subscribers()
         self._player.play(self._options.range)
         gc.collect()
         gc.freeze()  # objects that exist by now need no further collection while messages wait
         self._player.run()
+
+    def _log_capacity(self) -> None:
+        """State how many messages per second the rate requires, and what this machine can play."""
+        rate, found = self._options.rate, measure_capacity(self._source, SystemClock())
+        if found is None:
+            return
+        if rate > found.largest_rate:
+            late = f"play.rate {rate:g} is above the limit of this machine: messages will be late, none is dropped"
+            self.get_logger().warning(f"{late}. {found.to_text(rate)}")
+        else:
+            self.get_logger().info(found.to_text(rate))
 
     def _wait_for_subscribers(self) -> None:
         senders = self._topics.senders

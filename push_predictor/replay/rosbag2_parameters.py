@@ -26,7 +26,7 @@ from typing import Any
 from push_predictor.errors import RequestError
 
 GROUPS = ("play.", "storage.")
-_UNSET = (None, "", [], [""])
+_UNSET: tuple[Any, ...] = (None, "", [], [""])
 _TOPICS_ONLY = "push_replay plays topics only. `ros2 bag play` also plays services and actions"
 _NO_NAMES = f"['']: {_TOPICS_ONLY}"
 _NO_REQUESTS = f"false: {_TOPICS_ONLY}"

@@ -199,8 +199,12 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
 
 
 def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
-    with replay(second, play__start_paused=True) as (_, client):
+    with replay(second, play__start_paused=True) as (process, client):
         client.wait_for("paused")
+        assert (
+            "626 messages/s recorded, 626 messages/s at rate 1. A free core of this machine plays about"
+            in process.text()
+        )
         begin = time.monotonic()
         service(client, Resume)
         assert wait_until(lambda: client.received == len(push_messages(1.0)))
@@ -213,8 +217,9 @@ def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
 
 def test_too_high_rate_reports_how_far_the_replay_is_behind(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "long.mcap", push_messages(20.0))
-    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, client):
+    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (process, client):
         client.wait_for("paused")
+        assert "play.rate 1e+06 is above the limit of this machine" in process.text()
         service(client, Resume)
         report = client.report("finished")
     assert float(report["late_max_us"]) > 1.0e5  # 12 500 messages in 20 us of wall time are impossible
