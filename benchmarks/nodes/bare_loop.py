@@ -16,8 +16,8 @@
 
     python -m benchmarks.nodes.bare_loop sleep|publish BAG --rate R --seconds S
 
-Prints p50, p99 and maximum in us as JSON. `sleep` only sleeps until each deadline, `publish` then publishes the message.
-Both read the messages into memory first, and sleep like push_replay: absolute deadlines, a timer slack of 1 ns.
+Prints p50, p99 and maximum in us as JSON. `sleep` only sleeps until each deadline, `publish` then publishes the
+message. Both read the messages into memory first, and sleep like push_replay: absolute deadlines, timer slack 1 ns.
 """
 
 from __future__ import annotations

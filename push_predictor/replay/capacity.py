@@ -48,7 +48,7 @@ class Capacity:
         """One sentence about a replay at this rate."""
         return (
             f"{self.recorded:.0f} messages/s recorded, {self.recorded * rate:.0f} messages/s at rate {rate:g}. "
-            f"A free core of this machine plays about {self.playable:.0f} messages/s, which is rate {self.largest_rate:.2g}"
+            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.2g}"
         )
 
 

@@ -586,7 +586,7 @@ def test_diagnostics_count_answered_and_refused_requests(server):
         lambda s: {p.key: p.value for p in s.values}["requests_refused"] == str(refused)
     )
     assert status.level == b"\0"
-    assert "push_predictor" in status.name
+    assert (status.name, status.hardware_id) == ("/push_predictor: predictions", "gp")
     assert values["requests_served"] == str(tabulated)
     assert values["last_refusal"].startswith("velocity: nan")
     assert values["models"] == "analytical, gp, vhgp"

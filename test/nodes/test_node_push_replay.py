@@ -127,7 +127,7 @@ def replay(
     """A replay that starts when the test has subscribed; parameters with `__` for a dot."""
     domain = free_domain()
     names = {name.replace("__", "."): value for name, value in params.items()}
-    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60, **names}
+    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout": 60.0, **names}
     with ros_context(domain, namespace) as node:
         client = ReplayClient(node)
         with node_process("push_replay", *ros_args, domain=domain, namespace=namespace, params=given) as process:

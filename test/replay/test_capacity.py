@@ -64,7 +64,7 @@ def test_the_largest_rate_is_the_ratio_of_playable_and_recorded_messages() -> No
     assert found.playable == pytest.approx(101_000.0 / (1.0 + PUBLISHING))
     assert found.largest_rate == pytest.approx(1010.0 / (1.0 + PUBLISHING))
     assert found.to_text(2.0).startswith("100 messages/s recorded, 200 messages/s at rate 2. ")
-    assert f"about {found.playable:.0f} messages/s, which is rate 3.7e+02" in found.to_text(2.0)
+    assert f"about {found.playable:.0f} messages/s: rate 3.7e+02" in found.to_text(2.0)
 
 
 @pytest.mark.parametrize("times", [[], [7], [7, 7]])
