@@ -16,13 +16,18 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+from rclpy.context import Context
+from rclpy.node import Node
+from ros_harness import free_domain
 
 from push_predictor.errors import RequestError
-from push_predictor.nodes.replay.parameters import PARAMETERS
+from push_predictor.nodes.replay.parameters import PARAMETERS, read_options
 from push_predictor.replay.options import replay_options
 from push_predictor.replay.rosbag2_parameters import check_given
 
@@ -165,6 +170,46 @@ def options(**given: Any) -> Any:
     }
     times = {name.removesuffix(".sec"): 0 for name in values if name.endswith(".sec")}
     return replay_options(values | {name.replace("__", "."): value for name, value in given.items()}, times)
+
+
+def test_a_parameter_file_of_rosbag2s_player_gives_the_options(tmp_path: Path) -> None:
+    file = tmp_path / "player.yaml"
+    given = DEFAULTS | {"storage.uri": "/bag", "play.rate": 13.0, "play.delay.nsec": 1, "play.loop": True}
+    file.write_text(yaml.safe_dump({"rosbag2_player": {"ros__parameters": nested(given)}}))
+    read = options_of("--params-file", str(file))
+    assert (read.recording, read.rate, read.delay, read.loop) == (Path("/bag"), 13.0, 1, True)
+    assert (read.clock_frequency, read.acked_timeout, read.filter.topics) == (0.0, -1, ())
+
+
+def test_a_time_in_seconds_replaces_only_a_pair_of_defaults() -> None:
+    zero = ("-p", "recording:=a", "-p", "play.delay:=2.5", "-p", "play.delay.sec:=0", "-p", "play.delay.nsec:=0")
+    assert options_of(*zero).delay == 2_500_000_000
+    with pytest.raises(RequestError, match=r"give either play\.delay in seconds or play\.delay\.nsec"):
+        options_of("-p", "recording:=a", "-p", "play.delay:=2.5", "-p", "play.delay.nsec:=5")
+
+
+def options_of(*ros_args: str) -> Any:
+    """The options that a node of these arguments reads."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    context = Context()
+    context.init(args=["--ros-args", *ros_args], domain_id=free_domain())
+    node = Node("rosbag2_player", context=context, enable_rosout=False, start_parameter_services=False)
+    try:
+        return read_options(node)
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def nested(flat: dict[str, Any]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *groups, last = name.split(".")
+        place = tree
+        for group in groups:
+            place = place.setdefault(group, {})
+        place[last] = value
+    return tree
 
 
 def test_storage_uri_is_another_name_of_the_recording() -> None:

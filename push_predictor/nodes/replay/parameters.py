@@ -98,9 +98,11 @@ def read_options(node: Node) -> ReplayOptions:
 def _check_names(node: Node) -> None:
     """Refuse unknown `play.*` and `storage.*`, which ROS would ignore silently."""
     given = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
+    defaults = {param.name: param.default for param in PARAMETERS}
     for name in _DURATIONS:
-        if name in given and (both := [part for part in (f"{name}.sec", f"{name}.nsec") if part in given]):
-            raise RequestError(name, given[name], f"either {name} in seconds or {' and '.join(both)}")
+        pair = [part for part in (f"{name}.sec", f"{name}.nsec") if given.get(part, defaults[part]) != defaults[part]]
+        if name in given and pair:
+            raise RequestError(name, given[name], f"either {name} in seconds or {' and '.join(pair)}")
     without_effect = check_given(given, {param.name for param in PARAMETERS}.union(_DURATIONS))
     if without_effect:
         node.get_logger().info(f"without effect on this replay: {', '.join(without_effect)}")
