@@ -27,7 +27,7 @@ from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.player import PlayerOutput, ReplayPlayer
 from push_predictor.replay.source import Source
 
-MOST = 1000  # messages to time: the start waits for it
+MOST = 2000  # messages to time; some 30 ms, before the playback begins
 PUBLISHING = 1.7  # time to publish to one subscriber in another process, over that to read (docs/explanation/replay.md)
 _AT_ONCE = 1.0e12  # recorded seconds per second: every message is due
 
@@ -48,14 +48,14 @@ class Capacity:
         """One sentence about a replay at this rate."""
         return (
             f"{self.recorded:.0f} messages/s recorded, {self.recorded * rate:.0f} messages/s at rate {rate:g}. "
-            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.2g}"
+            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.3g}"
         )
 
 
 def measure_capacity(
     source: Source, wall: SteadyClock, cpu_time: Callable[[], int] = time.thread_time_ns
 ) -> Capacity | None:
-    """Play the first second of a source, MOST messages at most, to nobody. None if it has no two different times.
+    """Play the first messages of a source, MOST of them, to nobody. None if they have no two different times.
 
     cpu_time: of this thread, ns. A short measurement of wall time would be one of what else the machine does.
     """
@@ -85,7 +85,7 @@ class _Beginning:
 
 
 def _play_at_once(source: Source, wall: SteadyClock, times: list[int]) -> None:
-    """Let a player read, sort and time the first second of the messages; their log times are added to `times`."""
+    """Let a player read and sort all messages and compute their deadlines; adds their log times to `times`."""
 
     def publish(message: RawMessage) -> bool:
         times.append(message.log_time)
@@ -96,6 +96,6 @@ def _play_at_once(source: Source, wall: SteadyClock, times: list[int]) -> None:
             player.close()
 
     output = PlayerOutput(lambda message: None, publish, lambda: None, announce)
-    player = ReplayPlayer(source, PlayerClock(wall, _AT_ONCE), wall, output, MOST, loop=False, delay=0)
-    player.play(PlayRange(duration=SECOND))
+    player = ReplayPlayer(source, PlayerClock(wall, _AT_ONCE), wall, output, MOST // 2, loop=False, delay=0)
+    player.play(PlayRange())
     player.run()

@@ -64,7 +64,7 @@ def test_the_largest_rate_is_the_ratio_of_playable_and_recorded_messages() -> No
     assert found.playable == pytest.approx(101_000.0 / (1.0 + PUBLISHING))
     assert found.largest_rate == pytest.approx(1010.0 / (1.0 + PUBLISHING))
     assert found.to_text(2.0).startswith("100 messages/s recorded, 200 messages/s at rate 2. ")
-    assert f"about {found.playable:.0f} messages/s: rate 3.7e+02" in found.to_text(2.0)
+    assert f"about {found.playable:.0f} messages/s: rate 374" in found.to_text(2.0)
 
 
 @pytest.mark.parametrize("times", [[], [7], [7, 7]])
@@ -72,10 +72,9 @@ def test_messages_of_one_time_have_no_rate(times: list[int]) -> None:
     assert capacity(times, MS) is None
 
 
-def test_the_first_second_is_played_at_once() -> None:
-    denser = range(1001 * MS, 1500 * MS, MS)
+def test_all_messages_of_a_short_recording_are_played_at_once() -> None:
     looks = iter((7, 7 + MS))
-    found = measure_capacity(Messages(*range(0, 1001 * MS, 10 * MS), *denser), Ticking(), lambda: next(looks))
+    found = measure_capacity(Messages(*range(0, 1001 * MS, 10 * MS)), Ticking(), lambda: next(looks))
     assert found == capacity([10 * MS * k for k in range(101)], MS)
 
 
