@@ -74,7 +74,7 @@ def test_clients_of_both_types_control_one_player(tmp_path: Path, interfaces: No
         assert {PLAYER.rpartition("/")[2]} == {name for name in node.get_node_names() if name[0] != "_"} - {
             node.get_name()
         }
-        assert process.stop() == 0, process.text()
+        assert process.stop() == 0 and "Traceback" not in process.text(), process.text()
 
 
 OWN = {GetRate: "get_rate", IsPaused: "is_paused", Pause: "pause", PlayNext: "play_next", SetRate: "set_rate"}

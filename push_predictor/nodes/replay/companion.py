@@ -19,7 +19,7 @@ from __future__ import annotations
 import threading
 
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -47,6 +47,7 @@ class CompanionNode:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._closing = threading.Event()
         self._thread = threading.Thread(target=self._spin, name=suffix)
 
     def start(self) -> None:
@@ -55,16 +56,17 @@ class CompanionNode:
 
     def close(self) -> None:
         """End the thread and destroy the node."""
-        self._executor.shutdown()
+        self._closing.set()
+        # A task wakes the thread. The executor is shut down afterwards: rclpy raises in a thread that still waits.
+        self._executor.create_task(lambda: None)
         self._thread.join()
+        self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
 
     def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            return
+        while not self._closing.is_set():
+            self._executor.spin_once()
 
 
 def _enclave(node: Node) -> str:
