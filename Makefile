@@ -51,7 +51,7 @@ $(VENV)/.docs: $(VENV)/.python setup.py
 	touch $@
 
 # Building the message packages takes most of the time: only when they change. tf2_msgs is not on PyPI.
-$(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) scripts/install_tf2_msgs.sh
+$(VENV)/.interfaces: $(VENV)/.python $(INTERFACES) scripts/install_interfaces.sh scripts/install_tf2_msgs.sh
 	$(BIN)/pip install -qq 'ros-jazzy-rclpy[fastrtps]' ./push_predictor_interfaces
 	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/install_tf2_msgs.sh
 	touch $@

@@ -82,22 +82,23 @@ class LiveTable:
         for status in message.status:
             self._values[status.name] = {entry.key: entry.value for entry in status.values}
 
-    def _validator(self) -> dict[str, str]:
-        return next((values for name, values in self._values.items() if "push_validator" in name), {})
+    def _of(self, subject: str) -> dict[str, str]:
+        """The latest values of the status NODE: SUBJECT, whatever the name of the node."""
+        return next((values for name, values in self._values.items() if name.endswith(f": {subject}")), {})
 
     def _models(self) -> list[str]:
-        values = self._validator()
+        values = self._of("validation")
         return [key.removesuffix(" nmse") for key in values if key.endswith(" nmse")]
 
     def _line(self, model: str) -> str:
-        values = self._validator()
+        values = self._of("validation")
         return ", ".join(f"{key} {values.get(f'{model} {key}', '-')}" for key in ("windows", "nmse", "nlpd"))
 
     def _table(self) -> Table:
-        replay = next((values for name, values in self._values.items() if "push_replay" in name), {})
+        replay = self._of("replay")
         table = Table(title=f"Online validation (99 % of messages at most {replay.get('late_p99_us', '–')} µs late)")
         for column in ("model", *COLUMNS):
             table.add_column(column, justify="right")
         for name in self._models():
-            table.add_row(name, *(self._validator().get(f"{name} {column}", "-") for column in COLUMNS))
+            table.add_row(name, *(self._of("validation").get(f"{name} {column}", "-") for column in COLUMNS))
         return table

@@ -34,9 +34,14 @@ class Level(Enum):
 
 
 def diagnostic_status(
-    name: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str = ""
+    node: str, subject: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str
 ) -> DiagnosticStatus:
-    """The status of one component. Floats get six digits, lists commas; None becomes '-'."""
+    """The status of one subject of a node, named `NODE: SUBJECT` as diagnostic_updater names its tasks.
+
+    node: its fully qualified name. hardware_id: name of the rig, model or recording that the status is about, '' while
+    there is none. Of the values, floats get six digits, lists commas; None becomes '-'.
+    """
+    name = f"{node}: {subject}"
     pairs = [KeyValue(key=key, value=_text(value)) for key, value in values.items()]
     return DiagnosticStatus(level=level.value, name=name, message=message, hardware_id=hardware_id, values=pairs)
 

@@ -4,23 +4,8 @@
 #
 #   scripts/install_tf2_msgs.sh [PREFIX]     PREFIX: a folder to install into instead (pip's --prefix)
 set -eu
-interfaces=$(cd "$(dirname "$0")/../push_predictor_interfaces" && pwd)
 source=$(mktemp -d)
 trap 'rm -rf "$source"' EXIT
 mkdir "$source/msg"
 echo 'geometry_msgs/TransformStamped[] transforms' >"$source/msg/TFMessage.msg"
-cp "$interfaces/ros_wheels.cmake" "$source"
-for file in pyproject.toml package.xml; do
-    sed -e 's/push_predictor_interfaces/tf2_msgs/' -e 's/push-predictor-interfaces/tf2-msgs/' "$interfaces/$file" >"$source/$file"
-done
-cat >"$source/CMakeLists.txt" <<'CMAKE'
-cmake_minimum_required(VERSION 3.15...3.28)
-project(tf2_msgs)
-find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-find_package(geometry_msgs REQUIRED)
-rosidl_generate_interfaces(${PROJECT_NAME} "msg/TFMessage.msg" DEPENDENCIES geometry_msgs)
-ament_export_dependencies(rosidl_default_runtime)
-ament_package()
-CMAKE
-python -m pip install --quiet --no-deps ${1:+--prefix "$1"} "$source"
+"$(dirname "$0")/install_interfaces.sh" tf2_msgs geometry_msgs "$source" "$@"

@@ -138,7 +138,8 @@ def _windows(diagnostics: Mapping[str, Mapping[str, str]]) -> int:
 
 
 def _of(diagnostics: Mapping[str, Mapping[str, str]], node: str) -> Mapping[str, str]:
-    return next((values for name, values in diagnostics.items() if node in name), {})
+    """The latest values of a node, from the status `/NODE: SUBJECT`."""
+    return next((values for name, values in diagnostics.items() if name.startswith(f"/{node}: ")), {})
 
 
 def _with_children(nodes: Mapping[str, int]) -> dict[str, int]:

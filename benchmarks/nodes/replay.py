@@ -14,25 +14,32 @@
 
 """Does a replay keep its rate and lose nothing? Compares received messages with recorded ones.
 
-    python -m benchmarks.nodes.replay [--seconds 60] [--rate 1] [--depth 1000]
+    python -m benchmarks.nodes.replay [--seconds 60] [--rate 1] [--depth 1000] [--rounds 1]
 
 Simulates pushes with poses at 250 Hz and a wrench at 125 Hz, replays them with push_replay in a separate process and
-subscribes here. The node reports its lateness; the machine's load is printed. --depth is that of the subscriber's
-queues, 0 keeps all messages.
+subscribes here. --depth is that of the subscriber's queues, 0 keeps all messages.
+
+The lateness that the node reports is compared with that of two bare loops over the same deadlines (bare_loop.py): one
+sleeps, the other sleeps and publishes. The three take turns in each round, in processes of their own, so that a busy
+machine delays all of them. Prints p50 and p99 of each round, the medians over the rounds, their ratios and the load.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import re
+import statistics
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
+from typing import TypeAlias
 
 import numpy as np
 import rclpy
@@ -48,11 +55,12 @@ from push_predictor.simulation.rig_simulator import SimulationSpec, simulate
 from push_predictor.simulation.sensors import Sensors
 
 TOPICS = {"/slider/pose": PoseStamped, "/pusher/pose": PoseStamped, "/pusher/wrench": WrenchStamped}
+Figures: TypeAlias = tuple[float, float]  # p50 and p99 of the lateness, us
 SECONDS_A_PUSH = 2.0  # at least, at 20 mm/s over 30 mm
 
 
 def main() -> int:
-    """Replay and compare; the exit status is 0 if every message arrived once, in order, unchanged."""
+    """Replay and compare; the exit status is 0 if every message of a replay arrived once, in order, unchanged."""
     options = _options()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", "78")
@@ -61,17 +69,26 @@ def main() -> int:
         plan = random_pushes(int(options.seconds / SECONDS_A_PUSH) + 2, [0.02], 0.03, np.random.default_rng(0))
         sensors = Sensors(rate=250.0, wrench_rate=125.0)
         write_recording(bag, simulate(SimulationSpec("rect1", "abs", plan, sensors=sensors, name="pushes")))
-        print(f"load average {os.getloadavg()[0]:.1f} before", flush=True)
-        with _subscribed(options.depth) as received:
-            status = _replay(bag, options.rate, options.seconds)
-        print(f"load average {os.getloadavg()[0]:.1f} after, {os.cpu_count()} cores")
-        return status or _compare(bag, received, options.seconds)
+        wrong, figures = 0, {name: list[Figures]() for name in ("push_replay", "publish", "sleep")}
+        for number in range(options.rounds):
+            print(f"round {number + 1}: load average {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores", flush=True)
+            with _subscribed(options.depth) as received:
+                figures["push_replay"].append(_replay(bag, options.rate, options.seconds))
+            wrong += _compare(bag, received, options.seconds)
+            with _subscribed(options.depth):
+                figures["publish"].append(_bare_loop("publish", bag, options.rate, options.seconds))
+            figures["sleep"].append(_bare_loop("sleep", bag, options.rate, options.seconds))
+            for name, found in figures.items():
+                print(f"    {name:12s} late p50 {found[-1][0]:.0f} us, p99 {found[-1][1]:.0f} us", flush=True)
+        _print_ratios(figures)
+        return 1 if wrong else 0
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0, help="of recorded time (default %(default)s)")
     parser.add_argument("--rate", type=float, default=1.0, help="of the replay (default %(default)s)")
+    parser.add_argument("--rounds", type=int, default=1, help="of the three (default %(default)s)")
     parser.add_argument("--depth", type=int, default=1000, help="of the subscriber's queues (default %(default)s)")
     return parser.parse_args()
 
@@ -109,7 +126,8 @@ def _spin(executor: SingleThreadedExecutor) -> None:
         return
 
 
-def _replay(bag: Path, rate: float, seconds: float) -> int:
+def _replay(bag: Path, rate: float, seconds: float) -> Figures:
+    """The lateness that a replay reports at its end."""
     parameters = {
         "recording": bag,
         "play.rate": rate,
@@ -119,7 +137,32 @@ def _replay(bag: Path, rate: float, seconds: float) -> int:
     }
     assigned = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
     command = [sys.executable, "-m", "push_predictor.nodes.push_replay", "--ros-args", *assigned]
-    return subprocess.run(command, check=False).returncode
+    printed = subprocess.run(command, check=True, stderr=subprocess.PIPE, text=True).stderr
+    print(printed, end="", flush=True)
+    (found,) = re.findall(r"finished: .*late p50 (\d+) us, p99 (\d+) us", printed)
+    return float(found[0]), float(found[1])
+
+
+def _bare_loop(kind: str, bag: Path, rate: float, seconds: float) -> Figures:
+    """The lateness of a bare loop over the same deadlines."""
+    options = ["--rate", str(rate), "--seconds", str(seconds)]
+    command = [sys.executable, "-m", "benchmarks.nodes.bare_loop", kind, str(bag), *options]
+    found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+    return found["p50"], found["p99"]
+
+
+def _print_ratios(figures: Mapping[str, Sequence[Figures]]) -> None:
+    """Print the medians over the rounds, and those of the replay over those of the bare loops."""
+    medians = {
+        name: [statistics.median(values) for values in zip(*found, strict=True)] for name, found in figures.items()
+    }
+    ours = medians["push_replay"]
+    for name, (p50, p99) in medians.items():
+        ratios = f"push_replay is {ours[0] / p50:.2f} and {ours[1] / p99:.2f} times as late"
+        print(
+            f"{name:12s} median late p50 {p50:.0f} us, p99 {p99:.0f} us"
+            + ("" if name == "push_replay" else f"; {ratios}")
+        )
 
 
 def _compare(bag: Path, received: dict[str, list[bytes]], seconds: float) -> int:

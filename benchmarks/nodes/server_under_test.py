@@ -84,7 +84,7 @@ class Caller:
             self.executor.spin_once(timeout_sec=seconds)
 
     def reported(self, node_name: str) -> dict[str, str]:
-        """The next diagnostic status of the node of that name."""
+        """The next diagnostic status of the node whose fully qualified name begins with that name."""
         self.diagnostics.clear()
         self.spin_until(lambda: any(name.startswith(node_name) for name in self.diagnostics), 10.0)
         return next(values for name, values in self.diagnostics.items() if name.startswith(node_name))

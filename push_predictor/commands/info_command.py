@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from push_predictor.commands.common.options import add_command, add_rig, add_topics, save_topics_of, topics_of
-from push_predictor.commands.common.output import write_json
+from push_predictor.commands.common.output import check_output, write_json
+from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
     from push_predictor.types import Array
@@ -46,6 +48,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
     add_rig(parser)
+    parser.add_argument(
+        "--rig-out", type=Path, metavar="FILE.yaml", help="write the recorded push_rig record as rig file"
+    )
     add_topics(parser)
     parser.set_defaults(run=run)
 
@@ -61,6 +66,8 @@ def run(options: argparse.Namespace) -> None:
     path: Path = options.file
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
+    if options.rig_out is not None:
+        _write_rig(options)
     if is_recording(path):
         found = describe_recording(path, topics_of(options), load_rig(options.rig) if options.rig else None)
         save_topics_of(options, [path])
@@ -72,6 +79,19 @@ def run(options: argparse.Namespace) -> None:
         found = _describe_model(path)
     if not write_json(options, found):
         _print(found)
+
+
+def _write_rig(options: argparse.Namespace) -> None:
+    """Write the recorded rig, whatever --rig is. Raises RigError for a recording without one."""
+    from push_predictor.recordings.load import required_rig
+    from push_predictor.recordings.rig import save_rig
+    from push_predictor.recordings.table_file import is_recording
+
+    check_output("--rig-out", options.rig_out, force=options.force)
+    if not is_recording(options.file):
+        raise RequestError("--rig-out", str(options.rig_out), f"it with a recording: {options.file} is none")
+    save_rig(required_rig(options.file), options.rig_out)
+    print(f"rig: {options.rig_out}", file=sys.stderr)
 
 
 def _describe_model(path: Path) -> dict[str, object]:

@@ -80,8 +80,9 @@ class PredictServer(LifecycleNode):
         self._closing = Event()
         self._starting = False
         self._state = "unconfigured"
+        self._first_default = self.value("default_model")
         self._frames = RequestFrames(self, self.value("world_frame"))
-        self._trace = TraceAction(self, self._deployed, lambda: float(self.value("trace_alpha")))
+        self._trace = TraceAction(self, self._deployed, lambda: float(self.value("trace_alpha")), lambda: self._state)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._diagnostics_thread = PeriodicThread(
             self.value("diagnostics_period"), self._publish_diagnostics, self._log_diagnostics_error
@@ -177,8 +178,9 @@ class PredictServer(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Unload the models and destroy the services."""
+        """Unload the models, forget the default that was set since the start, destroy the services."""
         self._unload("unconfigured")
+        self.set_parameters([Parameter("default_model", value=self._first_default)])
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -253,9 +255,7 @@ class PredictServer(LifecycleNode):
         raise InactiveError(f"the node is {self._state}: {'activate it' if registry.names else NO_MODEL}")
 
     def _deployed(self, name: str) -> PushModel:
-        """The model to be traced. Raises RequestError, or InactiveError."""
-        if self._state != "active":
-            self._refuse_inactive(self._registry, None, None)
+        """The model to be traced. Raises RequestError."""
         return self._registry.get(name).model
 
     def _guarded(self, handler: Handler, request: Any, response: Any) -> Any:
@@ -279,7 +279,8 @@ class PredictServer(LifecycleNode):
 
     def _check_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         for parameter in changed:
-            if parameter.name == "default_model" and parameter.value not in ("", *self._registry.names):
+            known = self._state == "unconfigured" or parameter.value in ("", *self._registry.names)
+            if parameter.name == "default_model" and not known:
                 error = RequestError(parameter.name, parameter.value, self._registry.accepted)
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

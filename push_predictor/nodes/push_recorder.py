@@ -94,7 +94,8 @@ class PushRecorder(Node):
 
     def _publish(self) -> None:
         with self._working:
-            status = recorder_status(self.get_fully_qualified_name(), self._recording.progress(monotonic()))
+            name, progress = self.get_fully_qualified_name(), self._recording.progress(monotonic())
+            status = recorder_status(name, progress, self._rigs.rig)
         self._publisher.publish(diagnostic_array(self.get_clock().now().nanoseconds, status))
 
 

@@ -35,7 +35,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from msg_adapters.diagnostics import Level, diagnostic_array, diagnostic_status
-from push_predictor.errors import RigError
+from push_predictor.errors import RequestError, RigError
 from push_predictor.nodes.qos import KEPT, LATCHED, read_overrides
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor.nodes.replay.parameters import read_options
@@ -44,6 +44,7 @@ from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.check_process import CheckProcess
 from push_predictor.recordings.bag.reader import Bag, RawMessage, open_bag
 from push_predictor.recordings.rig import RECORD_NAME, load_rig, rig_from_record
+from push_predictor.replay.capacity import measure_capacity
 from push_predictor.replay.clock import SECOND, PlayerClock, SystemClock, reduce_timer_slack
 from push_predictor.replay.flow_control import FlowControl
 from push_predictor.replay.options import ReplayOptions
@@ -66,6 +67,7 @@ class PushReplay(Node):
         self._ending = threading.Event()
         self._options = options = read_options(self)
         bag = open_bag(options.recording)
+        _check_storage(options.storage, bag)
         self._restamper = Restamper() if options.restamp else None
         self._topics = self._open_topics(bag)
         self._source = BagSource(bag, tuple(self._topics.senders))
@@ -76,9 +78,9 @@ class PushReplay(Node):
         self._acknowledged: bool | None = None
         self._checks = CheckProcess(options.strict)
         self._player = self._make_player(options)
-        self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._check(bag)
         self._start_reporting()
+        self._controls = ReplayControls(self, self._player, restamps=options.restamp)
         self._threads = [threading.Thread(target=self._guarded, args=(w,)) for w in (self._play, self._publish_time)]
         for thread in self._threads:
             thread.start()
@@ -87,6 +89,7 @@ class PushReplay(Node):
         """Stop the playback and publish the last report."""
         self._ending.set()
         self._player.close()
+        self._controls.close()
         self._checks.stop()
         for thread in self._threads:
             thread.join()
@@ -144,7 +147,7 @@ class PushReplay(Node):
 
     def _publish(self, message: RawMessage) -> bool:
         untimed = self._options.clock_frequency > 0.0 and message.topic in self._topics.untimed
-        if self._options.clock_with_topics or untimed:
+        if self._options.triggers_clock(message.topic) or untimed:
             self._publish_clock(message.log_time)
         return self._topics.send(message)
 
@@ -170,11 +173,23 @@ class PushReplay(Node):
 
     def _play(self) -> None:
         reduce_timer_slack()
+        self._log_capacity()
         self._wait_for_subscribers()
         self._player.play(self._options.range)
         gc.collect()
         gc.freeze()  # objects that exist by now need no further collection while messages wait
         self._player.run()
+
+    def _log_capacity(self) -> None:
+        """State how many messages per second the rate requires, and what this machine can play."""
+        rate, found = self._options.rate, measure_capacity(self._source, SystemClock())
+        if found is None:
+            return
+        if rate > found.largest_rate:
+            late = f"play.rate {rate:g} is above the limit of this machine: messages will be late, none is dropped"
+            self.get_logger().warning(f"{late}. {found.to_text(rate)}")
+        else:
+            self.get_logger().info(found.to_text(rate))
 
     def _wait_for_subscribers(self) -> None:
         senders = self._topics.senders
@@ -237,10 +252,10 @@ class PushReplay(Node):
         )
 
     def _publish_report(self, report: ReplayReport) -> None:
-        name = f"{self.get_fully_qualified_name().lstrip('/')}: replay"
         level = Level.ERROR if self._checks.failed else Level.WARN if report.warnings else Level.OK
         message = "; ".join(report.warnings) or report.state
-        status = diagnostic_status(name, level, message, report.values, self._options.recording.name)
+        name, recording = self.get_fully_qualified_name(), self._options.recording.name
+        status = diagnostic_status(name, "replay", level, message, report.values, recording)
         self._diagnostics.publish(diagnostic_array(time.time_ns(), status))
 
 
@@ -249,6 +264,13 @@ def main() -> int:
     # By default Fast DDS asks subscribers only every 3 s what they lack; a fast replay overwrites it in that time.
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(share_path("config", "fastdds_replay.xml")))
     return run("push_replay", PushReplay)
+
+
+def _check_storage(wanted: str, bag: Bag) -> None:
+    """Raise RequestError if the parameter storage.storage_id does not fit the recording."""
+    if wanted and wanted != bag.storage:
+        reason = f"the format of {bag.path}" if bag.storage else f"rosbag2 has no name for the format of {bag.path}"
+        raise RequestError("storage.storage_id", wanted, f"{bag.storage!r}, {reason}")
 
 
 def _size(path: Path) -> int:

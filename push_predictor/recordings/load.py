@@ -76,7 +76,7 @@ def load_rig_for(paths: Sequence[Path], rig_file: Path | None = None) -> Rig:
         return load_rig(Path(rig_file))
     if not paths:
         raise RigError(f"{RECORD_NAME}: neither data nor a rig was given; {HOW_TO_GIVE}")
-    first, *others = [(path, _rig_of(Path(path))) for path in paths]
+    first, *others = [(path, required_rig(Path(path))) for path in paths]
     for path, rig in others:
         if _geometry(rig) != _geometry(first[1]):
             raise RigError(f"{path}: outline or pusher ({rig.shape}) differ from {first[0]} ({first[1].shape})")
@@ -120,7 +120,8 @@ def known_rig(path: Path) -> Rig | None:
     return recorded_rig(open_bag(path)) if is_recording(path) else rig_of_table(path)
 
 
-def _rig_of(path: Path) -> Rig:
+def required_rig(path: Path) -> Rig:
+    """The rig of a recording or of a table. Raises RigError without one."""
     if (rig := known_rig(path)) is None:
         place = "the recording" if is_recording(path) else str(rig_path(path))
         raise RigError(f"{path}: no {RECORD_NAME} in {place}; {HOW_TO_GIVE}")

@@ -45,7 +45,11 @@ class TopicFilter:
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """The options of a replay; times in ns."""
+    """The options of a replay; times in ns.
+
+    storage: rosbag2's name of the recording's format, empty for any. clock_triggers: topics before whose messages
+    /clock is published if clock_with_topics, empty for all.
+    """
 
     recording: Path
     rig: Path | None
@@ -60,17 +64,21 @@ class ReplayOptions:
     delay: int
     clock_frequency: float
     clock_with_topics: bool
+    clock_triggers: tuple[str, ...]
+    storage: str
     filter: TopicFilter
     qos_overrides: Path | None
     window: int
     acked_timeout: int
     strict: bool
 
+    def triggers_clock(self, topic: str) -> bool:
+        """Whether /clock is published with the log time before each message of a topic."""
+        return self.clock_with_topics and (not self.clock_triggers or _listed(topic, self.clock_triggers))
+
 
 def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
     """The options for parameter values by name and times (ns) by name. Raises RequestError for a wrong value."""
-    if not values["recording"]:
-        raise RequestError("recording", "", "an MCAP file or the folder of a rosbag2 MCAP bag")
     if values["restamp"] and values["play.rate"] != 1.0:
         accepted = "1.0, which restamp requires, or restamp false"
         raise RequestError("play.rate", values["play.rate"], accepted)
@@ -82,7 +90,7 @@ def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> Repla
 
 def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
     return ReplayOptions(
-        recording=Path(values["recording"]).expanduser(),
+        recording=_recording(values),
         rig=_path(values["rig"]),
         restamp=values["restamp"],
         spin=values["spin_us"] * 1000,
@@ -99,12 +107,24 @@ def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptio
         delay=times["play.delay"],
         clock_frequency=values["play.clock_publish_frequency"],
         clock_with_topics=values["play.clock_publish_on_topic_publish"],
+        clock_triggers=tuple(values["play.clock_trigger_topics"]),
+        storage=values["storage.storage_id"],
         filter=_filter(values),
         qos_overrides=_path(values["play.qos_profile_overrides_path"]),
         window=values["play.read_ahead_queue_size"],
         acked_timeout=times["play.wait_acked_timeout"],
         strict=values["strict"],
     )
+
+
+def _recording(values: Mapping[str, Any]) -> Path:
+    paths = {Path(values[name]).expanduser() for name in ("recording", "storage.uri") if values[name]}
+    if not paths:
+        raise RequestError("recording", "", "an MCAP file or the folder of a rosbag2 MCAP bag")
+    if len(paths) > 1:
+        accepted = f"one recording: recording is {values['recording']!r}"
+        raise RequestError("storage.uri", values["storage.uri"], accepted)
+    return paths.pop()
 
 
 def _filter(values: Mapping[str, Any]) -> TopicFilter:

@@ -30,6 +30,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from repository import REPOSITORY
 
 from push_predictor import __version__
@@ -38,7 +40,7 @@ from push_predictor.evaluation.offline import validate_recording
 from push_predictor.evaluation.validation import compare, metrics_json
 from push_predictor.models.predictors import MechanicsPredictor
 from push_predictor.models.store.model_file import load_model
-from push_predictor.recordings.load import load_data
+from push_predictor.recordings.load import known_rig, load_data
 from push_predictor.recordings.rig import load_rig
 from push_predictor.recordings.table_file import read_table, write_table
 
@@ -372,6 +374,49 @@ def test_info_takes_a_rig(place: Place, run, tmp_path: Path):
     sizes = ("--circle", "0.1", "--tip-radius", "0.004", "--surface", "abs", "--mass", "1.0")
     run("rig", *sizes, "--out", rig)
     assert "circle on abs" in str(run("info", place.path("test.mcap"), "--rig", rig, "--json", "-").json["rig"])
+
+
+def test_info_saves_the_rig_of_a_recording_that_loses_it_by_conversion(place: Place, run, tmp_path: Path):
+    whole, bare, rig = (
+        place.path("test.mcap"),
+        str(converted(Path(place.path("test.mcap")), tmp_path)),
+        tmp_path / "r.yaml",
+    )
+    assert_one_line(run("info", bare, "--rig-out", str(rig)), "info", ["converted.mcap", "no push_rig"])
+    assert not rig.exists()
+    saved = run("info", whole, "--rig-out", str(rig))
+    assert saved.status == 0 and saved.err == f"rig: {rig}\n"
+    assert load_rig(rig).to_record() == known_rig(Path(whole)).to_record()
+    assert run("info", bare, "--json", "-").json["rig"].startswith("none")
+    with_rig = run("info", bare, "--rig", str(rig), "--json", "-").json
+    assert with_rig | {"recording": ""} == run("info", whole, "--json", "-").json | {"recording": ""}
+
+
+def converted(bag: Path, folder: Path) -> Path:
+    """The messages of a bag alone, as other tools copy them: without the metadata records."""
+    path = folder / "converted.mcap"
+    with bag.open("rb") as source, path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channels: dict[str, int] = {}
+        for schema, channel, message in make_reader(source).iter_messages():
+            if channel.topic not in channels:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", kind, channel.metadata)
+            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    return path
+
+
+def test_info_writes_a_rig_only_of_a_recording_and_over_no_file(place: Place, run, tmp_path: Path):
+    rig, old = str(tmp_path / "rig.yaml"), tmp_path / "old.yaml"
+    assert_one_line(run("info", place.path("test.csv"), "--rig-out", rig), "info", ["--rig-out", "test.csv is none"])
+    old.write_text("mine\n")
+    refused = run("info", place.path("test.mcap"), "--rig-out", str(old))
+    assert_one_line(refused, "info", ["--rig-out", "--force to overwrite"])
+    assert old.read_text() == "mine\n"
+    assert run("info", place.path("test.mcap"), "--rig-out", str(old), "--force").status == 0
+    assert load_rig(old).shape == "rect1"
 
 
 def test_info_reports_a_damaged_recording(place: Place, run, tmp_path: Path):

@@ -107,7 +107,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
 def _counted(both: Both, cell: str) -> bool:
     """Whether all residuals of a cell were received, and its diagnostics count all windows and requests."""
     total = _windows(both, cell)
-    judged = both.diagnostics[f"{cell}/push_validator"].get("robot windows") == str(total)
+    judged = both.diagnostics[f"{cell}/push_validator: validation"].get("robot windows") == str(total)
     return judged and _served(both, cell) >= total + 40 and len(both.received[cell].residuals) >= total
 
 
@@ -183,11 +183,11 @@ def test_each_topic_carries_the_data_of_its_namespace(both: Both):
 
 
 def test_diagnostics_distinguish_the_robots(both: Both):
-    names = sorted(name.lstrip("/") for name in both.diagnostics)
-    ends = ("push_predictor: predictions", "push_replay: replay", "push_validator")
-    assert names == [f"{cell.strip('/')}/{end}" for cell in CELLS for end in ends]
+    names = sorted(both.diagnostics)
+    ends = ("push_predictor: predictions", "push_replay: replay", "push_validator: validation")
+    assert names == [f"{cell}/{end}" for cell in CELLS for end in ends]
     for cell in CELLS:
-        total, judged = _windows(both, cell), both.diagnostics[f"{cell}/push_validator"]
+        total, judged = _windows(both, cell), both.diagnostics[f"{cell}/push_validator: validation"]
         assert judged["robot windows"] == str(total)
         # Once each, except requests repeated after 2 s without an answer.
         assert total + 40 <= _served(both, cell) <= total + 40 + int(judged["timeouts"])

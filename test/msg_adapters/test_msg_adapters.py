@@ -225,12 +225,12 @@ def test_rejects_a_covariance_that_is_not_positive_definite():
 
 def test_a_status_names_its_values():
     values = {"p99_us": 123.456789, "models": ["a", "b"], "last": None, "active": True, "served": 12}
-    status = diagnostic_status("predict_server", Level.WARN, "one model failed", values, "rig")
+    status = diagnostic_status("/cell/server", "predictions", Level.WARN, "one model failed", values, "rig")
     array = over_the_wire(diagnostic_array(3 * 10**9 + 5, status))
     assert stamp_to_ns(array.header.stamp) == 3 * 10**9 + 5
     (back,) = array.status
     assert (back.name, back.level, back.message, back.hardware_id) == (
-        "predict_server",
+        "/cell/server: predictions",
         Level.WARN.value,
         "one model failed",
         "rig",

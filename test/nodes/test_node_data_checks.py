@@ -48,6 +48,8 @@ def test_a_force_of_the_wrong_sign_is_reported_by_both_nodes(tmp_path: Path) -> 
             for status in (received, played):
                 status.wait_for_message("change the sign", 120.0)
             assert (received.values["data check"], played.values["data_check"]) == ("wrench_sign", "wrench_sign")
+            assert received.identity == ("/push_validator: validation", "hex")
+            assert played.identity == ("/push_replay: replay", "wrong")
             assert (received.all[-1][0], played.all[-1][0]) == (DiagnosticStatus.ERROR, DiagnosticStatus.WARN)
             assert replay.text().count("change the sign") == 1
         assert validator.text().count("change the sign") >= 1

@@ -16,11 +16,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
-import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +27,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from lab_bags import Lab, robot_in_tf, short_recording
 from ros_harness import free_domain, node_process, ros_context
 from sensor_msgs.msg import JointState
+from standard_interfaces import provide_interfaces
 from validator_bench import WRITTEN, Status, assert_same_as_offline, replaying
 
 from push_predictor.models.store.model_file import save_model
@@ -78,16 +75,9 @@ def parameters(rig: Rig, output: Path) -> dict[str, object]:
 
 
 @pytest.fixture
-def tf_installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def tf_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """tf2_msgs for the nodes: installed, or in the folder PUSH_PREDICTOR_TF2_MSGS (scripts/install_tf2_msgs.sh)."""
-    prefix = os.environ.get("PUSH_PREDICTOR_TF2_MSGS")
-    if importlib.util.find_spec("tf2_msgs") is None and not prefix:
-        pytest.skip("tf2_msgs is not installed: scripts/install_tf2_msgs.sh FOLDER, PUSH_PREDICTOR_TF2_MSGS=FOLDER")
-    if prefix:
-        site = Path(prefix, "lib", f"python{sys.version_info.major}.{sys.version_info.minor}", "site-packages")
-        for name, folder in (("PYTHONPATH", site), ("LD_LIBRARY_PATH", Path(prefix, "lib"))):
-            monkeypatch.setenv(name, os.pathsep.join(filter(None, [str(folder), os.environ.get(name)])))
-    yield
+    provide_interfaces("tf2_msgs", monkeypatch)
 
 
 def test_best_effort_transforms_give_the_windows_of_the_recording_after_a_wrong_type(tmp_path: Path) -> None:

@@ -29,6 +29,8 @@ import ros_harness as harness
 import yaml
 from lifecycle_msgs.msg import Transition
 from rcl_interfaces.srv import DescribeParameters
+from rclpy.action import ActionClient
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from server_bench import GOOD, MANY, server_of
@@ -55,7 +57,8 @@ from push_predictor.nodes.server.prediction_services import MAX_PUSHES, handle_p
 from push_predictor.planning.given_earlier import EarlierWindows, given_earlier
 from push_predictor.planning.persistence import Persistence, root_of
 from push_predictor.recordings.table import empty_table
-from push_predictor_interfaces.srv import LoadModel, PredictPush, PredictPushBatch
+from push_predictor_interfaces.action import TraceResidual
+from push_predictor_interfaces.srv import ListModels, LoadModel, PredictPush, PredictPushBatch
 
 CORNERS = np.array([[0.04, 0.04, 0.25], [-0.04, 0.04, 0.25], [-0.04, -0.04, 0.25], [0.04, -0.04, 0.25]])
 CONFIG = harness.REPOSITORY / "config" / "predict_server.yaml"
@@ -466,15 +469,17 @@ def test_missing_default_model_is_not_replaced_by_another(folder):
 # --- life cycle, parameters, diagnostics ------------------------------------------------------------------------
 
 
-def test_inactive_node_refuses_requests(folder):
+def test_only_an_active_node_answers_requests_and_accepts_goals(folder):
     with server_of([folder / "gp.model"], autostart=False) as server:
-        assert server.state() == "unconfigured"
+        accepted = _goal_client(server)
+        assert server.state() == "unconfigured" and not accepted()
         assert server.change(Transition.TRANSITION_CONFIGURE)
         for step in (None, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE):
             if step is not None:
                 assert server.change(step)
             active = step == Transition.TRANSITION_ACTIVATE
             assert server.push().success == server.batch(MANY).success == active
+            assert accepted() == active
             assert list(server.list().names) == ["gp"]
         refused = server.push()
         assert refused.message == "the node is inactive: activate it" and refused.error_code == refused.NOT_ACTIVE
@@ -484,7 +489,44 @@ def test_inactive_node_refuses_requests(folder):
         assert server.change(Transition.TRANSITION_ACTIVATE)
         assert server.push().success
         assert server.change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
-        assert server.state() == "finalized"
+        assert server.state() == "finalized" and not accepted()
+        assert "goal rejected, the node is finalized" in server.process.text()
+
+
+def _goal_client(server):
+    """Whether a goal of trace_residual without data is accepted, as a function."""
+    client = ActionClient(server.node, TraceResidual, "trace_residual")
+    harness.acquaint(server.node, "push_predictor")
+
+    def accepted():
+        sent = harness.in_spin(server.node, lambda: client.send_goal_async(TraceResidual.Goal()))
+        assert harness.wait_until(sent.done)
+        return sent.result().accepted
+
+    return accepted
+
+
+def test_cleanup_forgets_loaded_models_and_a_default_set_since_the_start(folder, monkeypatch):
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    arguments = ["--ros-args", "-p", f"models:=['{folder / 'gp.model'}']", "-p", "default_model:=gp"]
+    rclpy.init(args=arguments, domain_id=harness.free_domain(), signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = predict_server.started_server(Stop())
+        wanted = LoadModel.Request(path=str(folder / "analytical.model"), make_default=True)
+        assert node._on_load(wanted, LoadModel.Response()).success
+        assert node.value("default_model") == "analytical"
+        node.trigger_deactivate()
+        node.trigger_cleanup()
+        assert node.value("default_model") == "gp"
+        node.trigger_configure()
+        node.trigger_activate()
+        listed = node._on_list(ListModels.Request(), ListModels.Response())
+        assert (list(listed.names), listed.default_model) == (["gp"], "gp")
+        assert node._on_push(query_to_request("", GOOD, 0.2), PredictPush.Response()).success
+        assert not node.set_parameters([Parameter("default_model", value="analytical")])[0].successful
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
 
 
 def test_activation_fails_without_a_model():
@@ -544,7 +586,7 @@ def test_diagnostics_count_answered_and_refused_requests(server):
         lambda s: {p.key: p.value for p in s.values}["requests_refused"] == str(refused)
     )
     assert status.level == b"\0"
-    assert "push_predictor" in status.name
+    assert (status.name, status.hardware_id) == ("/push_predictor: predictions", "gp")
     assert values["requests_served"] == str(tabulated)
     assert values["last_refusal"].startswith("velocity: nan")
     assert values["models"] == "analytical, gp, vhgp"

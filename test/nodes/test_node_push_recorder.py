@@ -75,7 +75,7 @@ class Recorded:
                 status.wait_for("windows", "53")
                 status.wait_for("slider samples", str(len(read_recording(HEXAGON).slider.stamp)))
             self.ended = time.time_ns()
-            self.waiting, self.last = status.all[0][2], status.values
+            self.waiting, self.last, self.identity = status.all[0][2], status.values, status.identity
             self.status, self.text = process.stop(signal.SIGINT), process.text()
 
 
@@ -135,6 +135,7 @@ def test_diagnostics_have_the_state_and_the_figures(recorded: Recorded) -> None:
     assert recorded.last["slider samples"] == "1878"
     assert float(recorded.last["slider rate"]) == pytest.approx(100.0, rel=0.01)
     assert 0.5 < float(recorded.last["share of contact"]) < 0.8
+    assert recorded.identity == ("/push_recorder: recording", "hex")
 
 
 def test_push_replay_plays_it(recorded: Recorded) -> None:

@@ -127,7 +127,7 @@ def replay(
     """A replay that starts when the test has subscribed; parameters with `__` for a dot."""
     domain = free_domain()
     names = {name.replace("__", "."): value for name, value in params.items()}
-    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout.sec": 60, **names}
+    given = {"recording": bag, "wait_for_subscribers": 60.0, "play.wait_acked_timeout": 60.0, **names}
     with ros_context(domain, namespace) as node:
         client = ReplayClient(node)
         with node_process("push_replay", *ros_args, domain=domain, namespace=namespace, params=given) as process:
@@ -199,8 +199,12 @@ def test_another_process_receives_every_message_once_in_order_and_unchanged(
 
 
 def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
-    with replay(second, play__start_paused=True) as (_, client):
+    with replay(second, play__start_paused=True) as (process, client):
         client.wait_for("paused")
+        assert (
+            "626 messages/s recorded, 626 messages/s at rate 1. A free core of this machine plays about"
+            in process.text()
+        )
         begin = time.monotonic()
         service(client, Resume)
         assert wait_until(lambda: client.received == len(push_messages(1.0)))
@@ -213,8 +217,9 @@ def test_replay_keeps_its_pace_and_reports_its_lateness(second: Path) -> None:
 
 def test_too_high_rate_reports_how_far_the_replay_is_behind(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "long.mcap", push_messages(20.0))
-    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (_, client):
+    with replay(bag, play__rate=1.0e6, play__start_paused=True) as (process, client):
         client.wait_for("paused")
+        assert "play.rate 1e+06 is above the limit of this machine" in process.text()
         service(client, Resume)
         report = client.report("finished")
     assert float(report["late_max_us"]) > 1.0e5  # 12 500 messages in 20 us of wall time are impossible
@@ -431,6 +436,13 @@ def test_signals_end_every_state_with_status_0(second: Path, state: str, number:
         ({"rig": "/nowhere.yaml"}, "/nowhere.yaml: the rig cannot be read"),
         ({"play.qos_profile_overrides_path": "/nowhere.yaml"}, "play.qos_profile_overrides_path: '/nowhere.yaml'"),
         ({"qos_overrides./slider/pose.publisher.reliability": "perhaps"}, "reliability"),
+        ({"play.nonsense": 1}, "play.nonsense: 1 is not accepted"),
+        ({"play.delay": 1.0, "play.delay.nsec": 5}, "play.delay: 1.0 is not accepted, give either play.delay in"),
+        ({"storage.uri": "/other.mcap"}, "storage.uri: '/other.mcap' is not accepted, give one recording"),
+        (
+            {"storage.storage_id": "sqlite3"},
+            "storage.storage_id: 'sqlite3' is not accepted, give 'mcap', the format of",
+        ),
     ],
 )
 def test_bad_parameter_ends_in_one_line_and_status_1(

@@ -23,6 +23,7 @@ from typing import Any
 
 import pytest
 
+from push_predictor.nodes.replay import controls
 from push_predictor.nodes.replay.controls import ReplayControls
 from push_predictor_interfaces import srv
 
@@ -42,17 +43,35 @@ NAMES = {
 
 
 class FakeNode:
-    """Records the services that are created on it, and what is logged."""
+    """Records the services that are created on it, and what is logged; `~/stop` is remapped."""
 
     def __init__(self) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
         self.logged: list[str] = []
+        self.companion: Any = None
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         self.services[name] = (kind, callback)
 
+    def resolve_service_name(self, name: str) -> str:
+        return "/halt" if name == "~/stop" else name.replace("~", "/replay")
+
     def get_logger(self) -> Any:
         return SimpleNamespace(warning=self.logged.append, error=self.logged.append)
+
+
+class FakeCompanion:
+    """A companion that records whether it answers."""
+
+    def __init__(self, principal: Any, suffix: str) -> None:
+        self.node, self.state = FakeNode(), "made"
+        principal.companion = self
+
+    def start(self) -> None:
+        self.state = "started"
+
+    def close(self) -> None:
+        self.state = "closed"
 
 
 class FakePlayer:
@@ -96,11 +115,15 @@ class Desk:
 
     def __init__(self, restamps: bool = False) -> None:
         self.node, self.player = FakeNode(), FakePlayer()
-        ReplayControls(self.node, self.player, restamps)  # type: ignore[arg-type]  # fakes
+        self.controls = ReplayControls(self.node, self.player, restamps)  # type: ignore[arg-type]  # fakes
 
     def call(self, name: str, **fields: Any) -> Any:
-        kind, callback = self.node.services[f"~/{name}"]
-        return callback(kind.Request(**fields), kind.Response())
+        return answer(self.node, name, **fields)
+
+
+def answer(node: FakeNode, name: str, **fields: Any) -> Any:
+    kind, callback = node.services[node.resolve_service_name(f"~/{name}")]
+    return callback(kind.Request(**fields), kind.Response())
 
 
 @pytest.fixture(autouse=True)
@@ -110,7 +133,13 @@ def without_rosbag2(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_service_has_a_private_name() -> None:
-    assert {name: kind for name, (kind, _) in Desk().node.services.items()} == {f"~/{n}": k for n, k in NAMES.items()}
+    desk = Desk()
+    assert {name: kind for name, (kind, _) in desk.node.services.items()} == {full_name(n): k for n, k in NAMES.items()}
+    desk.controls.close()  # there is no companion
+
+
+def full_name(name: str) -> str:
+    return FakeNode().resolve_service_name(f"~/{name}")
 
 
 def test_an_accepted_control_has_no_error() -> None:
@@ -189,29 +218,35 @@ def rosbag2(without_rosbag2: None, monkeypatch: pytest.MonkeyPatch) -> Desk:
         setattr(types, kind.__name__, of_rosbag2(kind))
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces", ModuleType("rosbag2_interfaces"))
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", types)
+    monkeypatch.setattr(controls, "CompanionNode", FakeCompanion)
     return Desk()
 
 
-def test_rosbag2s_types_have_names_of_their_own(rosbag2: Desk) -> None:
-    assert set(rosbag2.node.services) == {f"~/{n}" for n in NAMES} | {f"~/rosbag2/{n}" for n in NAMES}
-    types = sys.modules["rosbag2_interfaces.srv"]
+def test_rosbag2s_types_have_the_same_names_on_a_companion(rosbag2: Desk) -> None:
+    types, companion = sys.modules["rosbag2_interfaces.srv"], rosbag2.node.companion
+    assert companion.state == "started"
+    assert set(companion.node.services) == set(rosbag2.node.services) == {full_name(n) for n in NAMES}
     for name, kind in NAMES.items():
-        assert rosbag2.node.services[f"~/rosbag2/{name}"][0] is getattr(types, kind.__name__)
-        assert rosbag2.node.services[f"~/{name}"][0] is kind
+        assert companion.node.services[full_name(name)][0] is getattr(types, kind.__name__)
+        assert rosbag2.node.services[full_name(name)][0] is kind
+    rosbag2.controls.close()
+    assert companion.state == "closed"
 
 
 def test_rosbag2s_services_control_the_same_player(rosbag2: Desk) -> None:
-    assert rosbag2.call("rosbag2/set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
-    assert rosbag2.call("rosbag2/burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
-    assert rosbag2.call("rosbag2/play_next").success
-    rosbag2.call("rosbag2/resume")
+    other = rosbag2.node.companion.node
+    assert answer(other, "set_rate", rate=3.0).success and rosbag2.player.rate == 3.0
+    assert answer(other, "burst", num_messages=2).actually_burst == 2 and rosbag2.player.left == 1
+    assert answer(other, "play_next").success
+    answer(other, "resume")
     assert not rosbag2.player.paused and not rosbag2.call("is_paused").paused
 
 
 def test_a_refusal_needs_only_the_fields_of_rosbag2(rosbag2: Desk) -> None:
-    assert rosbag2.call("rosbag2/set_rate", rate=-1.0).success is False
-    assert rosbag2.call("rosbag2/play").success is False
-    rosbag2.call("rosbag2/resume")
-    assert rosbag2.call("rosbag2/burst").actually_burst == 0
-    rosbag2.call("rosbag2/stop")  # fails, and is logged
+    other = rosbag2.node.companion.node
+    assert answer(other, "set_rate", rate=-1.0).success is False
+    assert answer(other, "play").success is False
+    answer(other, "resume")
+    assert answer(other, "burst").actually_burst == 0
+    answer(other, "stop")  # fails, and is logged
     assert "ZeroDivisionError" in rosbag2.node.logged[-1]

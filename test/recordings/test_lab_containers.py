@@ -77,6 +77,11 @@ def test_each_container_gives_the_windows_of_the_original(tmp_path: Path, write:
     assert_same_windows(read_recording(path, rig=original().rig, topics=topics))
 
 
+@pytest.mark.parametrize(("write", "storage"), [(write_db3, "sqlite3"), (db3_file, "sqlite3"), (bag_file, "")])
+def test_a_bag_knows_rosbag2s_name_of_its_format(tmp_path: Path, write: object, storage: str) -> None:
+    assert open_bag(write(vicon_and_ur(), tmp_path / "lab")).storage == storage  # type: ignore[operator]
+
+
 @pytest.mark.parametrize("write", [write_db3, bag_file])
 def test_a_laboratorys_own_type_is_read_by_the_definition_in_the_bag(tmp_path: Path, write: object) -> None:
     found = read_recording(write(own_type(), tmp_path / "lab"), topics=OWN)  # type: ignore[operator]

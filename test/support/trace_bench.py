@@ -97,7 +97,7 @@ class Server:
 
 
 class Goal:
-    """A goal that was accepted: its feedback so far, its status and result."""
+    """A goal that was sent: whether it was accepted, then its feedback so far, its status and result."""
 
     def __init__(self, node: Node, action: ActionClient, goal: TraceResidual.Goal) -> None:
         assert action.wait_for_server(harness.START_TIMEOUT)
@@ -105,8 +105,9 @@ class Goal:
         sent = harness.in_spin(node, lambda: action.send_goal_async(goal, self._feedback))
         assert harness.wait_until(sent.done, PATIENCE)
         self.handle: Any = sent.result()
-        assert self.handle.accepted
-        self._result = harness.in_spin(node, self.handle.get_result_async)
+        self.accepted = bool(self.handle.accepted)
+        if self.accepted:
+            self._result = harness.in_spin(node, self.handle.get_result_async)
 
     def _feedback(self, message: Any) -> None:
         self.stages.append((message.feedback.stage, message.feedback.progress))

@@ -79,6 +79,7 @@ class Status:
 
     def __init__(self, node: Node, name: str = "push_validator") -> None:
         self._name = name
+        self.identity = ("", "")  # name and hardware_id of the last one
         self.all: list[tuple[bytes, str, dict[str, str]]] = []
         node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, 100)
 
@@ -99,6 +100,7 @@ class Status:
     def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if self._name in status.name:
+                self.identity = status.name, status.hardware_id
                 self.all.append((status.level, status.message, {v.key: v.value for v in status.values}))
 
     @property

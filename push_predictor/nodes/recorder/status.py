@@ -20,9 +20,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from msg_adapters.diagnostics import Level, diagnostic_status
 from push_predictor.online.recorder.progress import Progress
+from push_predictor.recordings.rig import Rig
 
 
-def recorder_status(name: str, progress: Progress) -> DiagnosticStatus:
+def recorder_status(node_name: str, progress: Progress, rig: Rig | None) -> DiagnosticStatus:
     """WARN while something is missing. The message has the problems, the values the figures of every stream."""
     values: dict[str, object] = {"state": "recording" if progress.started else "waiting for messages"}
     values |= {"bag": progress.path, "seconds": progress.seconds, "messages": sum(progress.messages.values())}
@@ -31,4 +32,5 @@ def recorder_status(name: str, progress: Progress) -> DiagnosticStatus:
         values |= {f"{each.name} samples": each.samples, f"{each.name} rate": each.rate}
         values[f"{each.name} largest gap"] = each.largest_gap
     level = Level.WARN if progress.problems else Level.OK
-    return diagnostic_status(name, level, " ".join(progress.problems.values()) or str(values["state"]), values)
+    message = " ".join(progress.problems.values()) or str(values["state"])
+    return diagnostic_status(node_name, "recording", level, message, values, rig.shape if rig else "")

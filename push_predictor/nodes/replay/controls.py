@@ -28,29 +28,35 @@ from rclpy.node import Node
 
 from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import BusyError, NothingLeftError, NotPausedError, PushPredictorError, RequestError
+from push_predictor.nodes.replay.companion import CompanionNode
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 from push_predictor.replay.player import ReplayPlayer
 from push_predictor_interfaces import srv as own_types
 
-ROSBAG2 = "rosbag2"  # private namespace of the services with rosbag2's own types
-
 
 class ReplayControls:
     """The player services of a node, with private names.
 
-    `~/NAME` has this project's type. Where rosbag2_interfaces is installed, `~/rosbag2/NAME` has rosbag2's type: two
-    types of one name exclude each other.
+    `~/NAME` has this project's type. Where rosbag2_interfaces is installed, a companion offers rosbag2's there as well.
     """
 
     def __init__(self, node: Node, player: ReplayPlayer, restamps: bool) -> None:
         self._node, self._player, self._restamps = node, player, restamps
-        self._offer(own_types, "~")
+        self._offer(node, own_types)
+        self._companion: CompanionNode | None = None
         if (rosbag2_types := _imported_rosbag2()) is not None:
-            self._offer(rosbag2_types, f"~/{ROSBAG2}")
+            self._companion = CompanionNode(node, "rosbag2")
+            self._offer(self._companion.node, rosbag2_types)
+            self._companion.start()
 
-    def _offer(self, types: ModuleType, namespace: str) -> None:
-        """Create the services with the types of a package."""
+    def close(self) -> None:
+        """End the companion."""
+        if self._companion is not None:
+            self._companion.close()
+
+    def _offer(self, server: Node, types: ModuleType) -> None:
+        """Create the services with the types of a package on a node."""
         for kind, name, handler in (
             ("Pause", "pause", self._pause),
             ("Resume", "resume", self._resume),
@@ -64,7 +70,8 @@ class ReplayControls:
             ("Seek", "seek", self._seek),
             ("Stop", "stop", self._stop),
         ):
-            self._node.create_service(getattr(types, kind), f"{namespace}/{name}", partial(self._guarded, handler))
+            full_name = self._node.resolve_service_name(f"~/{name}")  # of the node, remapped, also on the companion
+            server.create_service(getattr(types, kind), full_name, partial(self._guarded, handler))
 
     def _guarded(self, handler: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
         """Turn every exception into a refusal: one that left a callback would end the node."""

@@ -21,9 +21,11 @@ from typing import Any
 
 from rclpy.node import Node
 
+from push_predictor.errors import RequestError
 from push_predictor.nodes.parameters import Param, declare, given_value, values_of
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.options import ReplayOptions, replay_options
+from push_predictor.replay.rosbag2_parameters import check_given
 
 _LONGEST = 1.0e10  # s, 300 years: longer than any stamp
 
@@ -37,7 +39,9 @@ def _duration(name: str, default: tuple[int, int], description: str) -> tuple[Pa
 
 
 PARAMETERS: tuple[Param, ...] = (
-    Param("recording", "", "MCAP file, or folder of a rosbag2 MCAP bag, to play"),
+    Param("recording", "", "MCAP file, or folder of a rosbag2 MCAP bag, to play; or give storage.uri"),
+    Param("storage.uri", "", "another name of the parameter recording, that of rosbag2"),
+    Param("storage.storage_id", "", "the format that the recording must have, mcap or sqlite3 (empty: any)"),
     Param("rig", "", "YAML file with the rig; it replaces the push_rig record of the recording"),
     Param("restamp", False, "add one constant offset to all header stamps so that they start now; requires rate 1"),
     Param("spin_us", 0, "busy-wait during the last microseconds before a deadline: less lateness, more CPU", 0, 5000),
@@ -57,8 +61,15 @@ PARAMETERS: tuple[Param, ...] = (
     *_duration("play.playback_duration", (-1, 0), "play this much of the recording (negative: all)"),
     *_duration("play.playback_until_timestamp", (0, -1), "play up to this log time (negative: to the end)"),
     *_duration("play.delay", (0, 0), "wait this long before playing, in each loop"),
-    Param("play.clock_publish_frequency", 40.0, "/clock messages per second of wall time (0: none)", 0.0, 1000.0),
+    Param(
+        "play.clock_publish_frequency",
+        40.0,
+        "/clock messages per second of wall time (0, the default of rosbag2: none)",
+        0.0,
+        1000.0,
+    ),
     Param("play.clock_publish_on_topic_publish", False, "publish /clock with the log time before each message"),
+    Param("play.clock_trigger_topics", [""], "topics before whose messages it does so (empty: all)"),
     Param("play.topics_to_filter", [""], "topics to play (empty: all)"),
     Param("play.regex_to_filter", "", "also play topics that match this regular expression"),
     Param("play.exclude_topics_to_filter", [""], "topics not to play"),
@@ -73,7 +84,8 @@ _DURATIONS = tuple(param.name.removesuffix(".sec") for param in PARAMETERS if pa
 
 
 def read_options(node: Node) -> ReplayOptions:
-    """Declare and read the parameters. Raises RequestError for a value that is not accepted."""
+    """Declare and read the parameters. Raises RequestError for a value, or a name, that is not accepted."""
+    _check_names(node)
     seconds = {name: given_value(node, name) for name in _DURATIONS}
     short = {name: value for name, value in seconds.items() if value is not None}
     shorthand = [Param(name, 0.0, "in seconds", -_LONGEST, _LONGEST) for name in short]
@@ -81,6 +93,19 @@ def read_options(node: Node) -> ReplayOptions:
     declare(node, [*shorthand, *others])
     values = values_of(node, others)
     return replay_options(values, {name: _nanoseconds(name, short, values) for name in _DURATIONS})
+
+
+def _check_names(node: Node) -> None:
+    """Refuse unknown `play.*` and `storage.*`, which ROS would ignore silently."""
+    given = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
+    defaults = {param.name: param.default for param in PARAMETERS}
+    for name in _DURATIONS:
+        pair = [part for part in (f"{name}.sec", f"{name}.nsec") if given.get(part, defaults[part]) != defaults[part]]
+        if name in given and pair:
+            raise RequestError(name, given[name], f"either {name} in seconds or {' and '.join(pair)}")
+    without_effect = check_given(given, {param.name for param in PARAMETERS}.union(_DURATIONS))
+    if without_effect:
+        node.get_logger().info(f"without effect on this replay: {', '.join(without_effect)}")
 
 
 def _nanoseconds(name: str, short: Mapping[str, Any], values: Mapping[str, Any]) -> int:

@@ -19,17 +19,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.node import Node
 
 
 class DeferredAction(ActionServer):
     """Goals execute from their arrival, can be cancelled, and end with `finish`.
 
-    An execute callback that waits would make the executor poll it without a pause. begin: called with every new goal.
+    An execute callback that waits would make the executor poll it without a pause. accepts: whether a goal that arrives
+    now is accepted. begin: called with every accepted goal.
     """
 
-    def __init__(self, node: Node, action_type: Any, name: str, begin: Callable[[Any], None]) -> None:
+    def __init__(
+        self, node: Node, action_type: Any, name: str, accepts: Callable[[], bool], begin: Callable[[Any], None]
+    ) -> None:
         def accepted(goal: Any) -> None:
             goal.execute()
             begin(goal)
@@ -40,6 +43,7 @@ class DeferredAction(ActionServer):
             action_type,
             name,
             execute_callback=lambda goal: None,
+            goal_callback=lambda request: GoalResponse.ACCEPT if accepts() else GoalResponse.REJECT,
             handle_accepted_callback=accepted,
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
         )

@@ -40,7 +40,7 @@ def server_status(
         "problems": "; ".join(problems) or None,
         **statistics.values(),
     }
-    return diagnostic_status(f"{node_name}: predictions", level, message, values)
+    return diagnostic_status(node_name, "predictions", level, message, values, registry.default)
 
 
 def _health(state: str, registry: ModelRegistry, problems: Sequence[str]) -> tuple[Level, str]:

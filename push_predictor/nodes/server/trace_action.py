@@ -76,16 +76,23 @@ class _Job:
 class TraceAction:
     """One trace at a time. model_of: the model of a name, or raises PushPredictorError; alpha: the present level.
 
+    state: the present state of the node; goals are rejected unless it is active.
     All methods except `close` run in the executor's thread.
     """
 
-    def __init__(self, node: Node, model_of: Callable[[str], PushModel], alpha: Callable[[], float]) -> None:
-        self._node, self._model_of, self._alpha = node, model_of, alpha
+    def __init__(
+        self,
+        node: Node,
+        model_of: Callable[[str], PushModel],
+        alpha: Callable[[], float],
+        state: Callable[[], str],
+    ) -> None:
+        self._node, self._model_of, self._alpha, self._state = node, model_of, alpha, state
         self._job: _Job | None = None
         self._timer: Any = None
         self._closing = threading.Event()
         self._validator = ValidatorFolder(node)
-        self._action = DeferredAction(node, TraceResidual, "trace_residual", self._on_goal)
+        self._action = DeferredAction(node, TraceResidual, "trace_residual", self._accepts, self._on_goal)
 
     def close(self) -> None:
         """End a running trace; called from another thread while the executor still spins."""
@@ -107,6 +114,12 @@ class TraceAction:
             self._abort(self._job.goal, reason, ErrorCode.NOT_ACTIVE)
 
     # --- a goal ---------------------------------------------------------------------------------------------
+
+    def _accepts(self) -> bool:
+        """Whether the node is active; ROS gives a client no reason for a rejected goal, so the log has it."""
+        if (state := self._state()) != "active":
+            self._node.get_logger().warning(f"trace_residual: goal rejected, the node is {state}")
+        return state == "active"
 
     def _on_goal(self, goal: Any) -> None:
         self._guarded(goal, lambda: self._begin(goal))

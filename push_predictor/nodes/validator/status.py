@@ -33,6 +33,7 @@ from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.session import SILENCE, Session, State
+from push_predictor.recordings.rig import Rig
 from push_predictor.recordings.windows.stream_faults import describe_faults
 
 SILENT = f"No usable sample for {SILENCE:g} s. Call `~/finish` to write the results."
@@ -66,7 +67,8 @@ class StatusPublisher:
             for problem in problems:
                 self._node.get_logger().warning(problem)
         name, failure = self._node.get_fully_qualified_name(), self._session.failure
-        status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure)
+        rig = self._rigs.rig
+        status = validator_status(name, self._activity(), run, self._sensors, self._client, problems, failure, rig)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
     def _log_topics(self) -> None:
@@ -96,13 +98,14 @@ class StatusPublisher:
 
 
 def validator_status(
-    name: str,
+    node_name: str,
     state: str,
     run: ValidationRun | None,
     sensors: SensorSubscriber,
     client: PredictionClient,
     problems: Sequence[str],
     failure: str,
+    rig: Rig | None,
 ) -> DiagnosticStatus:
     """The status of a validator: ERROR for a failure, a refused topic or refused samples, WARN for a problem.
 
@@ -119,7 +122,8 @@ def validator_status(
     if run is not None:
         values |= _stream_figures(run) | _scores(run) | {"data check": run.checks.check.result}
         values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
-    return diagnostic_status(name, level, _paragraph([failure, *warnings]) or state, values)
+    message = _paragraph([failure, *warnings]) or state
+    return diagnostic_status(node_name, "validation", level, message, values, rig.shape if rig else "")
 
 
 def _paragraph(texts: Sequence[str]) -> str:

@@ -63,6 +63,12 @@ class Bag:
         self._scratch = scratch  # contains decompressed files while the bag is in use
 
     @property
+    def storage(self) -> str:
+        """rosbag2's name of the format: mcap or sqlite3; empty for files that rosbag2 cannot read."""
+        kinds = ((McapFile, "mcap"), (SqliteFile, "sqlite3"))
+        return next((name for kind, name in kinds if isinstance(self.files[0], kind)), "")
+
+    @property
     def topics(self) -> dict[str, str]:
         """{topic: type}, by topic name."""
         merged = {topic: kind for file in self.files[::-1] for topic, kind in file.topics.items()}

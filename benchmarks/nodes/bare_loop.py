@@ -1,0 +1,90 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lateness that a replay can hardly undercut on this machine: that of a bare loop over the same deadlines.
+
+    python -m benchmarks.nodes.bare_loop sleep|publish BAG --rate R --seconds S
+
+Prints p50, p99 and maximum in us as JSON. `sleep` only sleeps until each deadline, `publish` then publishes the
+message. Both read the messages into memory first, and sleep like push_replay: absolute deadlines, timer slack 1 ns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter_ns, sleep
+
+from push_predictor.recordings.bag.reader import RawMessage, open_bag
+from push_predictor.replay.clock import SECOND, reduce_timer_slack
+from push_predictor.replay.lateness import Lateness
+
+PUSH_TOPICS = ("/slider/pose", "/pusher/pose", "/pusher/wrench")
+
+
+def main() -> int:
+    """Run the loop and print the figures; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=("sleep", "publish"))
+    parser.add_argument("bag", type=Path)
+    parser.add_argument("--rate", type=float, default=1.0)
+    parser.add_argument("--seconds", type=float, default=60.0, help="of recorded time")
+    options = parser.parse_args()
+    every = sorted(open_bag(options.bag).messages(), key=lambda message: message.log_time)
+    end = every[0].log_time + options.seconds * SECOND
+    messages = [message for message in every if message.log_time <= end]
+    publish = _publisher(messages) if options.kind == "publish" else lambda message: None
+    late = lateness(messages, options.rate, publish)
+    figures = {"p50": late.percentile(0.5), "p99": late.percentile(0.99), "max": late.maximum}
+    print(json.dumps({name: value / 1000.0 for name, value in figures.items()}))
+    return 0
+
+
+def lateness(messages: list[RawMessage], rate: float, publish: Callable[[RawMessage], object]) -> Lateness:
+    """Sleep until the time of each message, publish it, and note the delay up to then."""
+    reduce_timer_slack()
+    gc.collect()
+    gc.freeze()
+    late, first = Lateness(), messages[0].log_time
+    begin = perf_counter_ns() + SECOND // 100  # the first deadline is not late
+    for message in messages:
+        deadline = begin + round((message.log_time - first) / rate)
+        if (remaining := deadline - perf_counter_ns()) > 0:
+            sleep(remaining / SECOND)
+        publish(message)
+        late.add(perf_counter_ns() - deadline)
+    return late
+
+
+def _publisher(messages: list[RawMessage]) -> Callable[[RawMessage], object]:
+    """A function that publishes a message, once each push topic has a subscriber."""
+    import rclpy
+
+    from push_predictor.nodes.replay.topics import message_class
+
+    rclpy.init()
+    node = rclpy.create_node("bare_loop")
+    topics = {message.topic: message_class(message.type) for message in messages}
+    publishers = {topic: node.create_publisher(kind, topic, 1000) for topic, kind in topics.items()}
+    while not all(publishers[topic].get_subscription_count() for topic in PUSH_TOPICS):
+        sleep(0.01)
+    return lambda message: publishers[message.topic].publish(message.data)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

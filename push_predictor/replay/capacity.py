@@ -1,0 +1,101 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How fast this machine can play a recording, estimated from its first messages before the playback begins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+from push_predictor.recordings.bag.reader import RawMessage
+from push_predictor.replay.clock import SECOND, PlayerClock, SteadyClock
+from push_predictor.replay.play_range import PlayRange
+from push_predictor.replay.player import PlayerOutput, ReplayPlayer
+from push_predictor.replay.source import Source
+
+MOST = 2000  # messages to time; some 30 ms, before the playback begins
+PUBLISHING = 1.7  # time to publish to one subscriber in another process, over that to read (docs/explanation/replay.md)
+_AT_ONCE = 1.0e12  # recorded seconds per second: every message is due
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """Messages per second: recorded, and playable by this machine on a free core to one subscriber."""
+
+    recorded: float
+    playable: float
+
+    @property
+    def largest_rate(self) -> float:
+        """The rate above which the replay falls behind."""
+        return self.playable / self.recorded
+
+    def to_text(self, rate: float) -> str:
+        """One sentence about a replay at this rate."""
+        return (
+            f"{self.recorded:.0f} messages/s recorded, {self.recorded * rate:.0f} messages/s at rate {rate:g}. "
+            f"A free core of this machine plays about {self.playable:.0f} messages/s: rate {self.largest_rate:.3g}"
+        )
+
+
+def measure_capacity(
+    source: Source, wall: SteadyClock, cpu_time: Callable[[], int] = time.thread_time_ns
+) -> Capacity | None:
+    """Play the first messages of a source, MOST of them, to nobody. None if they have no two different times.
+
+    cpu_time: of this thread, ns. A short measurement of wall time would be one of what else the machine does.
+    """
+    times: list[int] = []
+    begin = cpu_time()
+    _play_at_once(_Beginning(source), wall, times)
+    return capacity(times, cpu_time() - begin)
+
+
+def capacity(times: list[int], reading: int) -> Capacity | None:
+    """The capacity of a machine that reads messages of these log times (ns) in `reading` ns of CPU time."""
+    span = max(times) - min(times) if times else 0
+    if not span or reading <= 0:
+        return None
+    return Capacity((len(times) - 1) * SECOND / span, len(times) * SECOND / (reading * (1.0 + PUBLISHING)))
+
+
+class _Beginning:
+    """The first messages of a source."""
+
+    def __init__(self, source: Source) -> None:
+        self._source, self.start = source, source.start
+
+    def messages(self, start: int) -> Iterator[RawMessage]:
+        """The first messages, roughly in order."""
+        return islice(self._source.messages(start), MOST)
+
+
+def _play_at_once(source: Source, wall: SteadyClock, times: list[int]) -> None:
+    """Let a player read and sort all messages and compute their deadlines; adds their log times to `times`."""
+
+    def publish(message: RawMessage) -> bool:
+        times.append(message.log_time)
+        return True
+
+    def announce(state: str) -> None:
+        if state == "finished":
+            player.close()
+
+    output = PlayerOutput(lambda message: None, publish, lambda: None, announce)
+    player = ReplayPlayer(source, PlayerClock(wall, _AT_ONCE), wall, output, MOST // 2, loop=False, delay=0)
+    player.play(PlayRange())
+    player.run()

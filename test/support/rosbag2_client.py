@@ -1,0 +1,53 @@
+# Copyright 2026 The push_predictor authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A client made for rosbag2's player: calls services in turn, and prints the answers as JSON.
+
+python rosbag2_client.py PLAYER NAME:JSON_REQUEST ...
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from ros_harness import call, ros_context
+from rosbag2_interfaces import srv
+
+
+def main() -> None:
+    """Call the services and print `[{field: value}, ...]`."""
+    player, *words = sys.argv[1:]
+    calls = [(name, json.loads(request)) for name, _, request in (word.partition(":") for word in words)]
+    with ros_context(int(os.environ["ROS_DOMAIN_ID"])) as node:
+        # All clients at once: when one is answered, the replay has discovered the others, and no answer is lost.
+        kinds = {name: getattr(srv, name.title().replace("_", "")) for name, _ in calls}
+        clients = {name: node.create_client(kind, f"{player}/{name}") for name, kind in kinds.items()}
+        answers = [call(clients[name], filled(kinds[name].Request(), request)) for name, request in calls]
+    print(json.dumps([{field: getattr(a, field) for field in a.get_fields_and_field_types()} for a in answers]))
+
+
+def filled(message: Any, values: Mapping[str, Any]) -> Any:
+    """The message with these values."""
+    for field, value in values.items():
+        part = getattr(message, field)
+        setattr(message, field, filled(part, value) if isinstance(value, dict) else type(part)(value))
+    return message
+
+
+if __name__ == "__main__":
+    main()
