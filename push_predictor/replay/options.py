@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from push_predictor.errors import RequestError
+from push_predictor.recordings.topics import STREAMS, Topics
 from push_predictor.replay.clock import SECOND
 from push_predictor.replay.play_range import PlayRange
 
@@ -45,7 +46,7 @@ class TopicFilter:
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """The options of a replay; times in ns."""
+    """The options of a replay; times in ns. topics: of the streams of pushes, where they were given."""
 
     recording: Path
     rig: Path | None
@@ -65,12 +66,13 @@ class ReplayOptions:
     window: int
     acked_timeout: int
     strict: bool
+    topics: Topics
 
 
 def replay_options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptions:
     """The options for parameter values by name and times (ns) by name. Raises RequestError for a wrong value."""
     if not values["recording"]:
-        raise RequestError("recording", "", "an MCAP file or the folder of a rosbag2 MCAP bag")
+        raise RequestError("recording", "", "the path of a recording (docs/reference/recordings.md)")
     if values["restamp"] and values["play.rate"] != 1.0:
         accepted = "1.0, which restamp requires, or restamp false"
         raise RequestError("play.rate", values["play.rate"], accepted)
@@ -104,6 +106,11 @@ def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptio
         window=values["play.read_ahead_queue_size"],
         acked_timeout=times["play.wait_acked_timeout"],
         strict=values["strict"],
+        topics=Topics(
+            *(values[f"{stream}_topic"] for stream in STREAMS),
+            world=values["world_frame"],
+            wrench_frame=values["wrench_frame"],
+        ),
     )
 
 
