@@ -106,12 +106,13 @@ def _options(values: Mapping[str, Any], times: Mapping[str, int]) -> ReplayOptio
         window=values["play.read_ahead_queue_size"],
         acked_timeout=times["play.wait_acked_timeout"],
         strict=values["strict"],
-        topics=Topics(
-            *(values[f"{stream}_topic"] for stream in STREAMS),
-            world=values["world_frame"],
-            wrench_frame=values["wrench_frame"],
-        ),
+        topics=_topics(values),
     )
+
+
+def _topics(values: Mapping[str, Any]) -> Topics:
+    named = {stream: values[f"{stream}_topic"] for stream in STREAMS}
+    return Topics(**named, world=values["world_frame"], wrench_frame=values["wrench_frame"])
 
 
 def _filter(values: Mapping[str, Any]) -> TopicFilter:
