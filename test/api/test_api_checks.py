@@ -160,6 +160,14 @@ def test_a_validation_warns_of_training_pushes_and_of_another_slider(model: Push
     assert "was trained with the outline of 'hex'" in text
 
 
+def test_a_validation_warns_of_faults_of_the_streams_also_if_strict(model: PushModel, tmp_path: Path) -> None:
+    """They do not make the data wrong."""
+    write_recording(tmp_path / "blind", replace(read_recording(HEXAGON), wrench=None))
+    assert any(
+        "no wrench was recorded" in text for text in warned(lambda: validate(model, tmp_path / "blind", strict=True))
+    )
+
+
 def test_a_trace_of_a_narrow_domain_states_what_that_means(
     model: PushModel, narrow: Path, loaded_only: Callable[..., None]
 ) -> None:
