@@ -176,8 +176,10 @@ def _validation(options: argparse.Namespace) -> None:
             watch = part_of(watch, 0.5, 1.0)
         else:
             models, recording = [load_model(path) for path in options.model], options.recording
-        topics, checks = topics_of(options), DataChecks(options.strict, warn)
-        page, metrics = report_recording(models, recording, options.out, rig, topics, watch, warn, checks)
+        checks = DataChecks(options.strict, warn)
+        page, metrics = report_recording(
+            models, recording, options.out, rig, topics_of(options), watch=watch, report=warn, checks=checks
+        )
         save_topics_of(options, [recording])
     write_text(options.out / "validation.json", json.dumps(metrics, indent=2) + "\n")
     if not write_json(options, {"report": str(page), "models": metrics}):
